@@ -121,14 +121,17 @@ def build(
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:
-    """Return the platforms with these names, with `host` resolved; all if there are no names. Raises BuildError."""
+    """Return the platforms with these names, with `host` resolved. Without names, return all platforms.
+
+    Raises OptionError about an unknown name, and BuildError if there is no platform for this machine.
+    """
     if not names:
         return list(PLATFORMS)
     names = [names] if isinstance(names, str) else names
     if unknown := set(names) - {"host", *PLATFORMS}:
         hint = did_you_mean(min(unknown), ["host", *PLATFORMS], also=OTHER_NAMES)
         all_names = ", ".join(["host", *PLATFORMS])
-        raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only {all_names}{hint}")
+        raise OptionError(f"there is no platform {', '.join(sorted(unknown))}, only {all_names}{hint}")
     host = host_platform(fmi)
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")

@@ -299,8 +299,9 @@ def _simulate(
     from rov_fmu.report.console import print_end
 
     opens = plot == Path()
-    check_outputs(output, None if opens else plot, [path for path in (vehicle, commands) if path])
     loaded = load(vehicle)
+    inputs = [vehicle, *loaded.files, *([commands] if commands else [])]
+    check_outputs(output, None if opens else plot, inputs)
     result = run(loaded, settings, commands, stop, step)
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
     write_results(result, output, picture, title(loaded, settings, commands))

@@ -25,7 +25,7 @@ enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
 
 typedef struct {
     int order;                     /* the order of the highest coefficient that is known */
-    unsigned moving;               /* one bit for each component; it is set where the states are not constant */
+    uint64_t moving;               /* one bit for each component; it is set where the states are not constant */
     unsigned blocks;               /* one bit for each block of equation.h; it is set where the states are not constant */
     double size[N_SERIES];         /* for each state, the size of its group */
     double unit;                   /* the unit of time, s */

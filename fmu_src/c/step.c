@@ -11,7 +11,7 @@ typedef struct {
     double scale[N_SERIES];        /* the size of each group of states, or an earlier size / 4 per piece since, if larger */
     double largest[N_SERIES];      /* the largest size of each group so far */
     double covered[N_USED];        /* the integral of each state's size over time, to within a factor of two */
-    unsigned settled;              /* one bit for each component; it is set once the component has settled */
+    uint64_t settled;              /* one bit for each component; it is set once the component has settled */
     int reverse[N_MONITORED];      /* 1 for each velocity whose coefficients are those of the negative direction */
 } motion;
 
@@ -80,21 +80,21 @@ INLINE void motion_begin(motion *m, double unit, series *s)
     model_direct(m->n, m->reverse, &m->q);
     model_rates(m->n, &m->q, m->y, rate);
     for (int i = 0; i < N_SERIES; i++) {
-        const unsigned bit = 1U << COMPONENT_OF[i];
+        const uint64_t bit = UINT64_C(1) << COMPONENT_OF[i];
         s->c[0][i] = m->y[i];
         s->c[1][i] = m->settled & bit ? 0.0 : unit * rate[i];
         s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
     }
     for (int k = 0; k < N_COMPONENTS; k++) {
-        s->moving |= COMPONENT_INPUTS[k] & s->moving ? 1U << k : 0U;
+        s->moving |= COMPONENT_INPUTS[k] & s->moving ? UINT64_C(1) << k : 0U;
     }
     if (N_DYNAMIC < N_COMPONENTS) { /* a component without an effect need not be computed */
-        unsigned still = 0U; /* one bit for each velocity that stays 0 */
+        uint64_t still = 0U; /* one bit for each velocity that stays 0 */
         for (int i = 0; i < N_MONITORED; i++) {
-            still |= m->y[i] == 0.0 && !(s->moving >> COMPONENT_OF[i] & 1U) ? 1U << i : 0U;
+            still |= m->y[i] == 0.0 && !(s->moving >> COMPONENT_OF[i] & 1U) ? UINT64_C(1) << i : 0U;
         }
         for (int k = N_DYNAMIC; k < N_COMPONENTS; k++) {
-            s->moving &= NEEDED_WITH[k] & ~still ? ~0U : ~(1U << k);
+            s->moving &= NEEDED_WITH[k] & ~still ? ~UINT64_C(0) : ~(UINT64_C(1) << k);
         }
     }
     for (int i = 0; i < N_SERIES; i++) {
@@ -230,7 +230,7 @@ static void motion_settle(motion *m, double rest)
         for (int i = 0; i < N_SERIES; i++) {
             still &= COMPONENT_OF[i] != k || fabs(rate[i]) <= 8.0 * DBL_EPSILON * size[i] + DBL_MIN;
         }
-        m->settled |= still || motion_fades(m, k, rest) ? 1U << k : 0U;
+        m->settled |= still || motion_fades(m, k, rest) ? UINT64_C(1) << k : 0U;
     }
 }
 
@@ -250,7 +250,7 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
 static bool motion_coasts(motion *m, double rest, double *heading)
 {
-    if (m->settled != (1U << N_DYNAMIC) - 1U) {
+    if (m->settled != (UINT64_C(1) << N_DYNAMIC) - 1U) {
         return false;
     }
     model_coast(m->n, &m->q, rest, m->y, m->displacement, heading);

@@ -239,7 +239,7 @@ class EquationSource:
 
     def needed_with(self, group: Sequence[str]) -> int:
         """Return bits for the states that let a component act on others unless they are 0, or all bits for always."""
-        always, partners = 2**32 - 1, 0
+        always, partners = 2**64 - 1, 0
         needed = {*self.equation.monitored, *(self.equation.heading if self.layout.has_attitude else ())}
         if self.equation.used.isdisjoint(group) or not needed.isdisjoint(group):
             return always

@@ -63,12 +63,13 @@ class VehicleModel(Vehicle):
 
         `time` holds the output times (s), which rise. Each step from one to the next is exact, whatever its length.
 
-        `inputs` maps names of inputs to values; all other inputs are 0. A value is a number; an array with a value for
-        each time, which is held up to the next time; or a function of an array of times, which is evaluated in the
+        `inputs` maps names of inputs to values. All other inputs have their usual values: no command, no load, no
+        current, and the usual voltage. A value is one of three things. A number holds at all times. An array has a
+        value for each time, which is held up to the next time. A function of an array of times is evaluated in the
         middle of each step and held over the step. Beyond ±1 a command saturates, with a warning. A data frame is
         possible, too. If there is a column `time` among the inputs, the other arrays have a value for each of its times
-        instead. Each value is held from its time up to the next, also between output times; the inputs are 0 before the
-        first time.
+        instead. Each value is held from its time up to the next, also between output times. Before the first time the
+        inputs have their usual values.
 
         `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
         pitch begins at the Euler angles phi_0, theta_0 and psi_0 (rad), which `start` may contain, too. They are 0 by

@@ -68,14 +68,14 @@ def serve(path: Path, options: Options) -> None:
 
 def _setup(path: Path, options: Options) -> Setup:
     """Return what a flight begins with. Raises FileError, InputError, WriteError."""
-    if options.log:
-        if options.log.suffix.lower() != ".csv":
-            raise InputError(f"--log {options.log}: the name must end with .csv")
-        check_targets([options.log], [path])
+    if options.log and options.log.suffix.lower() != ".csv":
+        raise InputError(f"--log {options.log}: the name must end with .csv")
     if options.frame is not None and options.frame not in FRAMES:
         hint = did_you_mean(options.frame, FRAMES)
         raise InputError(f"--frame {shown(options.frame)}: must be one of {', '.join(FRAMES)}{hint}")
     vehicle = load(path)
+    if options.log:
+        check_targets([options.log], [path, *vehicle.files])
     given = read_settings(options.settings, vehicle.layout)
     vehicle = vehicle.with_(**given.coefficients)
     checked_values("inputs", given.inputs, vehicle.layout.inputs, many=False)

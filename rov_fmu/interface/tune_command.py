@@ -30,7 +30,7 @@ def tune_vehicle(
     if not vehicle.layout.has(axis):
         raise InputError(f"tune: {path}: --axis {axis.name}: the vehicle has only {', '.join(vehicle.layout.kinds)}")
     if output:
-        check_targets([output], [points] if points else [])
+        check_targets([output], [*([points] if points else []), *vehicle.files])
         check_written(output, VEHICLE_FILE)
     try:
         tuning = _tuned(vehicle, axis, command, V_ss, Tau, points)

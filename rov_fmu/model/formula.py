@@ -225,6 +225,8 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
                 return ast.BinOp(inner, ast.Div(), _times(ast.Constant(2.0), node))
             if function not in FUNCTIONS:
                 return _times(ast.Call(ast.Name(f"{SLOPE}{function}"), [argument], []), inner)
+            if function == "log":
+                return ast.BinOp(inner, ast.Div(), argument)
             slope = ast.Call(ast.Name("cos" if function == "sin" else "sin"), [argument], [])
             return _times(slope if function == "sin" else _negative(slope), inner)
         case ast.Call(func=ast.Name(id="pow"), args=[base, exponent]):  # the base is not negative

@@ -494,7 +494,7 @@ class Layout:
     @cached_property
     def is_linked(self) -> bool:
         """True when the motion along one axis acts on others."""
-        return self.coupled or self.has_attitude
+        return self.coupled or self.has_attitude or bool(self.cross)
 
     @cached_property
     def memory(self) -> tuple[str, ...]:

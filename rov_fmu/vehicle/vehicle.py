@@ -153,9 +153,11 @@ class Vehicle:
 
     @property
     def files(self) -> list[Path]:
-        """The existing files that are read together with the vehicle file."""
+        """The existing files that belong to the vehicle file: its tables, pictures and report."""
         report = self.provenance.report if self.provenance else None
         tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
+        tables += [path for paths in self.thrust_files.values() for path in paths]
+        tables += [table.path for table in self.electric_currents.values()]
         pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
         return [path for path in (*tables, *pictures, report) if path and path.is_file()]
 

@@ -11,7 +11,7 @@ import pytest
 
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import BuildError
+from rov_fmu.engine.compile import OptionError
 from rov_fmu.io.messages import did_you_mean, only, similar
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import ALONE, BARE, TESTS
@@ -207,7 +207,7 @@ def test_a_mistake_on_the_command_line_is_one_line(case: str, here: Path, capsys
 
 
 def test_platforms_of_a_program_are_guessed_too() -> None:
-    with pytest.raises(BuildError, match=r"^there is no platform macos, only host, .*; did you mean darwin64 or aa"):
+    with pytest.raises(OptionError, match=r"^there is no platform macos, only host, .*; did you mean darwin64 or aa"):
         chosen_platforms(["macos"])
 
 

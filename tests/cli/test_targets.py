@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import BARE, COMMANDS, REFIT, TESTS, Command, run_elsewhere, without_progress
 from tests.folders import small_folder
+from tests.vehicles import THRUST_EFFECTS
 
 Capsys = pytest.CaptureFixture[str]
 OLD = b"the old one"
@@ -244,6 +245,31 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(tmp_path: Path, c
     _refused([*tune, str(points)], tmp_path, capsys)
     assert main([*tune, str(rov)]) == 0, "a vehicle may be tuned in its place"
     assert load_vehicle(rov).sources["alpha_w"].startswith("Tuned to")
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "names"),
+    [
+        (THRUST_EFFECTS, {"thrust_12_v.csv", "thrust_16_v.csv"}),
+        (SHIPPED["bluerov2"], {"t200_current_16_v.csv"}),
+    ],
+    ids=["thrust", "electric current"],
+)
+def test_no_command_writes_over_a_table_of_the_vehicle(
+    vehicle: Path, names: set[str], tmp_path: Path, capsys: Capsys
+) -> None:
+    for path in (vehicle, *load_vehicle(vehicle).files):
+        copy = tmp_path / path.relative_to(vehicle.parent)
+        copy.parent.mkdir(exist_ok=True)
+        shutil.copy(path, copy)
+    rov = tmp_path / vehicle.name
+    tables = {path for path in load_vehicle(rov).files if path.suffix == ".csv"}
+    assert {path.name for path in tables} == names
+    for table in map(str, tables):
+        _refused(["simulate", str(rov), "-o", table], tmp_path, capsys)
+        _refused(["sitl", str(rov), "--log", table], tmp_path, capsys)
+        _refused(["tune", str(rov), "--axis", "surge", "--command", "1", "--v-ss", "1", "-o", table], tmp_path, capsys)
+        _refused(["build", str(rov), "-o", table], tmp_path, capsys)
 
 
 @pytest.mark.parametrize("there", [True, False])

@@ -161,6 +161,6 @@ def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Veh
 
 
 def test_build_raises_an_error_about_an_unknown_platform(vehicle: Vehicle, tmp_path: Path) -> None:
-    with pytest.raises(fmu_compile.BuildError, match="there is no platform linux, only host, linux64"):
+    with pytest.raises(fmu_compile.OptionError, match="there is no platform linux, only host, linux64"):
         build(vehicle, tmp_path / "rov.fmu", platforms=["linux"])
     assert list(tmp_path.iterdir()) == []

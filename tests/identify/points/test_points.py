@@ -207,6 +207,8 @@ def test_axes_that_share_a_curve_are_one_group() -> None:
     (everything,) = connected(VIDEORAY.layout, tilts=True)
     assert everything == ([*VIDEORAY.layout.curves], [SURGE, HEAVE, YAW])
     assert len([*connected(HEAVY.layout)]) == 1, "its axes are coupled"
+    crossed = replace(VIDEORAY.layout, cross=(("a_d", "w", "u"),))
+    assert len([*connected(crossed)]) == 1, "surge acts on heave"
     assert [curve.name for curve in curves_of(VIDEORAY.layout, YAW)] == ["rear"]
 
 
