@@ -318,22 +318,25 @@ def _unusable(
     error: NoFitError | MotionError,
     fit: Callable[[Sequence[Recording]], object],
 ) -> UnusableError:
-    """Return the recordings of an axis that no vehicle fits alone, or else all of them, and the likely cause."""
-    wrong = list(recordings)
-    if len(recordings) > 1:
-        wrong = []
-        for recording in recordings:
-            try:
-                fit([recording])
-            except (NoFitError, MotionError) as its_error:
-                wrong, error = [*wrong, recording], its_error
-        wrong = wrong or list(recordings)
-    files = join_names(dict.fromkeys(recording.file for recording in wrong))
-    line = str(error) if isinstance(error, NoFitError) else f"{files}: {error}: check units and signs"
-    names = {"reason": str(error).removeprefix(f"{files}: ").partition(". ")[0], "cause": _likely_cause(wrong, base)}
-    return UnusableError(
-        f"{tests.folder}: {line}", Finding("no fit", wrong[0].axis.name, names=names), wrong[0].axis, wrong
-    )
+    """Return the recordings of an axis that no vehicle fits alone, or else all of them, and the likely cause.
+
+    Recordings with another reason than the first one are found when the rest is fitted again.
+    """
+    alone: dict[str, list[Recording]] = {}
+    for recording in recordings if len(recordings) > 1 else ():
+        try:
+            fit([recording])
+        except (NoFitError, MotionError) as its_error:
+            alone.setdefault(_reason(its_error), []).append(recording)
+    reason, wrong = next(iter(alone.items()), (_reason(error), list(recordings)))
+    files, axis = join_names(dict.fromkeys(recording.file for recording in wrong)), wrong[0].axis
+    names = {"reason": reason.partition(". ")[0], "cause": _likely_cause(wrong, base)}
+    return UnusableError(f"{tests.folder}: {files}: {reason}", Finding("no fit", axis.name, names=names), axis, wrong)
+
+
+def _reason(error: NoFitError | MotionError) -> str:
+    """Return why there is no fit, and what to check."""
+    return error.reason if isinstance(error, NoFitError) else f"{error}. Check units and signs"
 
 
 def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:

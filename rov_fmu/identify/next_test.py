@@ -47,7 +47,7 @@ _VAGUE = 1e3
 REPEATED = "fly the first step of the dive once more at its end, because something drifts over the dive"
 """What to do where drift is suspected: the two steps show how much it is."""
 NO_LIMITS = TankLimits()
-NOISE = {"distance": 0.02, "depth": 0.01, "heading": 0.01, "velocity": 0.02}
+NOISE = {"distance": 0.02, "depth": 0.01, "heading": 0.01, "roll angle": 0.01, "pitch angle": 0.01, "velocity": 0.02}
 """The noise of a typical sensor (m, rad, m/s), where there is no recording."""
 
 

@@ -402,7 +402,7 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]], kn
 def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> Iterator[str]:
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
-    yield from _unknown_effects(layout)
+    yield from _unknown_effects(layout, description.base_name)
     yield from _mistakes_in_known(file, description)
     if "known" not in lost:
         yield from _missing_halves(file, description)
@@ -427,24 +427,34 @@ def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> 
         yield key_line("fit.attitude", f"the vehicle has the axis {join_names(own)}, which is simulated: leave it out")
 
 
-def _unknown_effects(layout: Layout) -> Iterator[str]:
-    """Yield a line for each effect that identification does not know, and that would make its coefficients wrong."""
+_UNKNOWN_EFFECTS = {
+    "table": "identification fits a_t and b_t in place of a table",
+    "V_0": "identification fits the effect of the voltage if [fit] has `voltage`",
+    "d": "identification fits the loss of thrust if [fit] has `advance`",
+}
+"""Keys of a thrust curve, and what identification does instead of using them."""
+
+
+def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
+    """Yield a line for each effect that identification does not use, and that would make its coefficients wrong.
+
+    The effects are those of rov.toml or of its `base`.
+    """
+    found: dict[str, str] = {}
     for curve in layout.curves:
-        for key, given in (("table", curve.tables), ("V_0", "V_0" in curve.keys), ("d", "d" in curve.keys)):
-            if given:
-                reason = (
-                    "identification does not know this effect: leave it out here, and add it to the vehicle file later"
-                )
-                yield key_line(f"curves.{curve.name}.{key}", reason)
+        keys = (*curve.keys, *(["table"] if curve.tables else []))
+        found |= {f"curves.{curve.name}.{key}": reason for key, reason in _UNKNOWN_EFFECTS.items() if key in keys}
     if layout.fins:
-        yield key_line(
-            "fin", "identification does not know fins: leave them out here, and add them to the vehicle file later"
-        )
+        found["fin"] = "identification does not know fins"
     if layout.has_dead_time:
-        yield key_line("commands.T_d", "identification finds delays itself: leave it out here")
+        found["commands.T_d"] = "identification finds delays itself"
     if layout.pulse:
-        reason = "each log says itself what its commands are: leave it out here, and add it to the vehicle file later"
-        yield key_line("commands.pulse", reason)
+        found["commands.pulse"] = "each log says itself what its commands are"
+    for key, reason in found.items():
+        if base:
+            yield key_line("base", f"this vehicle has {key}, but {reason}. Remove it in a copy of the file", base)
+        else:
+            yield key_line(key, f"{reason}. Leave it out here, and add it to the vehicle file later")
 
 
 def _mistakes_in_known(file: _ReadableFile, description: Description) -> Iterator[str]:

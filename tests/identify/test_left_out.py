@@ -113,7 +113,10 @@ def failing(fit: Fit, fails: Callable[[Sequence[Recording]], bool], error: Excep
 @pytest.mark.parametrize(
     ("error", "reason"),
     [
-        (NoFitError("log_heave_1.csv: no vehicle moves so: a_d = 9 would do it best. Check units"), "no vehicle moves"),
+        (
+            NoFitError("log_heave_1.csv", "no vehicle moves so: a_d = 9 would do it best. Check units"),
+            "no vehicle moves",
+        ),
         pytest.param(
             MotionError("the motion cannot be computed"),
             "the motion cannot be computed. Check units and signs",
@@ -135,6 +138,25 @@ def test_a_recording_that_no_vehicle_fits_is_left_out(
     assert found.vehicle.rov["a_d_w"] == pytest.approx(VIDEORAY["a_d_w"] / VIDEORAY["alpha_w"], rel=0.1)
 
 
+def test_recordings_that_no_vehicle_fits_have_each_their_own_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fit_or_fail(recordings: Sequence[Recording], *args: object, **options: object) -> object:
+        for recording in recordings:
+            if recording.file != "log_heave_0.csv":
+                raise NoFitError(recording.file, f"{recording.file[10]} moves so. Check units")
+        return fit_recordings(recordings, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "fit_recordings", fit_or_fail)
+    second = (folder(tmp_path) / "log_heave_1.csv").read_text(encoding="utf-8")
+    found = identify(load_tank_tests(folder(tmp_path, log_heave_2=f"{second}\n")))
+    told = [line for line in found.warnings if "no recording of heave" in line]
+    assert [line.partition(". ")[0] for line in told] == [
+        f"log_heave_{n}.csv: no recording of heave, because {n} moves so" for n in (1, 2)
+    ]
+    assert files(found) == ["log_heave_0.csv"]
+
+
 def test_where_nothing_fits_the_folder_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     error = MotionError("the motion cannot be computed")
     monkeypatch.setattr(module, "fit_recordings", failing(fit_recordings, lambda _: True, error))
@@ -142,7 +164,7 @@ def test_where_nothing_fits_the_folder_is_refused(tmp_path: Path, monkeypatch: p
     with pytest.raises(DataFileError) as refusal:
         identify(load_tank_tests(path))
     files = "log_heave_0.csv, log_heave_1.csv"
-    assert str(refusal.value) == f"{path}: {files}: the motion cannot be computed: check units and signs"
+    assert str(refusal.value) == f"{path}: {files}: the motion cannot be computed. Check units and signs"
 
 
 def test_axes_that_fit_alone_only_are_fitted_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -153,7 +175,7 @@ def test_axes_that_fit_alone_only_are_fitted_apart(tmp_path: Path, monkeypatch: 
     def both(recordings: Sequence[Recording]) -> bool:
         return len({recording.axis for recording in recordings}) == 2
 
-    error = NoFitError("log_surge_0.csv: no surge moves so")
+    error = NoFitError("log_surge_0.csv", "no surge moves so")
     monkeypatch.setattr(module, "fit_recordings", failing(fit_recordings, both, error))
     found = identify(load_tank_tests(path))
     assert files(found) == ["log_surge_0.csv", "log_yaw_0.csv"]

@@ -11,6 +11,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.geometry import check_layout
+from tests.commands import ROOT
 from tests.damage import changed_toml, fuzz
 from tests.folders import (
     BLUEROV2,
@@ -66,7 +67,13 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         f"{DOWN}[commands]\npulse = [1100, 1500, 1900]\n",
         WITH_THRUST,
-        "/rov.toml: commands.pulse: each log says itself what its commands are: leave it out here, and add it to the",
+        "/rov.toml: commands.pulse: each log says itself what its commands are. Leave it out here, and add it to the",
+    ),
+    (
+        f'base = "remus100.toml"\n{HEAD}',
+        {"remus100.toml": (ROOT / "examples" / "remus100" / "remus100.toml").read_text(encoding="utf-8")},
+        "/rov.toml: base = 'remus100.toml': this vehicle has fin, but identification does not know fins. Remove it | "
+        ": there are no tests",
     ),
     (
         DOWN.replace('curve = "t200"', 'curve = "t100"'),

@@ -27,7 +27,11 @@ class MotionError(ArithmeticError):
 
 
 class NoFitError(ValueError):
-    """Recordings that no vehicle fits; the message is one line with the axis and its files."""
+    """No vehicle fits some recordings. The message is one line with their files and the reason."""
+
+    def __init__(self, files: str, reason: str) -> None:
+        super().__init__(f"{files}: {reason}")
+        self.reason = reason
 
 
 def limits(
@@ -63,8 +67,9 @@ def check_limits(
         if what := next(_at_limit(axis, own, names, extras, x, low, high), None):
             files = ", ".join(dict.fromkeys(r.file for r in own))
             raise NoFitError(
-                f"{files}: no {axis.name} of a vehicle with this thrust and mass moves so: {what} would do it best. "
-                f"Check units, signs, and the order and directions of the thrusters"
+                files,
+                f"no {axis.name} of a vehicle with this thrust and mass moves so: {what} would do it best. "
+                f"Check units, signs, and the order and directions of the thrusters",
             )
 
 
@@ -79,8 +84,9 @@ def check_thrust(rov: Rov, data: Sequence[PreparedRecording]) -> None:
             files = join_names(dict.fromkeys(recording.file for recording in own))
             axes = join_names(dict.fromkeys(recording.axis.name for recording in own))
             raise NoFitError(
-                f"{files}: no {curve.name} thrust moves a vehicle so in {axes}: {what} would do it best. "
-                f"Check units, signs, and the order and directions of the thrusters"
+                files,
+                f"no {curve.name} thrust moves a vehicle so in {axes}: {what} would do it best. "
+                f"Check units, signs, and the order and directions of the thrusters",
             )
 
 
