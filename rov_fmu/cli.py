@@ -1,6 +1,7 @@
 """The command rov-fmu: build, simulate, fly, sitl, sdf, prove, study, identify, tune, schema, tables, figures.
 
-Each command is a short function, which imports what it needs when it is called: so `--help` and completion are quick.
+Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
+fast.
 """
 
 import warnings
@@ -70,7 +71,7 @@ _vehicle = partial(
 
 
 class _Choice(click.Choice[Any]):
-    """One of several words. A wrong word ends with one line that lists them and names the most similar one."""
+    """One of several words. A wrong word leads to one line that lists the choices and names the most similar one."""
 
     def __init__(self, choices: Sequence[Any], also: Mapping[str, str] | None = None) -> None:
         """`also` maps other words that people use to the choices."""
@@ -132,7 +133,7 @@ _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is 
 
 
 class _Commands(click.Group):
-    """The commands. Without one, the help is printed; it has the whole summary of each."""
+    """The commands. Without a command, the help is printed. It shows the complete summary of each command."""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the commands with their summaries, which Click would cut to a line."""
@@ -378,7 +379,8 @@ def _short_names(paths: Sequence[Path]) -> list[str]:
 
 
 def _open(path: Path, option: str) -> None:
-    """Print the path of a file, and open it in a browser. The option writes the file where the user wants it."""
+    """Print the path of a file, and open it in a browser. `option` is the option with which the user can choose the
+    place of the file."""
     click.echo(path)
     if not webbrowser.open(path.as_uri()):
         click.echo(

@@ -27,15 +27,16 @@ from rov_fmu.tank.recording import Recording
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
 _BACKWARD = 0.005
-"""A thrust curve that points backward only at commands below this one does so by rounding."""
+"""If a thrust curve has the wrong sign only below this command, rounding is the reason."""
 _CHANCE = 0.003
-"""The probability that forces or tables and recordings of the same vehicle seem to differ, although they do not."""
+"""The probability of a false alarm about a difference between recordings and forces or tables."""
 _SOME_OUTLIERS, _MANY_OUTLIERS = 0.03, 0.15
 """The shares of outliers above which they are reported, and above which a recording is doubtful."""
 _TURNS = 0.05
-"""A rate of turn, rad/s, that changes a test of surge or sway."""
+"""The rate of turn above which a test of surge or sway is affected, rad/s."""
 _SIGNIFICANT = 4.0
-"""A difference between directions of so many standard errors is no chance, at any of some ten commands."""
+"""A difference between directions counts if it exceeds this number of standard errors. About ten commands are tested,
+so chance hardly reaches it."""
 
 
 def on_thrust(curve: str, fit: ThrustFit, rov: Rov) -> Iterator[Finding]:
@@ -71,7 +72,7 @@ def on_turning(results: Iterable[AxisResult], rov: Rov) -> Iterator[Finding]:
 
 
 def on_voltage(rov: Rov, requests: Requests) -> Iterator[Finding]:
-    """Yield a finding if the voltage was fitted, and nobody said at which voltage the thrust was measured."""
+    """Yield a finding if the voltage was fitted, but the voltage of the thrust tests is not given."""
     fitted = [curve.name for curve in rov.layout.curves if "V_0" in curve.keys]
     if requests.voltage and (unsaid := [name for name in fitted if name not in requests.measured_at]):
         key = coefficient_name("V_0", unsaid[0])
@@ -253,8 +254,8 @@ def on_forces(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:
 def _asymmetry(x: Array, y: Array, model: Array, noise: float = 0.0) -> dict[str, float] | None:
     """Compare both directions at the same command; return the numbers of a finding, or None.
 
-    There is a finding where the directions differ by 5 % more, or less, than in the model, and by more than the noise
-    and the scatter of repeated measurements explain.
+    There is a finding if the ratio of the directions differs from the model by more than 5 %, and by more than noise
+    and scatter explain.
     """
     ratios, scatter = {}, max(noise, _scatter(x, y))
     for level in np.unique(np.round(np.abs(x[x < 0.0]), 6)).tolist():

@@ -18,7 +18,7 @@ def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
 
 
 def warnings(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of the findings that ask for something, as warnings and doubts do."""
+    """Return the sentences of warnings and doubts."""
     return sentences(finding for finding in found if finding.kind not in FACTS)
 
 
@@ -132,8 +132,8 @@ _USUAL_BETA = 0.65
 def _weak_thrust(values: Mapping[str, Any]) -> str:
     """Explain that all axes of a curve move as if the thrust were several times as strong.
 
-    The factor is the mean of β, so with forces that are stronger by it, β would be 1. It is a lower bound, because β of
-    an ROV is below 1. The likely cause is the one whose factor leads to a usual β.
+    The factor is the geometric mean of β. If the forces were larger by this factor, β would be 1. The true factor is
+    larger, because β of an ROV is below 1. The likely cause is the one that leads to the most usual β.
     """
     factor = float(values["factor"])
     causes = {1.0 / of_newton: f"are they in {unit}" for unit, of_newton in FORCE_UNITS.items() if unit != "N"}
@@ -360,7 +360,7 @@ FACTS = frozenset(EFFECTS) | {
     "switches between rows",
     "delay not modelled",
 }
-"""The kinds of findings that say what was found or done, and ask for nothing."""
+"""The kinds of findings that need no action."""
 FIRST = frozenset({"missing column", "copy", "frozen sensors", "axis not pushed", "no fit", "poor prediction"})
 """The kinds of warnings that stand first: wrong or missing data, and axes that must not be trusted."""
 DOUBTS = frozenset(
@@ -383,7 +383,7 @@ DOUBTS = frozenset(
         "correlated residuals",
     }
 )
-"""The kinds of findings that say what the data leave open. All other kinds contradict the model or the data."""
+"""The kinds of findings about open questions. Kinds in neither set are warnings."""
 
 
 def heading(finding: Finding) -> str:

@@ -29,7 +29,8 @@ class AxisResult:
 
     axis: Axis
     points: tuple[Point, ...]
-    """The points of the tables, and those read off the recordings, without weight where the recordings are fitted."""
+    """The points of the tables, and those read off the recordings. The latter have weight 0 if the recordings are
+    fitted."""
     steps: tuple[StepResponse, ...]
     """The held commands of the recordings."""
     drag: QuadraticFit | None
@@ -105,7 +106,7 @@ class Identification:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The n measured points of one quantity of an axis, beside models; NaN where there is no number."""
+    """The n measured points of one quantity of an axis, with the values of models. NaN stands for a missing value."""
 
     result: AxisResult
     quantity: str

@@ -44,7 +44,8 @@ from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 _CHECKED, _FITTED = 0.1, 0.9
 """The share of the work that is done when units and signs are checked, and when the recordings are fitted."""
 _SATURATED = 0.2
-"""The share of the time at full command from which on saturation is the likely cause of a recording without a fit."""
+"""If a recording cannot be fitted and its thrusters were at full command for more than this share of the time,
+saturation is the likely cause."""
 _MEAN_VOLTAGE = "Mean voltage of the recordings"
 _ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
 _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
@@ -53,8 +54,8 @@ _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 def identify(tests: TankTests, on_progress: Progress = silent) -> Identification:
     """Identify a vehicle from its tests.
 
-    Tests that cannot be used are left out with a finding. Raises DataFileError where nothing can be learnt, or where
-    the unit or sign of a file is certainly wrong, and VehicleFileError.
+    Unusable tests are left out, with a finding. Raises DataFileError if no usable test remains or if the unit or sign
+    of a file is certainly wrong, and VehicleFileError.
     """
     while True:
         try:
@@ -155,7 +156,7 @@ class _Found:
         """Take the coefficients from recordings, which also correct tested thrust curves."""
         values = {name: fit.rov[name] for name in fit.estimate.names}
         curves = [c for c in fit.rov.layout.curves if c.coefficient("n_V") in values]
-        if curves:  # the battery and V_0 belong to the exponent
+        if curves:  # with the exponent, the vehicle also gets a battery and V_0
             self.rov = Rov(replace(self.rov.layout, voltage=fit.rov.layout.voltage), self.rov.coefficients)
         for curve in curves:
             V_0 = curve.coefficient("V_0")
@@ -166,7 +167,7 @@ class _Found:
         for name in fit.estimate.names:
             tested = self.tested.get(name)
             self.sources[name] = f"{tested}, and the recordings" if tested else _capitalized(fit.method)
-            self.intervals.pop(name, None)  # that of the forces alone
+            self.intervals.pop(name, None)  # the interval from the forces only is no longer valid
         self.intervals |= fit.estimate.intervals
 
     def take(self, result: AxisResult) -> None:
@@ -254,7 +255,7 @@ def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
 
 
 def _recordings(tests: TankTests, axes: Iterable[Axis]) -> list[Recording]:
-    """Return the recordings of axes that have something to be identified."""
+    """Return the recordings of the axes of which drag or β is unknown."""
     wanted = (axis for axis in axes if drag_and_beta(axis, tests.given.known))
     return [recording for axis in wanted for recording in tests.recordings.get(axis.name, ())]
 
@@ -262,7 +263,8 @@ def _recordings(tests: TankTests, axes: Iterable[Axis]) -> list[Recording]:
 def _fit_recordings(
     tests: TankTests, recordings: Sequence[Recording], base: Rov, thrust: Mapping[str, ThrustFit], on_progress: Progress
 ) -> tuple[dict[str, RecordingsFit], list[Finding]]:
-    """Fit recordings of axes that share thrust curves; return the fits by axis, and a finding about fits apart.
+    """Fit recordings of axes that share thrust curves; return the fits by axis, and findings if the axes had to be
+    fitted separately.
 
     Where no vehicle fits all recordings, each axis is fitted alone. Raises UnusableError with the recordings that
     cannot be fitted alone either.
@@ -318,7 +320,8 @@ def _unusable(
     error: NoFitError | MotionError,
     fit: Callable[[Sequence[Recording]], object],
 ) -> UnusableError:
-    """Return the recordings of an axis that no vehicle fits alone, or else all of them, and the likely cause.
+    """Return an error with the recordings of an axis that cannot be fitted even alone (or with all of them, if each
+    can), and with the likely cause.
 
     Recordings with another reason than the first one are found when the rest is fitted again.
     """
@@ -340,7 +343,7 @@ def _reason(error: NoFitError | MotionError) -> str:
 
 
 def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:
-    """Return what most likely prevents a fit, in words."""
+    """Return the most likely reason why a fit fails."""
     full = max(float(np.mean(np.abs(r.reaching(base.layout)).max(axis=1) >= 0.999)) for r in recordings)
     if full > _SATURATED:
         return f"Thrusters are at full command for {full:.0%} of the time, where they may be limited by the current"
@@ -360,7 +363,7 @@ def _axis(
     check_push(tests.folder, axis, base, [p.command for p in points if p.weight > 0.0])
     points = tuple(p if is_pushed(axis, base, p.command) else replace(p, weight=0.0) for p in points)
     used = [p for p in points if p.weight > 0.0]
-    if fitted:  # this fit has every sample, so points that were read off the recordings tell nothing more
+    if fitted:  # the fit uses every sample, so points that were read off the recordings add no information
         points = tuple(replace(p, weight=0.0) if p.is_read_off else p for p in points)
     response = _response(axis, points, base, known, _thrust_of(fitted, driving))
     wanted = set(drag_and_beta(axis, known))

@@ -33,7 +33,7 @@ class Estimate:
     covariance: Array
     """p x p; infinite where a coefficient is not identifiable."""
     degrees_of_freedom: float
-    """Independent numbers less parameters."""
+    """The number of independent measurements minus the number of parameters."""
     noise: float
     """Standard deviation of the residuals, in their unit."""
 
@@ -80,7 +80,7 @@ class Estimate:
             return np.asarray(self.covariance / np.outer(error, error))
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """Return the physical part of the 95 % interval; None where the coefficient is not identifiable."""
+        """Return the 95 % interval, cut at the physical bounds; None where the coefficient is not identifiable."""
         value, error = self[name], self.errors[name]
         if not isfinite(error) or not self.degrees_of_freedom > 0.0:
             return None
@@ -133,7 +133,7 @@ def internal(names: Sequence[str], values: Mapping[str, float]) -> Array:
 
 
 def external(names: Sequence[str], x: Array) -> dict[str, float]:
-    """Convert internal parameters to named coefficients; x may contain more parameters behind them."""
+    """Convert internal parameters to named coefficients; x may contain further parameters after them."""
     return {n: exp(value) if is_factor(n) else value for n, value in zip(names, x.tolist(), strict=False)}
 
 
@@ -157,8 +157,9 @@ def minimize(
 ) -> Solution:
     """Solve bounded least squares with SciPy.
 
-    With a robust loss, residuals beyond the threshold count less than their square. The methods follow each other:
-    "trf" stays away from the bounds, for starts far from the solution, and "dogbox" ends at them.
+    With a robust loss, residuals beyond the threshold count less than their square. The methods are used one after
+    another. "trf" stays away from the bounds, which helps if the start is far from the solution. "dogbox" can end at a
+    bound.
     """
     low, high = limits
     start = np.clip(start, low, high)
@@ -237,19 +238,21 @@ def estimate_alike(
 
 
 def scaled(columns: Array) -> Array:
-    """Return the columns that are not zero, with a length of 1."""
+    """Return the nonzero columns, scaled to length 1."""
     size = np.linalg.norm(columns, axis=0)
     return np.asarray(columns[:, size > 0.0] / size[size > 0.0])
 
 
 def basis(columns: Array, least: float) -> Array:
-    """Return an orthonormal basis of the space of the columns, without directions that are smaller than `least`."""
+    """Return an orthonormal basis of the space of the columns, without directions whose singular value is below
+    `least`."""
     U, s, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(U[:, s > least])
 
 
 def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Array:
-    """Predict the numbers of every group by a fit without it; NaN where too few remain (None)."""
+    """Predict the values of each group by a fit without this group. NaN if too few data remain (`predict` returns
+    None)."""
     found = np.full(len(groups), np.nan)
     for group in np.unique(groups):
         out = groups == group

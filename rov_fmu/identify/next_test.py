@@ -28,20 +28,20 @@ from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 _PULLS = (0.05, 0.1, 0.15, 0.2)
-"""The weak commands of a test of forces, where the shape of the thrust curve is hard to see."""
+"""The commands of a test of forces. At weak commands the shape of the thrust curve is least known."""
 _TIMES = 4
 """The number of forces at each of these commands."""
 _RATE = 10.0  # Hz
 _HOLDS = 5.0, 60.0
-"""The shortest and the longest hold, s, where no limit asks for a shorter one."""
+"""The shortest and the longest hold, s. Limits may make a hold shorter."""
 _SHORTER = (1.0, 0.5, 0.25, 0.125)
 """The shares of a hold that are tried until the test is within the limits."""
 _KNOWN = 0.05
-"""Half the width of an interval, relative to the value, from which on enough is known."""
+"""Enough is known if half the width of the interval, relative to the value, is at most this."""
 _LEAST_PART = 0.1
 """The share of the quadratic part below which a linear part of thrust or drag hardly matters."""
 _USEFUL = 0.9
-"""The width of an interval after a test, relative to the width before it, from which on the test is of use."""
+"""A test is useful if it reduces the width of the interval to at most this share."""
 _VAGUE = 1e3
 """The assumed standard error of a coefficient that is not identifiable yet, relative to its value."""
 REPEATED = "fly the first step of the dive once more at its end, because something drifts over the dive"
@@ -174,7 +174,7 @@ def _within(
 
 
 def _fits(axis: Axis, rov: Rov, limits: TankLimits, command: Array) -> bool:
-    """Return True when the tank is as long as the vehicle goes, until it has come to rest."""
+    """Return True if the vehicle stays within the length of the tank until it has come to rest."""
     if axis.is_rotation or limits.tank_length == inf:
         return True
     model = _simulator(axis, rov, "velocity", np.concatenate([command, np.zeros(round(_HOLDS[1] * _RATE))]))
@@ -195,7 +195,8 @@ def _simulator(
 
 
 def _information(axis: Axis, rov: Rov, names: tuple[str, ...], sensor: Sensor, command: Array) -> Array:
-    """Return the information of a recording about the coefficients, with unknown initial values; or NaN."""
+    """Return the information of a recording about the coefficients, allowing for unknown initial values. The result is
+    NaN if the motion cannot be computed."""
     model = _simulator(axis, rov, sensor.quantity, command, names, sensor.noise)
     x = model.start(dict(rov.coefficients), {})
     try:

@@ -20,8 +20,9 @@ _WHITE = (0.0, 0.003, 0.01, 0.03, 0.1, 0.3)
 def noise_spectrum(residuals: Array, jacobian: Array) -> Array | None:
     """Return the variance of the noise in each of n coefficients of its cosine transform; None for too few samples.
 
-    The noise is of first order, with white noise added. Standard deviations are averaged over corner frequencies and
-    shares of white noise by their likelihood, so long time constants that cannot be excluded count.
+    The noise is of first order, with white noise added. The standard deviations are averaged over corner frequencies
+    and shares of white noise, weighted by likelihood. Long time constants that the data do not exclude therefore count,
+    too.
     """
     n = len(residuals)
     y, taken = cosines(residuals)[:_SLOWEST], _span(cosines(jacobian)[:_SLOWEST])

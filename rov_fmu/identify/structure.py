@@ -30,21 +30,23 @@ from rov_fmu.tank.smoothing import without_spikes
 _CHANCE = 1e-4
 """The probability of a false alarm by one cause; there are about ten causes."""
 _FREEDOM = 30.0
-"""The degrees of freedom of the estimated spectrum of the noise; few, so that a wrong spectrum raises no alarm."""
+"""The assumed degrees of freedom of the noise spectrum. They are few, so that an error of the spectrum raises no
+alarm."""
 _COEFFICIENTS = 512
 """The number of coefficients of the cosine transform that are tested; faster ones contain no motion."""
 _LAG = 0.2
-"""The time constant that stands for a lag of any length, s. The delay is projected out, so only the shape counts."""
+"""The time constant of the tested lag, s. It represents lags of any length, because the delay is projected out and only
+the shape counts."""
 _SLOW = 12
 """The number of cosines over time that stand for an unknown slow force."""
 _BY_RECORDING = ("drift", "recording", "unknown")
 """The causes whose size may differ between recordings."""
 _NEGLIGIBLE = 1e-6
-"""Residuals within this share of the change of the measured values need no explanation: they are those of rounding."""
+"""Residuals smaller than this share of the range of the measured values are rounding errors, and are not tested."""
 _LEAST_RECORDINGS = 3
-"""The least number of recordings of which one can be told to be unlike the others."""
+"""The least number of recordings for which a single different one can be recognised."""
 _LOGGED = 1.2
-"""The factor by which the score of a cause with a column of its own in the logs is raised above that of the others."""
+"""The score of a cause is multiplied by this factor if a column of the logs measures it."""
 
 
 def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
@@ -133,7 +135,7 @@ class _Case:
         for name, values in s.recording.context.items():
             x = self._sampled(values)
             found[name] = response.by_force(F * (x - x.mean()), x - x.mean())
-            if name in ("roll", "pitch"):  # they turn the velocities of other axes into that of this one
+            if name in ("roll", "pitch"):  # a tilted sensor also measures the velocities of other axes
                 across = np.column_stack([self._beside("u"), self._beside("v")])
                 turning = across * np.gradient(x, s.time)[:, None]
                 turned = response.by_velocity(across * x[:, None]), response.by_force(turning)
@@ -157,7 +159,7 @@ class _Case:
 
     @cached_property
     def _displacement(self) -> Array:
-        """The displacement from the start along the axis, n. A vehicle that turns sees it from another side."""
+        """The displacement from the start, as a component along the present direction of the axis, n."""
         s, axis = self.simulation, self.simulation.recording.axis
         if not is_in_flow(s.recording):
             return self.response.integral(s.velocity[:, None])[:, 0]
@@ -168,12 +170,12 @@ class _Case:
         return np.asarray((place * self._directions[axis.velocity]).sum(axis=1))
 
     def _beside(self, velocity: str) -> Array:
-        """Return a velocity that the log has beside the recording at the n samples; 0 where there is none."""
+        """Return another logged velocity at the n samples, or 0 if it is not logged."""
         recording = self.simulation.recording
         return self._sampled(recording.beside.get(velocity, np.full(len(recording.time), np.nan)))
 
     def _sampled(self, values: Array) -> Array:
-        """Return values beside the recording at the n samples; 0 where there are none."""
+        """Return values of the log at the n samples, or 0 if all are missing."""
         there = np.isfinite(values)
         if not there.any():
             return np.zeros(len(self.simulation.time))
@@ -235,7 +237,7 @@ class _Case:
 
 @dataclass(frozen=True, eq=False)
 class _Misfit:
-    """What one cause explains of the whitened residuals."""
+    """The part of the whitened residuals that one cause explains."""
 
     explained: Array
     count: int

@@ -23,7 +23,7 @@ class Together:
         self.covariance: Array = np.zeros((0, 0))
         chosen = [*results]
         for result in chosen:
-            if result.recordings:  # axes that were fitted at once share this estimate
+            if result.recordings:  # axes that were fitted together share this estimate
                 self._add(result.recordings.together.as_normal())
         for fit in thrust:
             self._add(fit.estimate.as_normal())

@@ -27,7 +27,7 @@ of 1.1 to 1.2."""
 
 
 class TuningError(ValueError):
-    """A response that no tuning gives; the message is one line."""
+    """No tuning gives the wanted response. The message is one line."""
 
 
 @dataclass(frozen=True)

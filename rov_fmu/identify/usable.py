@@ -22,7 +22,7 @@ from rov_fmu.tank.tables import Row
 from rov_fmu.tank.tank_tests import TankTests
 
 _LEAST_PUSH = 1e-6
-"""The smallest push that counts, N or N m. A fit to less could overflow."""
+"""The smallest thrust that counts, N or N m. A fit with less could overflow."""
 
 
 def is_pushed(axis: Axis, base: Rov, command: float) -> bool:
@@ -31,10 +31,11 @@ def is_pushed(axis: Axis, base: Rov, command: float) -> bool:
 
 
 class UnusableError(Exception):
-    """Tests of an axis from which nothing can be learnt: some of its recordings, or all of them."""
+    """Tests of an axis are unusable: some of its recordings, or all of its tests."""
 
     def __init__(self, line: str, finding: Finding, axis: Axis, recordings: Sequence[Recording] = ()) -> None:
-        """Give the line that refuses them where nothing else is left, and otherwise the finding about each of them."""
+        """`line` is the error message if no other test remains. Otherwise `finding` becomes a finding about each
+        recording."""
         super().__init__(line)
         self.finding, self.axis, self.recordings = finding, axis, recordings
 
@@ -89,7 +90,8 @@ def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
 
 
 def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[Finding]:
-    """Return doubtful units and signs. Raises DataFileError with a line for each that is certainly wrong."""
+    """Return findings about doubtful units and signs. Raises DataFileError with a line for each that is certainly
+    wrong."""
     axes = [axis for axis in axes if max(base.force(axis, c) for c in (1.0, -1.0)) >= _LEAST_PUSH]  # see check_push
     recordings = {axis.name: tests.recordings.get(axis.name, ()) for axis in axes}
     steady, time_constants = (
@@ -106,7 +108,7 @@ def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[Findi
 
 
 def _with_forces(findings: Iterable[Finding], axis: Axis, tests: TankTests, base: Rov) -> tuple[Finding, ...]:
-    """Name the files of the forces in the wrong scales of an axis, because no file of the axis agrees with them."""
+    """Add the files of forces to the findings about an axis, because its files all disagree with them."""
     curves = {thruster.curve for thruster in base.layout.drivers(axis)}
     files = ", ".join(sorted({row.file for curve in curves for row in tests.thrust.get(curve, ())}))
     return tuple(

@@ -1,4 +1,4 @@
-"""Check the arguments of a simulation and make arrays of them; each wrong argument gives one clear line."""
+"""Check the arguments of a simulation and convert them to arrays; each wrong argument gives one clear line."""
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
@@ -27,7 +27,8 @@ _ONE_LINE = 60
 
 
 def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_repeat: bool = False) -> Array:
-    """Return times (s) as an array. Raises InputError if there are fewer than `least`, or if they do not rise.
+    """Return times (s) as an array. Raises InputError if there are fewer than `least`, or if they are not in ascending
+    order.
 
     `may_repeat` allows equal times.
     """
@@ -117,7 +118,7 @@ class Commands:
 
 
 def _beyond(values: Array, command: Declaration) -> str:
-    """Return in words the value farthest beyond the range of a command, or an empty text if none is beyond."""
+    """Describe the value that exceeds the range of a command most, or return an empty text."""
     low, high = command.minimum, command.maximum
     excess = np.maximum(low - values, values - high)
     if np.max(excess, initial=0.0) <= 0.0:

@@ -19,10 +19,10 @@ def identify_folder(
 ) -> tuple[Identification, list[str]]:
     """Identify a vehicle from a folder of tank tests, and write its vehicle file and its report if they are asked for.
 
-    `force` allows to replace files that were not written by `identify`, or were changed since. `begin` is called with
-    the name of each part of the work, and returns the function that takes the progress of this part. Returns the
-    identification, and a line for each file that was replaced. Raises FileError, and WriteError before the work begins
-    if a file cannot be written.
+    `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
+    name of each part of the work, and returns the function that takes the progress of this part. Returns the
+    identification, and a line for each file that was replaced. Raises FileError. Raises WriteError if a file cannot be
+    written; most such cases are found before the work begins.
     """
     replaced: list[str] = []
     if vehicle and report:

@@ -1,4 +1,4 @@
-"""The command `rov-fmu identify --inspect`: from a log to a table of what it contains, and a draft of rov.toml."""
+"""The command `rov-fmu identify --inspect`: the content of a log as a table, and a draft of rov.toml."""
 
 import errno
 import re
@@ -53,7 +53,7 @@ def _changing(inspection: Inspection) -> int:
 
 
 def write_draft(path: Path, text: str) -> None:
-    """Write a draft of rov.toml. Raises WriteError where there is one."""
+    """Write a draft of rov.toml. Raises WriteError if the file exists."""
     if path.exists():
         raise WriteError(errno.EEXIST, "the file there is not replaced by a draft", str(path))
     write_whole(Output(path, text.encode()))
@@ -114,7 +114,7 @@ def _draft(
 
 
 def _columns(found: Sequence[Inspection], tables: TableHeaders) -> Iterator[str]:
-    """Yield the table of the headers of CSV files, with those that are not known in comments."""
+    """Yield the table [columns]. Unknown headers are comments."""
     columns = {**tables.columns, **{title: meant for one in found for title, meant in one.columns.items()}}
     unknown = dict.fromkeys(tables.unknown, "") | {name: what for one in found for name, what in one.unread.items()}
     others = {name: what for name, what in unknown.items() if name not in columns}

@@ -66,15 +66,15 @@ class VehicleModel(Vehicle):
         `inputs` maps names of inputs to values. All other inputs have their usual values: no command, no load, no
         current, and the usual voltage. A value is one of three things. A number holds at all times. An array has a
         value for each time, which is held up to the next time. A function of an array of times is evaluated in the
-        middle of each step and held over the step. Beyond ±1 a command saturates, with a warning. A data frame is
-        possible, too. If there is a column `time` among the inputs, the other arrays have a value for each of its times
+        middle of each step and held over the step. Beyond ±1 a command saturates, with a warning. `inputs` may also be
+        a data frame. If there is a column `time` among the inputs, the other arrays have a value for each of its times
         instead. Each value is held from its time up to the next, also between output times. Before the first time the
         inputs have their usual values.
 
         `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
         pitch begins at the Euler angles phi_0, theta_0 and psi_0 (rad), which `start` may contain, too. They are 0 by
-        default: level and heading north. Instead of them, `start` may contain the quaternion, with psi_0 to choose the
-        turn of the heading.
+        default: level and heading north. Instead of them, `start` may contain the quaternion, and psi_0, which selects
+        the number of full turns of the heading.
 
         `record` names the variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the
         outputs of the FMU: states and thrust.
@@ -82,8 +82,8 @@ class VehicleModel(Vehicle):
         The first simulation of a kind of vehicle compiles the engine, which takes seconds, and keeps it in the user's
         cache folder.
 
-        Raises InputError about an argument that cannot be used, and where the motion cannot be computed, because it
-        overflows or takes too many steps; BuildError where the engine cannot be compiled.
+        Raises InputError if an argument cannot be used, or if the motion cannot be computed because it overflows or
+        needs too many steps; BuildError where the engine cannot be compiled.
         """
         result = self._simulated(time, inputs, start, _NONE, record, workers=1, many=False)
         if len(result.failed):

@@ -65,8 +65,8 @@ class Result(Mapping[str, Array]):
     def final(self) -> dict[str, Array]:
         """The recorded states at the last time, by name: the `start` of a simulation that continues this one.
 
-        Of a vehicle with roll or pitch it also contains psi_0, so that the heading counts on. Changes of commands that
-        wait for a dead time are not part of it.
+        For a vehicle with roll or pitch, it also contains psi_0, so that the heading continues. It does not contain
+        changes of commands that are still waiting for the dead time.
         """
         found = {name: self.arrays[name][..., -1][()] for name in self.states}
         return found | (
@@ -130,7 +130,7 @@ class Result(Mapping[str, Array]):
 def _dashes(curves: Sequence[Array]) -> list[Any]:
     """Return the line style of each curve of a panel.
 
-    Of curves that lie on each other, the first is solid. The others are dashed on top of it, so that all are seen.
+    If curves coincide, the first is solid and the others are dashed on top of it, so that all are visible.
     """
     scale = max((float(np.nanmax(np.abs(values), initial=0.0)) for values in curves), default=0.0)
     groups: list[list[int]] = []

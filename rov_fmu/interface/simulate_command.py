@@ -75,7 +75,8 @@ def _result_times(stop: float, step: float) -> Array:
 
 
 def _least_step(stop: float) -> float:
-    """Return the least step with not too many results up to a time, s, rounded up to three digits."""
+    """Return the shortest allowed time between results for a simulation of this length, s, rounded up to three
+    digits."""
     least = stop / _MOST_RESULTS
     digit = 10.0 ** (floor(log10(least)) - 2)
     return ceil(round(least / digit, 6)) * digit
@@ -91,7 +92,7 @@ class Settings:
 
 
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
-    """Return the values of the options --set: inputs, what the vehicle begins with, coefficients. Raises InputError."""
+    """Return the values of the options --set: inputs, initial values and coefficients. Raises InputError."""
     at_start = {*layout.state, *layout.initial}
     found = _read_values(settings, layout)
     return Settings(
@@ -125,7 +126,7 @@ def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
 
 
 def _percent(text: str) -> str:
-    """Return what to write instead of a value in percent, or an empty text for another value."""
+    """Return a hint for a value in percent, or an empty text."""
     try:
         number = float(text.removesuffix("%")) if text.endswith("%") else nan
     except ValueError:

@@ -67,7 +67,7 @@ def serve(path: Path, options: Options) -> None:
 
 
 def _setup(path: Path, options: Options) -> Setup:
-    """Return what a flight begins with. Raises FileError, InputError, WriteError."""
+    """Return the setup of a flight. Raises FileError, InputError, WriteError."""
     if options.log and options.log.suffix.lower() != ".csv":
         raise InputError(f"--log {options.log}: the name must end with .csv")
     if options.frame is not None and options.frame not in FRAMES:

@@ -1,4 +1,4 @@
-"""The command `rov-fmu tune`: what its options mean, and the vehicle file that it writes."""
+"""The command `rov-fmu tune`: the meaning of its options, and the vehicle file that it writes."""
 
 from pathlib import Path
 

@@ -65,7 +65,7 @@ def print_end(written: Sequence[Path], following: str = "") -> None:
 def print_table(found: Table, out: Console | None = None) -> None:
     """Print a table between its title and its caption, which are paragraphs.
 
-    No number is cut: where a terminal is narrower than the numbers of a row, each row is a paragraph.
+    Numbers are never truncated. If the terminal is too narrow for a row, each row is printed as a paragraph.
     """
     out = out or console()
     if found.title:

@@ -1,4 +1,4 @@
-"""The printout of what a log contains."""
+"""The printout of the content of a log."""
 
 from collections.abc import Iterator
 

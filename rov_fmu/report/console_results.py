@@ -21,9 +21,9 @@ from rov_fmu.vehicle.uncertainty import significant, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SCREEN = 24
-"""The number of lines of the printout on a terminal of 80 columns, with the line about what is next."""
+"""The height of the printout on a terminal of 80 columns, in lines, including the line "Next"."""
 _FEWEST_COEFFICIENTS, _FEWEST_LINES = 4, 2
-"""The number of coefficients that are printed at least, and the lines that these need."""
+"""The least number of printed coefficients, and the number of lines that they need."""
 _MOST_WARNINGS = (3, 2, 1)
 """The numbers of warnings that are tried until the printout fits a screen."""
 _GAP = (0, 2, 0, 0)
@@ -65,7 +65,7 @@ def _predictions(identification: Identification) -> Iterator[Table]:
 
 
 def _print_coefficients(out: Console, vehicle: Vehicle, lines: int) -> None:
-    """Print the coefficients with the widest intervals, in columns, on about as many lines."""
+    """Print the coefficients with the widest intervals, in columns, on about `lines` lines."""
 
     def width(name: str) -> float:
         (low, high), value = vehicle.intervals[name], abs(vehicle.rov[name])
@@ -95,7 +95,8 @@ def _columns(texts: Sequence[str], width: int) -> int:
 
 
 def _conclusions(identification: Identification, most: int) -> Iterator[str]:
-    """Yield the paragraphs about other effects, the next test, the first warnings, and what else the report has."""
+    """Yield the paragraphs about other effects, the next test, the first warnings, and the number of further findings
+    in the report."""
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
         yield f"What else acts: {acting_words(kept)}."
@@ -121,7 +122,8 @@ def axes_with_warnings(identification: Identification) -> set[str]:
 
 
 def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[str]:
-    """Yield sentences about the most useful test, and the axes of which enough is known; some axes have warnings."""
+    """Yield sentences about the most useful test, and about axes of which enough is known. `warned` has the axes with
+    warnings."""
     if unknown := [test for test in tests if not test.is_known]:
         widest = unknown[0]
         if useful := next((test for test in unknown if test.is_useful), None):
@@ -155,7 +157,7 @@ def acting_words(kept: Iterable[FittedEffect]) -> str:
 
 
 def _of_recordings(found: Sequence[Unseen]) -> Table:
-    """Return the table of how far predictions of recordings are off that the model was not fitted to."""
+    """Return the table of the errors of predictions of recordings that the model was not fitted to."""
     numbers = ("off by", "no change", "noise")
     title = "Prediction of unseen data, RMS, beside no change at all and the sensor's noise"
     result = table(title, "", numbers, ("of",))

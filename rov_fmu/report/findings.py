@@ -15,7 +15,7 @@ EXPLAINED = {
     "Doubts": "The data leave these questions open. More or other tests would answer them.",
     "Facts": "What was found, and what was done with the data. No action is needed.",
 }
-"""What each group of findings says, by its heading (rov_fmu/identify/findings.py)."""
+"""An explanation of each group of findings, by its heading (rov_fmu/identify/findings.py)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,8 @@ class Unseen:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How far predictions are off (RMS), beside a model that predicts no change and the noise of the sensor."""
+    """The RMS errors of predictions, with two references: the errors of predicting no change, and the sensor's
+    noise."""
 
     span: Span
     of: str
@@ -55,7 +56,7 @@ class Accuracy:
 
 @dataclass(frozen=True)
 class MeasuredAndFitted:
-    """A coefficient that tables give and recordings too. The vehicle has the value of the recordings."""
+    """A coefficient that both tables and recordings determine. The vehicle has the value of the recordings."""
 
     name: str
     unit: str
@@ -151,7 +152,7 @@ def accuracies(axis: Axis, errors: Mapping[Key, Errors]) -> tuple[Accuracy, ...]
 
 
 def measured_and_fitted(results: Identification) -> Iterator[MeasuredAndFitted]:
-    """Yield the coefficients that recordings give, and thrust tests or tables of points too."""
+    """Yield the coefficients that recordings determine and that thrust tests or tables of points determine, too."""
     given: dict[str, MeasuredAndFitted] = {}
     units = {name: meta.unit for name, meta in results.vehicle.layout.coefficients.items()}
 

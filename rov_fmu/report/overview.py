@@ -37,7 +37,7 @@ class ShownPrediction:
     measured: Array
     predicted: Array
     start: float
-    """The time from which on the values are predicted, s; the data before it give the state at the start."""
+    """The time at which the prediction begins, s. The data before it give the initial state."""
     half_band: Array | None
     """Half the width of the 95 % band of the measured values; None where the data do not determine it."""
     by: str
@@ -60,7 +60,7 @@ class ShownPrediction:
 
 
 def shown_prediction(results: Identification) -> ShownPrediction | None:
-    """Return the prediction of unseen data with the median error, neither the best nor the worst; None without any."""
+    """Return the prediction of unseen data with the median error, None if there is no prediction."""
     found = [
         (prediction, result.recordings, result.held_out.by_halves)
         for result in results.axes
@@ -132,14 +132,14 @@ def amount_of_data(tests: TankTests) -> str:
 
 
 def main_errors(predicted: Sequence[Unseen]) -> Iterator[tuple[Unseen, Accuracy]]:
-    """Yield for each axis the error that is easiest to picture: of the position, over 10 s if there is one."""
+    """Yield the most descriptive error of each axis: that of the position, over 10 s if there is one."""
     for row in predicted:
         if row.errors:
             yield row, min(row.errors, key=lambda e: (e.of == "velocity", e.span != "10 s"))
 
 
 def main_coefficients(results: Identification, found: Sequence[Known]) -> tuple[Known, ...]:
-    """Return the coefficients of the axes, or those of them with the widest intervals where there are many."""
+    """Return the coefficients of the axes, or, if there are many, those with the widest intervals."""
     of_axes = {form.coefficient(key) for form in results.vehicle.layout.axes for key in (*form.keys, "alpha", "beta")}
     some = [k for k in found if k.name in of_axes] or [*found]
     widest = sorted(some, key=lambda k: -_width(k))[:_MOST_KNOWN]

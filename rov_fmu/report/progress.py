@@ -1,6 +1,6 @@
 """Progress on stderr: the parts of a command's work, one after another, or several at once.
 
-A terminal shows a line for each part: ✓ and the time that it took, or how far it is and about the time left. The lines
+A terminal shows a line for each part: ✓ and its duration, or its progress and the approximate remaining time. The lines
 disappear when the work ends or is interrupted. A pipe or a file gets one line as each part ends, except for the last
 part, whose end the result shows.
 """
@@ -36,7 +36,7 @@ class Parts:
         """When each running part began, s, and its line."""
 
     def begin(self, *names: str) -> OnProgress:
-        """End the running parts and begin others at once. Returns the progress of the last of these."""
+        """End the running parts and begin new ones. Returns the progress of the last of these."""
         while self._running:
             self.end(next(iter(self._running)))
         for name in names:
@@ -53,7 +53,7 @@ class Parts:
             self.print(f"{name}: done in {perf_counter() - began:.1f} s")
 
     def show(self, name: str, step: str, share: float, count: str = "") -> None:
-        """Show the step that a running part is at, the share of the part that is done, and a count instead of it."""
+        """Show the step of a running part, and the share that is done or, if given, a count."""
         _, task = self._running[name]
         if self._display and task is not None:
             self._display.update(task, completed=min(share, 0.999), description=step, count=count or f"{share:.0%}")
@@ -181,7 +181,7 @@ class _Words(ProgressColumn):
 
 
 class _Share(ProgressColumn):
-    """A bar and a count, while a part runs whose share is known."""
+    """A bar and a count, if the part is running and its share is known."""
 
     def render(self, task: Task) -> RenderableType:
         """Return the bar with the count behind it."""
@@ -193,7 +193,7 @@ class _Share(ProgressColumn):
 
 
 class TimeLeftColumn(ProgressColumn):
-    """About the time left, for work whose share is known at a few moments only.
+    """The approximate remaining time of work whose share is known only at a few moments.
 
     It follows from the time and the share of the work at the last of these moments, and counts down from there.
     """

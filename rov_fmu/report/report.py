@@ -57,7 +57,7 @@ def report_output(results: Identification, path: Path, on_progress: Progress = s
 
 
 def _today() -> date:
-    """Return the date of today (UTC), or that of SOURCE_DATE_EPOCH, by which builds become reproducible."""
+    """Return today's date (UTC), or the date of SOURCE_DATE_EPOCH, which makes builds reproducible."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     now = datetime.fromtimestamp(int(epoch), timezone.utc) if epoch.isdecimal() else datetime.now(timezone.utc)
     return now.date()

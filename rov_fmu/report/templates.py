@@ -33,7 +33,8 @@ def page(template: str, **content: object) -> str:
 def number(value: float | None, digits: int | None = None) -> str:
     """Return a number for readers, or a dash for None, NaN and infinity.
 
-    It has the given number of significant digits. Without it, it is exact if that is short, and else has 6 digits.
+    With `digits`, the number has this many significant digits. Without it, the exact number is written if it is short,
+    and otherwise 6 digits.
     """
     if value is None or not isfinite(value):
         return "–"
@@ -47,7 +48,7 @@ def with_interval(value: float, interval: tuple[float, float] | None) -> list[st
 
 
 def _with_signs(text: str) -> str:
-    """Return a number with a minus sign and, for an exponent, a power of ten."""
+    """Return a number with a typographic minus sign, and with a power of ten instead of an exponent."""
     mantissa, _, exponent = text.partition("e")
     if exponent:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")

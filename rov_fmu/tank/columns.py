@@ -32,7 +32,8 @@ VOLTAGE = Column({"V": 1.0, "mV": 1000.0}, True, True, 0.0, 1e4, also=("battery"
 
 
 def in_degrees(unit: str) -> tuple[float, str]:
-    """Return the factor from an SI unit to the one that is printed, and its name: angles are printed in degrees."""
+    """Return the factor from an SI unit to the printed unit, and the name of the printed unit. Angles are printed in
+    degrees."""
     return (ANGLES["deg"], unit.replace("rad", "deg")) if "rad" in unit else (1.0, unit)
 
 
@@ -46,7 +47,7 @@ def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCI
 VELOCITY_OF_ANY_AXIS = replace(
     velocity_column(SURGE), units={**velocity_column(SURGE).units, **velocity_column(YAW).units}
 )
-"""A column of velocities whose header does not tell whether the axis turns."""
+"""A column of velocities, linear or angular."""
 
 
 def position_column(axis: Axis) -> Column:

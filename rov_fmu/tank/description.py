@@ -48,7 +48,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
-"""The tables that must not stand beside `base`, because the base has its own."""
+"""The tables that are not allowed together with `base`, because the base has its own."""
 _FILE_TABLES = ("columns", "topics", "dives")
 """The tables that explain the files of tests."""
 
@@ -89,7 +89,7 @@ class _Fit(Strict):
     """The table [fit]: what is fitted in addition to thrust, drag and β."""
 
     lag: Annotated[Any, AfterValidator(_check_curve_names)] = ()
-    """The curves whose thrusters' lag is fitted; true for all curves."""
+    """The curves whose lag is fitted. true means all curves."""
     advance: Annotated[Any, AfterValidator(_check_curve_names)] = ()
     """The curves whose loss of thrust by the speed of advance is fitted; true for all curves."""
     voltage: bool = False
@@ -119,7 +119,7 @@ class Requests:
         return {"voltage": ("voltage",) * self.voltage, "attitude": ("roll", "pitch") * self.attitude}
 
     def of(self, curves: Collection[str]) -> "Requests":
-        """Return what is requested of some curves."""
+        """Return the requests for some curves."""
         lag, advance = (tuple(name for name in names if name in curves) for names in (self.lag, self.advance))
         return replace(self, lag=lag, advance=advance)
 
@@ -139,7 +139,7 @@ class Dive(Strict):
     files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_several)]
     """The files, one of which has the commands."""
     other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
-    """Those of the files whose times are of another clock than the commands'."""
+    """The files whose times come from another clock than the times of the commands."""
 
 
 def _as_fraction(value: object) -> object:
@@ -168,7 +168,7 @@ def _above(least: float, what: str) -> AfterValidator:
 
 
 class TankLimits(Strict):
-    """The table [limits]: the most that a proposed test may take."""
+    """The table [limits]: the limits of a proposed test."""
 
     tank_length: Annotated[Finite, _above(0.0, "the length of the tank in m")] = inf
     """The longest distance along surge, sway or heave, m."""
@@ -195,7 +195,7 @@ class _ReadableFile(OpenHardware):
 
 
 class _RovFile(_ReadableFile):
-    """A complete rov.toml."""
+    """The schema of rov.toml with every key optional, for a file with mistakes."""
 
     vehicle: Head
 
@@ -249,7 +249,8 @@ class Description:
     def logged(self) -> Layout:
         """The layout with the axes of which a log of several axes may have recordings.
 
-        Any autopilot logs roll and pitch, so they must be declared. Else they are only the context of other recordings.
+        Every autopilot logs roll and pitch. They become recordings only if the file declares these axes. Otherwise they
+        are conditions of other recordings.
         """
         forms = (form for form in self.layout.axes if form.axis not in (ROLL, PITCH) or form.axis.name in self.axes)
         return replace(self.layout, axes=tuple(forms))
@@ -266,11 +267,11 @@ class RovFile:
     columns: Mapping[str, str]
     """What the headers of CSV files stand for: other headers."""
     topics: Mapping[str, str]
-    """What the topics and fields of bags and ULogs stand for, as headers."""
+    """The standard header for each renamed header of a CSV file."""
     dives: Mapping[str, Dive]
     """The dives of several files, by name."""
     explains_files: bool
-    """False where a mistake in [columns], [topics] or [dives] leaves unknown what the files contain."""
+    """False if a mistake in [columns], [topics] or [dives] leaves the content of the files unknown."""
 
 
 def read_description(path: Path) -> RovFile:
@@ -297,7 +298,7 @@ def read_description(path: Path) -> RovFile:
 
 
 def _misspelt(lost: Iterable[str], tables: Collection[str]) -> bool:
-    """Return True if an unknown table seems to be meant for one of these: [boddy] for [body]."""
+    """Return True if the name of an unknown table is similar to one of these, such as [boddy] to [body]."""
     return any(similar(name, tables) for name in lost if name not in _RovFile.model_fields)
 
 

@@ -1,7 +1,7 @@
 """Findings about data: what was left out, what the data cannot determine, and what contradicts the model.
 
-A finding is data. Its sentence comes from a table of sentences by kind: SENTENCES below for reading files, and another
-one in rov_fmu/identify/findings.py.
+A finding is data. Its sentence comes from a table by kind: SENTENCES below for findings about reading files, and
+_SENTENCES in rov_fmu/identify/findings.py for all.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,7 +25,7 @@ class Finding:
     curve: str = ""
     file: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
-    """The words that the sentence needs: names of coefficients, units, formatted factors."""
+    """The words that the sentence needs. A number that must not become a range is given here as text."""
     numbers: Mapping[str, float] = field(default_factory=dict)
     """The numbers that the sentence needs. In a sentence about several files they become ranges."""
     certain: bool = False

@@ -1,4 +1,4 @@
-"""Find sensors that stopped changing before a log ends, and leave out what they say from then on."""
+"""Find sensors whose values stop changing before a log ends, and leave out their later values."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -14,16 +14,17 @@ from rov_fmu.tank.signals import LEAST_SAMPLES, Signal
 _LEAST_SHARE, _LEAST_TIME = 0.2, 5.0
 """A sensor is frozen if it keeps its last value for more than this share of the log, and for more than this time, s."""
 _CHANGING, _TURNING, _VISIBLE = 0.5, 0.2, 1.5
-"""Noise is visible if at least these shares of the samples changed before, and of the changes went back, and if the
-usual change is larger than so many of the smallest, which is the resolution of the sensor."""
+"""The noise of a sensor is visible if three conditions hold. At least the first share of the samples differ from the
+sample before. At least the second share of the changes have the opposite sign of the change before. The median change
+is more than the third number times the smallest change, which is the resolution of the sensor."""
 _TOGETHER = 2.0
-"""Sensors froze together if they did within this time, s."""
+"""Sensors froze together if they froze within this time, s."""
 
 
 def without_frozen(file: str, signals: Sequence[Signal]) -> tuple[list[Signal], list[Finding]]:
     """Return the signals without the values of sensors that froze together, and a finding about these.
 
-    One sensor alone may be right: a depth at the surface, or a heading at rest that has a coarse resolution.
+    A single constant sensor may be right: for example the depth at the surface, or a coarse heading at rest.
     """
     frozen = {n: start for n, signal in enumerate(signals) if (start := _frozen_from(signal, signals)) is not None}
     together = _together(frozen)
@@ -37,7 +38,7 @@ def without_frozen(file: str, signals: Sequence[Signal]) -> tuple[list[Signal], 
 
 
 def _frozen_from(signal: Signal, signals: Iterable[Signal]) -> float | None:
-    """Return the time from which a sensor with visible noise keeps exactly its last value, or None."""
+    """Return the time after which a sensor with visible noise keeps its last value exactly, or None."""
     there = np.isfinite(signal.values)
     time, values = signal.time[there], signal.values[there]
     steps = np.diff(values)
@@ -53,7 +54,8 @@ def _frozen_from(signal: Signal, signals: Iterable[Signal]) -> float | None:
 
 
 def _is_noisy(steps: Array) -> bool:
-    """Return True if the noise of a sensor is visible: a slow motion in coarse steps may end by itself."""
+    """Return True if the noise of a sensor is visible. Without noise, a slow motion in coarse steps may simply have
+    ended."""
     changes = steps[steps != 0.0]
     sizes = np.abs(changes)
     turning = np.count_nonzero(changes[1:] * changes[:-1] < 0.0)
@@ -62,7 +64,7 @@ def _is_noisy(steps: Array) -> bool:
 
 
 def _together(frozen: dict[int, float]) -> list[int]:
-    """Return the most sensors that froze together, in the order of the signals."""
+    """Return the largest group of sensors that froze together, in the order of the signals."""
     groups = [[n for n, at in frozen.items() if start <= at <= start + _TOGETHER] for start in frozen.values()]
     return max(groups, key=len, default=[])
 

@@ -42,7 +42,7 @@ class Log:
 
 
 def read_content(path: Path, layout: Layout, names: Names) -> Content:
-    """Read the content of a log of several axes, or of a part of a dive; commands are those of the thrusters.
+    """Read a log of several axes, or one file of a dive. The commands in the result are those of the thrusters.
 
     Raises DataFileError.
     """
@@ -65,14 +65,14 @@ def read_content(path: Path, layout: Layout, names: Names) -> Content:
 
 
 def _without_frozen(content: Content) -> Content:
-    """Leave out what sensors say after they froze together, with a finding."""
+    """Leave out the values of sensors after they froze together, and add a finding."""
     content.signals, frozen = without_frozen(content.file, content.signals)
     content.findings += frozen
     return content
 
 
 def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names = Names()) -> Log:  # noqa: B008 (frozen)
-    """Read a recording of every axis that the log measures, or of `axis` alone. Raises DataFileError."""
+    """Read a recording of every axis that the log measures, or only of `axis`. Raises DataFileError."""
     if path.suffix.lower() in READERS:
         content = read_content(path, layout, names)
     else:
@@ -94,10 +94,10 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names 
 
 
 def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout, names: Names) -> Log:
-    """Read a dive of several files, of which one has the commands. Raises DataFileError.
+    """Read a dive of several files. One of them has the commands. Raises DataFileError.
 
-    A file of another clock than that of the commands is told in its recordings. Where the times of both do not overlap,
-    its first sample is moved to the first command.
+    The recordings of a file with another clock than the commands have the name of this file as `clock`. If its times do
+    not overlap with those of the commands, its first sample is moved to the first command.
     """
     contents = [read_content(path, layout, names) for path in paths]
     commanding = [content for content in contents if content.commands]

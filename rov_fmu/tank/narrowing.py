@@ -38,14 +38,14 @@ class Given:
     head: Head
     rov: Rov
     """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
-    their values, the others UNKNOWN. Of the coefficients to be identified it has only those that every curve and axis
-    has; fits add reverse thrust, dead band, lag and load where they find them."""
+    their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
+    needs. The fits add reverse thrust, dead band, lag and load if they find them."""
     known: Mapping[str, Quantity]
     """The coefficients that are given, not identified."""
     thruster_sources: Mapping[str, Mapping[str, str]]
     """The sources of each thruster's direction and position."""
     requests: Requests
-    """What is fitted on request, of the curves that are left."""
+    """The requests that concern the remaining curves."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _given(description: Description, head: Head, layout: Layout, known: Mapping[
 
 
 def _kept_from_base(description: Description, tested: Tested) -> dict[str, Quantity]:
-    """Return the coefficients of the base that no test identifies anew."""
+    """Return the coefficients of the base that no test replaces."""
     requests = description.requests
     replaced = {coefficient_name("T", name) for name in requests.lag}
     replaced |= {coefficient_name(key, name) for name in requests.advance for key in ("d", "d_reverse")}
@@ -175,7 +175,7 @@ def _with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
         mix={name: gains for name, gains in mix.items() if any(gains.values())},
         coupled=layout.coupled and all(layout.has(axis) for axis in COUPLED_AXES),
     )
-    # The gains of an input that drives none of the axes cancel out.
+    # An input that drives none of the axes has gains that cancel each other.
     driving = {name for axis in axes for name in layout.signs(axis)}
     return replace(layout, mix={name: gains for name, gains in layout.mix.items() if f"u_{name}" in driving})
 
@@ -211,7 +211,7 @@ def _missing_hardware(description: Description, layout: Layout, known: Collectio
 def _missing_or_doubled_tests(
     description: Description, tested: Tested, layout: Layout, known: Collection[str]
 ) -> Iterator[str]:
-    """Yield a line for what neither a test nor rov.toml determines, and for what both determine."""
+    """Yield a line for each coefficient that neither a test nor rov.toml gives, and for each that both give."""
     for curve in layout.curves:
         names = curve.coefficient("a_t"), curve.coefficient("b_t")
         if curve.name not in tested.thrust:

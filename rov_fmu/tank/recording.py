@@ -10,7 +10,7 @@ from rov_fmu.tank.arrays import Array
 
 CONTEXT = {"voltage": "V", "roll": "rad", "pitch": "rad", "depth": "m", "distance": "m"}
 """The conditions that a recording may contain, with their units: the voltage of the battery, the angles of roll and
-pitch, the depth, and the distance over ground from where the log begins."""
+pitch, the depth, and the distance over ground from the start of the log."""
 
 CLOCK_ERROR = 5.0
 """The largest error of times that were aligned with those of another clock, s."""
@@ -30,11 +30,11 @@ class Recording:
     quantity: str
     """`velocity`, or the position whose rate it is: distance, depth, heading."""
     time: Array
-    """n: s, ascending, from 0."""
+    """n times in s, ascending from 0."""
     command: Array | None
-    """n: the command of the axis, a fraction of the full command, held until the next. Every input that drives the
-    axis has this command, with the sign that drives it to the positive side. None where the thrusters had another
-    pattern."""
+    """n: the command of the axis, a fraction of the full command, held until the next. Every input that drives the axis
+    has this command, with the sign that moves the vehicle in the positive direction. None if the thrusters had
+    different commands."""
     values: Array
     """n: NaN where the sensor has no value."""
     thrusters: Mapping[str, Array] = field(default_factory=dict)
@@ -42,12 +42,11 @@ class Recording:
     beside: Mapping[str, Array] = field(default_factory=dict)
     """n each: the logged u, v, r and psi, smoothed and interpolated; u and v are over ground."""
     context: Mapping[str, Array] = field(default_factory=dict)
-    """n each: what else the log tells about the conditions, interpolated between its samples. The names are those of
-    CONTEXT that the log has."""
+    """n values each: the logged conditions, interpolated between their samples. The names are keys of CONTEXT."""
 
     clock: str = ""
-    """The file whose clock the measurements have, where it is another one than that of the commands: their times may
-    be up to CLOCK_ERROR early or late. Empty for one clock."""
+    """The file whose clock gave the times of the measurements, if it differs from the clock of the commands. Empty if
+    both have the same clock."""
 
     @property
     def is_position(self) -> bool:

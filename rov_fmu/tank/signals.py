@@ -17,8 +17,8 @@ LEAST_SAMPLES = 20
 _SAME_COMMAND = 0.005
 """The largest difference of equal commands, as a fraction of the full command: two steps of a pulse of 1 µs."""
 _LEAST_CHANGE = 0.02
-"""The smallest change of thrust that counts, as a fraction of the full command. Smaller changes hold a heading or a
-depth, or are the rounding of a pulse."""
+"""The smallest change of thrust that counts, as a fraction of the full command. Smaller changes are due to a heading or
+depth controller, or to rounded pulses."""
 _LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
 """A gap is longer than this time, s, and than this many usual intervals."""
 _ROUNDING = 0.01
@@ -27,10 +27,10 @@ _TURN = 2.0 * pi + 2.0 * _ROUNDING
 _APART = 2.0
 """The time over which changes of a position are compared with a velocity, s."""
 _SAME_SCALE, _CLEAR = 0.01, 4.0
-"""Scales of two sensors differ if they do by more than this share, and by so many standard errors."""
+"""The scales of two sensors differ if the difference exceeds this share, and this number of standard errors."""
 _WRAPPING = (YAW.position, ROLL.position)
 _CONTEXT = {ROLL.position: "roll", PITCH.position: "pitch"}
-"""The names of positions in the context, where they differ."""
+"""The names of roll and pitch among the conditions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def recordings_of(
 ) -> tuple[tuple[Recording, ...], tuple[Finding, ...]]:
     """Return a recording of every useful signal, and a finding for each useless one; `only` selects one axis.
 
-    Signals of axes that the vehicle does not have, and those of other files, are only the context of the others.
+    Signals of other files, and of axes that the vehicle does not have, are only used as conditions of the recordings.
     """
     recordings, findings, signals = [], [], list(signals)
     for axis in [only] if only else [form.axis for form in layout.axes]:
@@ -95,7 +95,7 @@ def main_signals(signals: Iterable[Signal], axis: Axis) -> list[Signal]:
 
 
 def why_useless(recording: Recording, layout: Layout) -> Finding | None:
-    """Return the reason why nothing can be identified from a recording, or None."""
+    """Return the finding that says why a recording is useless, or None."""
     found = Finding("", axis=recording.axis.name, file=recording.file, names={"quantity": recording.quantity})
     values = recording.values[np.isfinite(recording.values)]
     if len(values) < LEAST_SAMPLES:
@@ -147,7 +147,7 @@ def _recording(
 ) -> Recording:
     """Return a recording of an axis at the times of commands and signal.
 
-    The last command counts for as long as a command is usually held.
+    The last command holds for the usual time between two commands.
     """
     time = np.union1d(commands.time, signal.time)
     end = commands.time[-1] + (np.median(np.diff(commands.time)) if len(commands.time) > 1 else 0.0)
@@ -180,7 +180,7 @@ def _beside(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
 
 
 def context_at(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
-    """Interpolate the conditions that the signals tell at the times of a recording."""
+    """Interpolate the conditions among the signals at the times of a recording."""
     found = {}
     for signal in signals:
         name, there = _CONTEXT.get(signal.quantity, signal.quantity), np.isfinite(signal.values)
@@ -216,8 +216,9 @@ def gaps_of(recording: Recording) -> list[Finding]:
 def unwrapped(time: Array, angle: Array) -> Array:
     """Return an angle (rad) without jumps of a full turn; NaN stays NaN.
 
-    An angle that leaves -180° ... 180° and 0° ... 360°, or that never jumps by half a turn between two samples without
-    a gap between them, is continuous already and stays as it is. Over a gap, the smaller turn is taken.
+    An angle is already continuous if it is not within -180° ... 180° or 0° ... 360°, or if it never jumps by more than
+    half a turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is
+    assumed.
     """
     found, there = angle.copy(), np.isfinite(angle)
     values = angle[there]
@@ -243,7 +244,7 @@ def command_of(layout: Layout, axis: Axis, thrusters: Mapping[str, Array]) -> Ar
 
 
 def _is_driven(layout: Layout, axis: Axis, thrusters: Mapping[str, Array]) -> bool:
-    """Return True when the push along the axis changes for any thrust curves.
+    """Return True if the thrust along the axis changes, whatever the coefficients of the thrust curves are.
 
     Thrust has a linear and a quadratic term in each direction. For the thrusters of one curve, the sum of one of these
     terms must change.

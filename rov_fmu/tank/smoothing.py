@@ -14,7 +14,7 @@ from rov_fmu.tank.arrays import Array
 Method = Literal["savitzky-golay", "moving average"]
 
 WINDOW = 0.5
-"""The length of the window, s, until a time constant is known."""
+"""The default length of the smoothing window, s. It holds until a time constant is known."""
 _MOST_SAMPLES = 1_000_000
 _ORDER = 3
 """The order of the local polynomials. A quadratic would flatten the bend at Tau."""
@@ -52,12 +52,14 @@ def without_spikes(values: Array) -> Array:
 
 
 def white_noise(values: Array) -> float:
-    """Estimate the standard deviation of the sensor's noise from second differences, where smooth motion vanishes."""
+    """Estimate the standard deviation of the sensor's noise from second differences, in which smooth motion nearly
+    vanishes."""
     return robust_deviation(np.diff(values, 2)) / sqrt(6.0)
 
 
 def sensor_noise(values: Array) -> float:
-    """Estimate the standard deviation of a sensor's noise, at least that of rounding to its resolution."""
+    """Estimate the standard deviation of a sensor's noise. It is not less than the error of rounding to the
+    resolution."""
     changes = np.abs(np.diff(values))
     resolution = float(changes[changes > 1e-9 * np.ptp(values)].min(initial=np.inf))
     return max(white_noise(values), resolution / sqrt(12.0) if np.isfinite(resolution) else 0.0)

@@ -34,7 +34,7 @@ class Row:
 
 
 def columns_of(kind: str, axis: Axis | None = None) -> dict[str, Column]:
-    """Return the columns of a table; velocities without an axis are those of any axis."""
+    """Return the columns of a table. Without an axis, the velocities may be linear or angular."""
     column = FORCE if kind == "thrust" else time_constant_column()
     if kind == "steady":
         column = velocity_column(axis) if axis else VELOCITY_OF_ANY_AXIS
@@ -46,7 +46,7 @@ def read_rows(
 ) -> tuple[list[Row], frozenset[str]]:
     """Read rows of a command and a force (`thrust`), velocity (`steady`) or time constant. Raises DataFileError.
 
-    `names` is the table [columns]. Returns those of its keys that the file has, too.
+    `names` is the table [columns] of rov.toml. Also returns the keys of `names` that the file has.
     """
     name, columns = TABLES[kind], columns_of(kind, axis)
     renamed = dict(_renamed(names, columns))
@@ -68,7 +68,7 @@ def read_rows(
 
 
 def _renamed(names: Mapping[str, str], columns: Mapping[str, Column]) -> Iterator[tuple[str, str]]:
-    """Yield the entries of the table [columns] that stand for columns of the table; others are for logs."""
+    """Yield the entries of [columns] that rename a column of this table. The other entries are for logs."""
     for title, meant in names.items():
         with suppress(ValueError):  # such as a unit that only a log may have
             if find_column(meant, columns, others=True):

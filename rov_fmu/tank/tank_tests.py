@@ -1,7 +1,7 @@
 """Read and check a folder of tank tests with its rov.toml.
 
-The name of a file, in small or capital letters, gives the kind of test and the thrust curve or axis that it tests;
-anything may follow another underscore:
+The name of a file, in small or capital letters, gives the kind of test and the tested thrust curve or axis. Any text
+may follow after another underscore:
 
     thrust_<curve>*.csv                        command, force                  bollard pull, (6)-(10)
     steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5
@@ -57,7 +57,7 @@ class TankTests:
     inputs: Mapping[str, str]
     """The SHA-256 hash of every file read, by its name."""
     tested: Tested
-    """What the files test, including those of curves that the vehicle does not need."""
+    """The curves and axes that the files test, including curves that the vehicle does not need."""
     findings: tuple[Finding, ...] = ()
     """What was left out of the vehicle and of the files."""
 
@@ -153,7 +153,7 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
         description_mistakes += lines_on(description.path, reader.missing_columns(description.requests))
     vehicle = Narrowed(None)
     tested = reader.tested(description)
-    # Without any axis, a file that could not be read may be the one with the axes.
+    # If no axis was found, it may be in a file that could not be read.
     if description and (tested.axes or not reader.mistakes):
         vehicle = narrowed(description, tested, folder)
     in_tests = [*reader.mistakes, *vehicle.test_mistakes]
@@ -195,7 +195,7 @@ class _Reader:
     inputs: dict[str, str] = field(default_factory=dict)
     """The hash of each file by its name."""
     originals: dict[tuple[str, ...], str] = field(default_factory=dict)
-    """The name of the first file, or of the files of the first dive, by the kind and the hash of its content."""
+    """The first file (or the files of the first dive) with each content, by kind and hash."""
     logged: Layout | None = None
     """The layout with the axes that a log of several axes may have recordings of."""
     names: Names = field(default_factory=Names)
@@ -243,7 +243,8 @@ class _Reader:
             self.mistakes += str(error).splitlines()
 
     def _is_copy(self, name: str, content: tuple[str, ...]) -> bool:
-        """Return True, with a finding, if a file before has the same content, which must not count twice."""
+        """Return True, and add a finding, if an earlier file has the same content. The same data must not count
+        twice."""
         if content not in self.originals:
             self.originals[content] = name
             return False
@@ -285,7 +286,8 @@ class _Reader:
             self.recordings.setdefault(recording.axis.name, []).append(recording)
 
     def _kind_and_subject(self, path: Path) -> tuple[str, str]:
-        """Return the kind of test and the curve or axis; no axis for a log of several. Raises DataFileError."""
+        """Return the kind of test and its curve or axis. The axis is empty for a log of several axes. Raises
+        DataFileError."""
         curves = [curve.name for curve in self.layout.curves] if self.layout else None
         kind, subject = _parts(path.stem.lower(), curves)
         if path.suffix.lower() in LOG_SUFFIXES:
@@ -353,7 +355,7 @@ class _Reader:
             if kind != "thrust" or subject in curves:
                 rows[kind][subject] = tuple(found)
         cancelling = {finding.axis for finding in self.findings if finding.kind == "cancelling thrusters"}
-        wanted = () if given.description.base else cancelling  # a base may have more axes than the logs are about
+        wanted = () if given.description.base else cancelling  # a base may have axes that the logs do not concern
         about = (
             Finding("axis not pushed", f.axis) if f.kind == "axis left out" and f.axis in wanted else f
             for f in findings

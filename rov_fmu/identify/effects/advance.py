@@ -7,7 +7,7 @@ from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.model.layout import Axis, coefficient_name
 
 _NO_THRUST = 2.0
-"""A usual thruster at full command pushes no more at about this speed, m/s."""
+"""The speed at which a usual thruster at full command gives no thrust, m/s."""
 
 
 class Advance(Effect):
@@ -28,7 +28,7 @@ class Advance(Effect):
 
     @property
     def is_one_of_many(self) -> bool:
-        """True: each curve may have such a loss, and drag looks much like it."""
+        """True: each curve may have such a loss, and it is hard to distinguish from drag."""
         return True
 
     def unit(self, axis: Axis) -> str:  # noqa: ARG002
@@ -36,7 +36,7 @@ class Advance(Effect):
         return "N.s/m"
 
     def bounds(self, setting: Setting) -> tuple[float, float]:
-        """Return no loss, and ten times the usual one."""
+        """Return 0, and ten times the usual loss."""
         return 0.0, 10.0 * self.prior(setting)
 
     def prior(self, setting: Setting) -> float:
@@ -45,7 +45,7 @@ class Advance(Effect):
         return max(curve.together * setting.base.curve_force(curve, 1.0), 1e-3) / _NO_THRUST
 
     def is_none(self, value: float) -> bool:
-        """Return True without a loss."""
+        """Return True if there is no loss."""
         return value <= 0.0
 
     def coefficients(self, rov: Mapping[str, Any], value: Any) -> dict[str, Any]:  # noqa: ARG002

@@ -30,7 +30,7 @@ class Attitude:
         return np.interp(time, self.time, self.roll), np.interp(time, self.time, self.pitch)
 
     def weight(self, time: Array) -> dict[str, Array]:
-        """Return the forces from outside that turn 1 N of net weight in heave into the vertical."""
+        """Return the external forces that make 1 N of net weight in heave act vertically."""
         phi, theta = self.at(time)
         return {
             "X_ext": -np.sin(theta),
@@ -46,7 +46,7 @@ class Attitude:
         phi, theta = self.at(time + late)
         pitching = np.gradient(theta, time) * np.sin(phi)
         u, v, w, r = (motion.get(name, np.zeros(1)) for name in "uvwr")
-        rates = {  # less those of a level vehicle, whose depth and heading are exact
+        rates = {  # the difference to a level vehicle, whose depth and heading the simulation has already
             "z": np.cos(theta) * (np.sin(phi) * v + np.cos(phi) * w) - np.sin(theta) * u - w,
             "psi": (r + pitching) / (np.cos(phi) * np.cos(theta)) - r,
         }

@@ -87,5 +87,5 @@ class CurrentEast(CurrentNorth):
 
 
 def is_in_flow(recording: Recording) -> bool:
-    """Return True when a current north and east can be seen along the axis, because the heading is logged."""
+    """Return True if a recording can show a current north and east, because the heading is logged."""
     return recording.axis in (SURGE, SWAY) and "psi" in recording.beside

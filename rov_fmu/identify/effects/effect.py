@@ -1,4 +1,4 @@
-"""What every effect declares: an optional parameter of a fit to recordings, in addition to drag and β."""
+"""The base class of effects. An effect is an optional parameter of a fit to recordings, in addition to drag and β."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -16,7 +16,7 @@ from rov_fmu.tank.recording import Recording
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """The recordings of a fit, and the vehicle that they are of."""
+    """The recordings of a fit, and their vehicle."""
 
     recordings: Sequence[Recording]
     base: Rov
@@ -55,30 +55,31 @@ class Effect(ABC):
     of: str
     """The name of an axis, a curve, or the file of one recording."""
     axis: str = ""
-    """The axis of the recording, since one file may have several."""
+    """The axis of the recording, because a file may have several. Empty for an effect of an axis or a curve."""
 
     kind: ClassVar[str]
     """The name of the effect."""
     words: ClassVar[str]
     """The effect in a table of the report."""
     sentence: ClassVar[str]
-    """What a finding says about the effect, with {value}, {unit}, {interval} and {of}."""
+    """The sentence of a finding about the effect. It has the fields {value}, {unit}, {interval} and {of}."""
     sentence_of_file: ClassVar[str] = ""
-    """What it says about an effect of a single recording, which adds to that of the axis; empty for the same."""
+    """The sentence for a single recording, whose value is added to that of the axis. Empty if it is the same
+    sentence."""
     neutral: ClassVar[float] = 0.0
     """The value without any effect."""
     begin: ClassVar[float] = 0.0
     """The value with which the search begins."""
     likely: ClassVar[float] = 0.0
-    """The value that is expected before the data are seen."""
+    """The prior mean of the value."""
     limits: ClassVar[tuple[float, float]] = -inf, inf
     """The least and the greatest value that the search may reach."""
     deviation: ClassVar[float] = 0.5
-    """The standard deviation of the value before the data are seen."""
+    """The prior standard deviation of the value."""
     keeps_prior: ClassVar[bool] = False
-    """True when the last fit has the prior too, and not only the selection."""
+    """True if the final fit also uses the prior. Other effects have a prior only during the selection."""
     order: ClassVar[int]
-    """The order of elimination, least first: the least likely effect is dropped first."""
+    """The place in the order of elimination. Effects with the smallest number are dropped first."""
     is_delay: ClassVar[bool] = False
     """True when it delays the commands."""
     is_current: ClassVar[bool] = False
@@ -96,7 +97,8 @@ class Effect(ABC):
 
     @property
     def is_one_of_many(self) -> bool:
-        """True when there are many such effects, so that chance finds one of them more easily."""
+        """True if there are many effects of this kind. One of them is then more easily significant by chance, so the
+        test is stricter."""
         return self.is_of_file
 
     @property
@@ -121,14 +123,14 @@ class Effect(ABC):
         return self.deviation
 
     def is_none(self, value: float) -> bool:  # noqa: ARG002
-        """Return True for a value that stands for no effect, besides the neutral one."""
+        """Return True if a value other than the neutral one also means no effect."""
         return False
 
     # ---- How it enters the simulation ----
 
     @property
     def input(self) -> str:
-        """The input of the vehicle that it adds to; empty where it is none."""
+        """The name of the input to which it is added. Empty if it does not enter as an input."""
         return ""
 
     def coefficients(self, rov: Mapping[str, Any], value: Any) -> dict[str, Any]:  # noqa: ARG002
@@ -136,7 +138,7 @@ class Effect(ABC):
         return {}
 
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Return pairs of coefficient names for a ratio: the one in reverse and the one ahead."""
+        """For a ratio, return pairs of coefficient names: in reverse and ahead."""
         return ()
 
     def added(self, rov: Rov, value: float) -> Rov:
@@ -163,6 +165,6 @@ def axis_of(effect: Effect, recordings: Sequence[Recording]) -> Axis:
 
 
 def of_axis_and_files(kind: type[Effect], setting: Setting, axis: Axis) -> Iterator[Effect]:
-    """Yield an effect of an axis, and what each file but the first adds to it."""
+    """Yield the effect of an axis, and an effect for every file except the first, which is added to it."""
     yield kind(axis.name)
     yield from (kind(file, axis.name) for file in [*dict.fromkeys(r.file for r in setting.of_axis(axis))][1:])

@@ -9,7 +9,8 @@ from rov_fmu.model.layout import AXES, SURGE, SWAY, Axis
 _LARGEST = 1.5
 """The largest load, relative to the strongest thrust."""
 _USUAL = 0.2
-"""The usual load, relative to the strongest thrust; and that of a single recording, relative to that of its axis."""
+"""The usual load relative to the strongest thrust. It is also the usual difference of a single recording, relative to
+the load of its axis."""
 
 
 class Load(Effect):

@@ -1,4 +1,4 @@
-"""Thrust and drag in reverse, by those ahead."""
+"""The ratios of thrust and drag in reverse to those ahead."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -24,7 +24,7 @@ class _Ratio(Effect):
 
 
 class ReverseThrust(_Ratio):
-    """The thrust of a curve in reverse."""
+    """The ratio of the thrust of a curve in reverse to its thrust ahead."""
 
     kind = "reverse thrust"
     words = "thrust in reverse, by that forward"
@@ -33,7 +33,7 @@ class ReverseThrust(_Ratio):
 
     @classmethod
     def candidates(cls, setting: Setting) -> Iterator[Effect]:
-        """Yield the ratio of each curve that has no part of its own in reverse."""
+        """Yield the ratio of each curve without separate coefficients in reverse."""
         return (cls(name) for name, curve in setting.curves.items() if "a_t" + REVERSE not in curve.keys)
 
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -53,7 +53,7 @@ class ReverseDrag(_Ratio):
 
     @classmethod
     def candidates(cls, setting: Setting) -> Iterator[Effect]:
-        """Yield the ratio of each axis whose drag is fitted, and is the same both ways."""
+        """Yield the ratio of each axis whose drag is fitted, and has no separate coefficients in reverse."""
         for axis in setting.axes:
             keys = setting.base.layout.kinds[axis.name].keys
             if "a_d" + REVERSE not in keys and axis.coefficient("a_d") not in setting.known:

@@ -42,7 +42,8 @@ class Voltage(Effect):
                 yield cls(name, V_0=setting.requests.measured_at.get(name, usual), usual=usual)
 
     def is_none(self, value: float) -> bool:
-        """Return True for an exponent at the lower limit, where the thrust does not follow the voltage."""
+        """Return True for an exponent at the lower limit, which means that the thrust does not depend on the
+        voltage."""
         return value <= self.limits[0]
 
     def coefficients(self, rov: Mapping[str, Any], value: Any) -> dict[str, Any]:  # noqa: ARG002

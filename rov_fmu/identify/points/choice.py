@@ -32,7 +32,8 @@ class Choice:
 def aicc(rss: float, count: int, free: int, least: float) -> float:
     """Return Akaike's information criterion for few data, of a least-squares fit with `free` coefficients.
 
-    `least` is the smallest possible RMS of the residuals, the last digit of the data. Infinite for too few data.
+    `least` is the smallest meaningful RMS of the residuals, given by the last digit of the data. The result is infinite
+    if there are too few data.
     """
     k, variance = free + 1, max(rss / count, least**2)
     return count * log(variance) + 2.0 * k + 2.0 * k * (k + 1) / (count - k - 1) if count > k + 1 else inf

@@ -94,7 +94,8 @@ def free_coefficients(
 
 
 def candidate_forms(axis: Axis, points: Sequence[Point], base: Rov, known: Collection[str]) -> Iterator[DragForm]:
-    """Yield the plain form, linear and quadratic drag in both directions alike, then the other identifiable forms."""
+    """Yield the plain form (linear and quadratic drag, the same in both directions), and then the other identifiable
+    forms."""
     used = [p for p in points if p.weight > 0.0]
     names, held = free_coefficients(axis, used, known)
     assumed = {name: words for name, (_, words) in held.items()}

@@ -67,9 +67,9 @@ def fit_response(
 ) -> ResponseFit:
     """Fit the unknown coefficients among a_d, b_d and β of the axis; `base` has the others, including α.
 
-    The plain form has linear and quadratic drag, the same in both directions. Another form is chosen where both the
-    information criterion and leave-one-thrust-out prefer it, also to every form with some of its coefficients. The
-    intervals are those of the fit with all coefficients, including the ones that are left out.
+    The plain form has linear and quadratic drag, the same in both directions. Another form is chosen if both the
+    information criterion and leave-one-thrust-out prefer it to the plain form, and to every form that has only some of
+    its coefficients. The intervals are those of the fit with all coefficients, including the ones that are left out.
     `thrust` is the estimate of measured thrust curves; its uncertainty widens the intervals.
     """
     data = tuple(points)
@@ -108,7 +108,7 @@ class _Candidate:
         return aicc(float(r @ r), len(self.used), len(self.form.names), _DIGITS)
 
     def estimate(self, at: Rov, thrust: Estimate | None = None) -> Estimate:
-        """Return the uncertainty of the fit, around other values."""
+        """Return the estimate with the values of `at` and the uncertainty of this fit."""
         names = self.form.names
         by_thrust = (self._slopes(at, thrust), thrust.covariance) if thrust is not None and names else None
         found = estimate_alike(names, self._solution, len(self.used), by_thrust)
@@ -240,7 +240,8 @@ def _residuals(
 
 
 def _start(axis: Axis, used: Sequence[Point], base: Rov, names: tuple[str, ...]) -> dict[str, float]:
-    """Return the start of the fit: half of the drag linear, half quadratic at the mean V_ss; then β from Tau."""
+    """Return the start of the fit. At the mean V_ss, half of the drag is linear and half is quadratic. β follows from
+    Tau."""
     beta, alpha = axis.coefficient("beta"), base[axis.coefficient("alpha")]
     steady = [p for p in used if p.quantity == "V_ss"]
     drag = [d for p in steady if (d := alpha * base.force(axis, p.command) / p.value) > 0.0]

@@ -1,7 +1,9 @@
-"""Find V_ss and Tau in recordings, sections 4.1-4.3: smooth, differentiate, find the steady state, apply (17).
+"""Find V_ss and Tau in recordings (sections 4.1-4.3 of the paper): smooth, differentiate, find the steady state, apply
+(17).
 
 V_ss comes from the raw samples: it is the slope of the position over the steady part of a hold, or the mean of the
-velocity. No filter has correlated the noise there, and the remaining correlation (turbulence) is measured and counted.
+velocity. The raw samples have no correlation from a filter. The remaining correlation (turbulence) is measured and
+taken into account.
 """
 
 from collections.abc import Iterator
@@ -47,7 +49,7 @@ class StepResponse:
 
 
 def steps(recording: Recording) -> tuple[StepResponse, ...]:
-    """Return the responses to the held commands of a recording; none where the axis had no command of its own."""
+    """Return the responses to the held commands of a recording; none if the recording has no command of the axis."""
     if recording.command is None:
         return ()
     there = np.isfinite(recording.values)
@@ -72,7 +74,8 @@ def steps(recording: Recording) -> tuple[StepResponse, ...]:
 
 
 def correlation_time(residuals: Array) -> float:
-    """Return the number of samples per independent one: 1 + 2 (sum of autocorrelation), 1 for white noise.
+    """Return the number of samples that count as one independent sample: 1 + 2 (sum of autocorrelation), 1 for white
+    noise.
 
     The sum ends where the autocorrelation is no larger than that of white noise by chance.
     """
@@ -147,7 +150,8 @@ def _rests(time: Array, values: Array, is_position: bool, V_ss: float) -> bool:
 
 
 def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -> StepResponse:
-    """Find the time when the smoothed velocity reaches (1 - 1/e) V_ss, (17); the window is about the time constant."""
+    """Find the time when the smoothed velocity reaches (1 - 1/e) V_ss, (17); the smoothing window is adapted to the
+    time constant."""
     assert step.V_ss is not None
     assert step.V_ss_error is not None
     window, Tau = max(WINDOW, 0.1 * (step.end - step.start)), nan

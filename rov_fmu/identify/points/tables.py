@@ -21,7 +21,8 @@ _FAR = 10.0
 
 
 class Table(Protocol):
-    """Measurements that are independent of the recordings, with residuals that a vehicle determines."""
+    """Measurements that are independent of the recordings, whose residuals follow from the coefficients of a
+    vehicle."""
 
     def __len__(self) -> int:
         """Return the number of measurements."""
@@ -41,7 +42,7 @@ class TablePoints:
 
     @classmethod
     def of(cls, fit: ResponseFit) -> Self | None:
-        """Return the points of a fit, as uncertain as they scatter about it; None where their scatter is unknown."""
+        """Return the points of a fit. Their error is their scatter about the fit. None if the scatter is unknown."""
         own = fit.given_thrust
         if not own.degrees_of_freedom > 0.0:
             return None
@@ -71,7 +72,7 @@ class TableForces:
     error: float
     """The standard error of each force, N."""
     fitted: Estimate
-    """The coefficients of the curve that are fitted, as the forces alone give them."""
+    """The coefficients of the curve that are fitted, with their values from the forces only."""
 
     @classmethod
     def of(cls, fit: ThrustFit) -> Self | None:

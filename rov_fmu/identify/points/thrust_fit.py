@@ -27,11 +27,12 @@ from rov_fmu.vehicle.checks import no_thrust
 _DIGITS = 1e-5
 """The resolution of a scale, relative to the strongest force."""
 _EXACT = 1e-6
-"""The error of the coefficients, relative to the largest one, below which it is that of rounding."""
+"""Errors of coefficients below this share of the largest coefficient are rounding errors."""
 _WEAKEST = 3.0
-"""The weakest command is at most this many dead bands. The curve beyond tells a dead band less and less well."""
+"""The weakest command must not exceed the dead band by more than this factor. Stronger commands hardly determine the
+dead band."""
 _GRID = {1: 24, 2: 8}
-"""The number of dead bands to start from, by the number of dead bands that are fitted."""
+"""The number of values of a dead band in the grid of starts, by the number of fitted dead bands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +227,7 @@ class _Candidate:
         return [starts[n] for n in np.argsort(costs)[:3]]
 
     def _linear(self, used: Flags, dead: Mapping[str, float]) -> Solution:
-        """Fit all other coefficients with the dead bands held."""
+        """Fit all other coefficients for given dead bands."""
         x, root = self.data.x[used], np.sqrt(self.data.weights[used])
         fixed, free = {**self.data.known, **dead}, [n for n in _linear(self.curve) if n in self.names]
         zero = {**dict.fromkeys(_linear(self.curve), 0.0), **fixed}
@@ -252,7 +253,7 @@ class _Candidate:
 
 
 def _choices(chosen: _Candidate, candidates: list[_Candidate]) -> Iterable[Choice]:
-    """Compare the best form with and the best without each extension."""
+    """Compare the best form with each extension and the best form without it."""
     for key, what in (
         ("a_t" + REVERSE, "a curve of its own in reverse"),
         ("c_0", "a dead band"),

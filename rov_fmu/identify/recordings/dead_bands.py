@@ -1,4 +1,4 @@
-"""The uncertainty of a dead band and of the linear thrust, which do not follow from derivatives where b_t is near 0.
+"""The uncertainty of a dead band and of the linear thrust. If b_t is near 0, it does not follow from derivatives.
 
 The thrust is a_t m^2 + b_t m with m = |command| - c_0. If c_0 grows by h and b_t by 2 a_t h, it changes by the constant
 -(b_t + a_t h) h. Near b_t = 0 the derivative along this direction vanishes, so derivatives would give infinite errors
@@ -63,8 +63,8 @@ def _take_secant(analysis: ResidualAnalysis, J: Array, n: int, direction: Array,
 def _directions(model: Simulator, x: Array) -> Iterator[tuple[int, Array, float]]:
     """Yield the place of each fitted c_0, the direction in x that hardly changes the thrust, and the room.
 
-    The direction has the change of b_t per change of c_0; both directions of command take part if they share the dead
-    band. The room is how much c_0 may fall until a b_t is 0.
+    Along the direction, b_t changes together with c_0. If both directions of command share the dead band, both b_t
+    change. `room` is the decrease of c_0 at which one b_t becomes 0.
     """
     rov = model.rov(x)
     names = [*model.names, *(f"c_0_{e.of}" if isinstance(e, DeadBand) else "" for e in model.extras)]

@@ -21,7 +21,8 @@ from rov_fmu.tank.smoothing import velocity
 _AHEAD = 10.0
 """How far ahead the short predictions reach, s."""
 _LEAD = 5.0
-"""The time before a prediction whose data give its first velocity and position, s; a third of a shorter recording."""
+"""The time before a prediction from which its initial velocity and position are estimated, s. For a shorter recording
+it is a third of the recording."""
 _FEWEST = 8
 """The smallest number of samples of a half."""
 _MOST = 30
@@ -74,7 +75,8 @@ class Prediction:
 
     @property
     def error(self) -> float:
-        """The mean square error of the velocity over 10 s, or else over all, relative to that of no change."""
+        """The mean square error of the velocity over 10 s (or over the whole recording, if it is shorter), relative to
+        that of no change."""
         predicted, unchanged, _ = of_velocity(self.errors).rms
         return (predicted / unchanged) ** 2 if unchanged > 0.0 else 0.0
 
@@ -212,7 +214,7 @@ def _delayed(data: PreparedRecording, values: Mapping[Effect, float]) -> Prepare
 def _predicted(
     model: Simulator, values: Mapping[Effect, float], windows: Sequence[Sequence[tuple[PreparedRecording, int]]]
 ) -> list[list[Part]]:
-    """Predict windows of recordings, each from a number of first samples, to which the values at the start are fitted.
+    """Predict windows of recordings. The values at the start of each window are fitted to its first samples.
 
     Raises MotionError.
     """

@@ -4,7 +4,8 @@ The fit compares what the sensor measures, such as a depth and not its derivativ
 and motion determine A, B and C of v' = C - B v - A |v| v, and with given thrust, inertia and α also a_d, b_d and β.
 Load, delay, current, lag and different coefficients in reverse are fitted where they are identifiable. Motion under
 many commands also determines the shape of the thrust curve, so the measured forces are residuals of the same fit, and
-all axes that share a tested curve are fitted at once. Each recording adds its initial velocity and position.
+all axes that share a tested curve are fitted together. Each recording adds two parameters: its initial velocity and
+position.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -47,11 +48,11 @@ from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation, white_noise
 
 _BEYOND_DOUBT = 100.0
-"""The value of Wald's statistic from which no held-out prediction is needed."""
+"""Effects with a larger Wald statistic need no confirmation by held-out predictions."""
 _STEPS = 30
 """The number of steps of a search after which half of the work seems to be done."""
 _ITERATIONS = 6
-"""The number of iterations of the noise of recordings with uncertain times of switches."""
+"""The number of iterations of the noise estimate, if times of switches are uncertain."""
 _PIECE = 5.0
 """The length of a piece of a recording, s, where the axes act on each other. The coupling makes a vehicle that moves
 ahead unstable in yaw, so small errors grow quickly, and the simulation of a long piece tells little."""
@@ -130,14 +131,15 @@ class _Fit:
         return allowing.chosen(extras, self.of_all_pieces(model, x, noise)[1])
 
     def of_all_pieces(self, model: Simulator, x: Array, noise: Array) -> tuple[Simulator, Array]:
-        """Return the model with all samples of all pieces, and its parameters by those of a model with some of them."""
+        """Return the model with all samples of all pieces, and its parameters, derived from a fit to some of the
+        pieces."""
         whole = self.model(model.extras, noise, with_prior=True)
         start = whole.start(model.rov(x).coefficients, model.extra_values(x), model.starts(x))
         without_spikes = replace(whole, data=tuple(d.thinned() for d in self.data))
         return whole, settled(without_spikes, start)
 
     def chosen(self, extras: tuple[Effect, ...], x: Array) -> tuple[RecordingsFit, ...]:
-        """Fit all extras from x on, and leave out those that the data do not justify."""
+        """Fit all effects, starting from x, and leave out those that the data do not justify."""
         noise = self.noise(extras, x)
         if any(d.shifts is not None for d in self.data):  # x was fitted without the allowance for switches
             x = solve(self.model(extras, noise, with_prior=True), x, self.loss, 1e-4, self.on_step).x
@@ -180,8 +182,9 @@ class _Fit:
     def simplest(self, analysis: ResidualAnalysis, noise: Array) -> ResidualAnalysis:
         """Drop groups of extras that are not justified together, by the Bayesian criterion.
 
-        Load, current and coefficients by direction can replace each other, so each may be significant although all of
-        them explain nothing: motion in one direction is the same with more current, more load and less linear drag.
+        Load, current and coefficients by direction can replace each other, so each of them may be significant although
+        all together explain nothing. For example, motion in one direction stays the same with more current, more load
+        and less linear drag.
         """
         kept = analysis.model.extras
         currents: set[Effect] = {e for e in kept if type(e) is Current}
@@ -237,7 +240,8 @@ class _Fit:
         return {axis.name, *(curve.name for curve in curves_of(self.base.layout, axis))}
 
     def held_out(self, analysis: ResidualAnalysis, extras: Collection[Effect]) -> dict[str, HeldOut]:
-        """Predict the recordings of each file by the others, with the thrust curves of the fit to all; by axis."""
+        """Predict the recordings of each file by a fit to the others. The thrust curves are those of the fit to all.
+        Returns the results by axis."""
         rov, values = analysis.model.rov(analysis.x), analysis.model.extra_values(analysis.x)
         base = self.base.replaced(_common(rov, self.base))
         found: dict[str, HeldOut] = {}

@@ -1,4 +1,5 @@
-"""The errors of predictions in m and m/s (rad and rad/s), beside the sensor's noise and a model without any change."""
+"""The errors of predictions in m and m/s (rad and rad/s), with two references: the sensor's noise, and the errors of
+predicting no change."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -38,7 +39,8 @@ class Errors:
 
     @property
     def explained(self) -> float:
-        """The share of the change beyond the noise that is predicted, by mean squares; 1 is perfect, 0 is no change.
+        """The predicted share of the change beyond the noise, in mean squares. 1 is a perfect prediction; 0 is as good
+        as predicting no change.
 
         It is NaN where the change is hardly above the noise.
         """

@@ -66,7 +66,7 @@ class RecordingsFit:
         return self.hold_out()
 
     def spread(self) -> dict[str, float]:
-        """Return the ratio of the differences between fits to their standard deviation by chance, by coefficient.
+        """Return, for each coefficient, the ratio of the differences between fits to their expected standard deviation.
 
         Each fit to the other recordings is compared with the fit to all. The variance of this difference is that of the
         former estimate less that of the latter, because the latter is efficient (Hausman 1978). Only ratios that chance
@@ -143,7 +143,7 @@ def part_of(together: Estimate, axis: Axis, rov: Rov) -> Estimate:
 
 
 def effects_of(analysis: ResidualAnalysis, kept: Collection[Effect]) -> dict[Effect, FittedEffect]:
-    """Return the effect of each extra of a fit, with its 95 % interval."""
+    """Return the fitted effects with their 95 % intervals."""
     model, found, reach = analysis.model, analysis.covariance(), quantile(max(analysis.degrees_of_freedom, 1.0))
     effects, recordings = {}, [d.recording for d in model.data]
     for n, (extra, value) in enumerate(model.extra_values(analysis.x).items(), len(model.names)):

@@ -18,12 +18,12 @@ from rov_fmu.tank.smoothing import robust_deviation
 _LEAST_FREEDOM = 8.0
 """The least number of degrees of freedom, unless the samples are fewer: the spectrum of slow noise has more."""
 _COLOURED = 2.0
-"""The correlation time in samples from which a fit absorbs a relevant part of the noise."""
+"""If the correlation time in samples is longer, the fit absorbs a relevant part of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A recording beside the fitted model; arrays over the measured samples, SI units."""
+    """A recording and the fitted model of it; arrays over the measured samples, SI units."""
 
     recording: Recording
     time: Array
@@ -112,7 +112,7 @@ class ResidualAnalysis:
         return float(np.sum((other.cost - self.cost) / correlation))
 
     def significance(self, extra: Effect) -> float:
-        """Return Wald's statistic, about the increase of the cost without the extra."""
+        """Return Wald's statistic: approximately the increase of the cost if the effect is left out."""
         n = len(self.model.names) + self.model.extras.index(extra)
         return float((self.x[n] - extra.neutral) ** 2 / self.covariance()[n, n])
 

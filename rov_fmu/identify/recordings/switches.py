@@ -1,8 +1,8 @@
-"""Decide how exactly a log knows the times of its commands, and allow for the uncertain times of the switches.
+"""Decide how exactly a log gives the times of its commands, and allow for the uncertain times of the switches.
 
 A log shows a new command in the first row after it, so the command changed at any time since the row before: on average
-in the middle, with a standard deviation of the time between the rows divided by √12. Where a test program wrote the
-log itself, the command changes at the row, or near it if the time stamps have errors. The residuals tell which it is.
+in the middle, with a standard deviation of the time between the rows divided by √12. Where a test program wrote the log
+itself, the command changes at the row, or near it if the time stamps have errors. The residuals decide between the two.
 """
 
 from collections.abc import Sequence
@@ -24,12 +24,13 @@ _TESTED = 60
 _COEFFICIENTS = 256
 """The number of coefficients of the cosine transform that the test uses."""
 _SHARES = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0])
-"""The scatter of the switches, relative to that of switches between rows. The last one stands for such switches."""
+"""The tested scatters of the switches, relative to the scatter of switches between rows. The last value means switches
+between rows."""
 _LARGEST = 5.0
 """The largest loss of log-likelihood of one piece, so that a few pieces with another misfit do not decide."""
 
 _CLEAR = 3.0
-"""The gain of log-likelihood by which a scatter must be better than none. Without any, chance rarely reaches it."""
+"""The least gain of log-likelihood of a scatter compared with no scatter. Chance rarely reaches it."""
 _RANK = 1e-6
 """The least singular value of columns that are independent of the others."""
 
@@ -87,7 +88,7 @@ class _Piece:
 
 
 def _whitened(residuals: Array, S: Array, jacobian: Array, shared: int) -> _Piece | None:
-    """Return a piece without what its own parameters, the values at its start, explain.
+    """Return a piece after removing the part that the values at its start explain.
 
     The first columns of the Jacobian are those of the shared parameters. Returns None for a piece without switches, or
     with too few samples.
@@ -121,7 +122,7 @@ def _without_fit(pieces: Sequence[_Piece]) -> list[_Piece]:
 
 
 def _gains(piece: _Piece) -> Array:
-    """Return how much larger the logarithm of the likelihood is with a scatter of the switches, for each share."""
+    """Return the gain of log-likelihood for each share of scatter."""
     U, s, _ = np.linalg.svd(piece.shifts, full_matrices=False)
     explained, scatter = (U.T @ piece.residuals) ** 2, np.outer(_SHARES, s) ** 2  # the covariance is I + share^2 A A'
     return np.asarray(0.5 * np.sum(explained * scatter / (1.0 + scatter) - np.log1p(scatter), axis=1))

@@ -30,9 +30,9 @@ _BETAS = 0.02, 2.0
 def first_guess(
     axis: Axis, data: Sequence[PreparedRecording], base: Rov, delays: Sequence[float] = DELAYS
 ) -> tuple[dict[str, float], float]:
-    """Return a_d, b_d, β and F_0 of an axis by their keys, and the delay of the commands (s), by all recordings.
+    """Return a_d, b_d, β and F_0 of an axis by key, and the delay of the commands (s), from all recordings.
 
-    The forces of coupling are those of the measured velocities, with the inertia for β = 1.
+    Forces of coupling are computed from the measured velocities with β = 1.
     """
     own = [d for d in data if d.axis is axis]
     inertia = base.inertia(base.layout.kinds[axis.name])

@@ -18,7 +18,8 @@ Values = Mapping[str, Array]
 """V numbers by the name of a coefficient, an input, or a variable at the start."""
 
 _SETTLED = 30.0
-"""A lagging force depends on the commands of so many time constants; what came before changes it by 1e-13."""
+"""A lagging force depends on the commands of this many time constants before. Earlier commands change it by less than
+1e-13."""
 _POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta", YAW: "psi"}
 _VAGUE = 0.3
 """The prior standard deviation of a velocity at the start that is not measured, m/s or rad/s."""
@@ -121,8 +122,9 @@ class Flight:
         """Return the values (V x n) and the velocities through the water of each recording.
 
         `values` has V sets of numbers. Each set has a delay of the commands for each recording (s). All sets are
-        simulated at the same times, which suit the first delays, because the motion as a function of the time of the
-        commands does not depend on the delays. The results are NaN where the motion cannot be computed.
+        simulated at the same times, chosen for the first delays. This is possible because the motion, as a function of
+        the time of the commands, does not depend on the delays. The results are NaN where the motion cannot be
+        computed.
         """
         switches = self.members[0].switches
         nodes = self._nodes(delays[0])
@@ -145,7 +147,8 @@ class Flight:
         return found, velocities
 
     def _nodes(self, delays: Sequence[float]) -> Array:
-        """Return the times of the simulation: the switches, and the samples, or steps of 0.05 s if they are fewer."""
+        """Return the times of the simulation: the switches, and either the samples or steps of 0.05 s, whichever are
+        fewer."""
         samples = [d.time - delay for d, delay in zip(self.members, delays, strict=True)]
         begin, end = min(float(s[0]) for s in samples), max(float(s[-1]) for s in samples)
         switches = self.members[0].switches
@@ -292,7 +295,7 @@ class SimulatedMotion:
         return _between(self.nodes, self.at[name], rate, sample, jumps)
 
 
-@np.errstate(all="ignore")  # data of no vehicle overflow, and the result is then not finite
+@np.errstate(all="ignore")  # impossible data may overflow; the result is then not finite
 def _between(nodes: Array, values: Array, rates: Array, sample: Array, jumps: Flags | None = None) -> Array:
     """Interpolate values between nodes by cubics with their rates, V x n. At a node the result is the value itself.
 

@@ -13,7 +13,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 
 _MOST = 300
-"""The number of switches of a recording that count as uncertain, strongest first."""
+"""At most this many switches of a recording count as uncertain: the strongest ones."""
 LONGEST = 1.0
 """The longest time between two rows in which a switch counts as uncertain, s. Longer ones are gaps."""
 
@@ -93,10 +93,10 @@ class LinearResponse:
         return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])
 
     def by_switches(self, between: Array | None = None, *, squared: bool = False) -> Array:
-        """Return the response to each strong switch when it comes later by one standard deviation, n x switches.
+        """Return the response to a delay of each strong switch by one standard deviation, n x switches.
 
-        With `squared`, it is the second-order term of this response, which grows with the square of the time by which
-        the switch is off. The square has its root mean square value then.
+        With `squared`, it is the second-order term of the response. It is proportional to the square of the delay, for
+        which the root mean square is used.
 
         A command that changes between two rows of a log changes at an unknown time between them, whose standard
         deviation is the time between the rows divided by √12. `between` has the times about which the switches of the

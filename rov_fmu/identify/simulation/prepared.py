@@ -20,16 +20,17 @@ _FEW = 500
 _FEW_PIECES = 4
 """The number of pieces of each file from which a search can begin."""
 _FEW_PIECES_OF_ALL = 12
-"""The least number of pieces of all files from which a search can begin, if there are so many."""
+"""A search begins with at least this many pieces of all files, if they exist."""
 _FEWEST_OF_PIECE = 8
-"""A piece with fewer samples tells nothing but its own start."""
+"""A piece with fewer samples determines only its own start."""
 _GAP = 1.0
 """The shortest gap, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedRecording:
-    """A recording, or a piece of it, that is ready to be simulated: J holds of the commands and n measured samples."""
+    """A recording, or a piece of it, that is ready to be simulated: J intervals with constant commands, and n measured
+    samples."""
 
     recording: Recording
     switches: Array
@@ -97,8 +98,8 @@ def switched_rows(reaching: Array) -> NDArray[np.intp]:
 def divided(data: Sequence[PreparedRecording], longest: float) -> tuple[PreparedRecording, ...]:
     """Divide the recordings of every file at gaps, and into pieces of about `longest` (s) at most.
 
-    Every piece has a start of its own, so that the error of a simulated position or heading grows for the length of a
-    piece only.
+    Every piece has its own start, so that errors of a simulated position or heading grow only over the length of a
+    piece.
     """
     bounds = {file: _bounds([d for d in data if d.recording.file == file], longest) for file in _files(data)}
     found = []

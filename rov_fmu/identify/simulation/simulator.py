@@ -21,7 +21,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import is_factor
 
 _CHANGE = 1e-6
-"""The relative change of a parameter for its derivative. The motion is exact, so the derivative is to about 1e-6."""
+"""The relative change of a parameter for its derivative. The motion is exact, so the relative error of the derivative
+is about 1e-6."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,8 @@ class Output:
 
 @dataclass(frozen=True, eq=False)
 class FlightPlace:
-    """A flight, the places of its recordings in the data, of its own parameters in x, and of its samples."""
+    """A flight, with the indices of its recordings in the data, of its parameters in x, and of its samples in the
+    residuals."""
 
     flight: Flight
     members: list[int]
@@ -65,10 +67,11 @@ class Simulator:
     extras: tuple[Effect, ...]
     sigma: Array
     likely: Array | None = None
-    """The prior standard deviation of each extra, infinite for one without; None if none has a prior."""
+    """The prior standard deviation of each effect, infinite for an effect without a prior. None if no effect has a
+    prior."""
     tables: tuple[Table, ...] = ()
     expected: Mapping[Effect, float] = field(default_factory=dict)
-    """The most likely values of extras with a prior, where they are not those of the effects themselves."""
+    """The prior means of effects, if they differ from `Effect.likely`."""
 
     # ---- Parameters ----
 
@@ -164,7 +167,7 @@ class Simulator:
                 yield (first.recording.file, float(first.time[0]), name), value
 
     def places_of(self, extras: Collection[Effect]) -> list[int]:
-        """Return the places in x of everything except the other extras."""
+        """Return the places in x of all parameters except the effects that are not given."""
         other = {n for n, extra in enumerate(self.extras, len(self.names)) if extra not in extras}
         return [n for n in range(self.size) if n not in other]
 
@@ -237,8 +240,8 @@ class Simulator:
     def slopes_of_flight(self, place: FlightPlace, x: Array, columns: Sequence[int]) -> tuple[Array, Array]:
         """Return the residuals of a flight (n) and their derivatives by some parameters (n x columns).
 
-        The derivatives by delays are those of a simulation that begins at a fixed time. The values at the start absorb
-        that it begins later or earlier.
+        For the derivatives by delays, the simulation begins at a fixed time. The values at the start compensate for
+        this.
         """
         steps = _CHANGE * np.maximum(np.abs(x[columns]), 0.01)
         X = np.tile(x, (len(columns) + 1, 1))

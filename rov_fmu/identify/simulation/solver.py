@@ -1,6 +1,6 @@
 """Fit the parameters of a simulator: the shared ones by SciPy, the values at the start of each flight within.
 
-The values at the start of a flight act on this flight alone, so they are fitted anew for every set of shared parameters
+The values at the start of a flight affect only this flight, so they are fitted again for every set of shared parameters
 (variable projection, Golub and Pereyra 1973, with Kaufman's approximation of the derivatives). The search then has few
 parameters, however many pieces there are, and a flight never starts far from its measurements.
 """
@@ -16,7 +16,7 @@ from rov_fmu.identify.simulation.simulator import FlightPlace, Simulator
 from rov_fmu.tank.arrays import Array
 
 HUBER = 2.5
-"""Residuals beyond so many standard deviations count linearly, not by their square."""
+"""Residuals larger than this many standard deviations count linearly, not squared."""
 _FINE = 1e-5
 """With a larger tolerance, a fit only searches for a start, and need not end at the bounds."""
 _ITERATIONS = 12
@@ -29,7 +29,7 @@ _NO_MOTION = "the motion cannot be computed with these coefficients"
 def solve(
     model: Simulator, start: Array, loss: Loss, tolerance: float = 1e-8, on_step: Callable[[], None] | None = None
 ) -> Solution:
-    """Return the best fit within the limits; a large tolerance gives a fit near it.
+    """Return the best fit within the limits; with a large tolerance, a fit near it.
 
     `on_step` is called at each step of the search. Raises MotionError.
     """
@@ -65,7 +65,7 @@ def settled(model: Simulator, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Inverse:
-    """How the best values at the start of a flight follow the residuals and the shared parameters, to first order."""
+    """The first-order change of the best values at the start of a flight, by residuals and by shared parameters."""
 
     by_residuals: Array
     """own x rows: the change of the values at the start for each residual."""
@@ -137,7 +137,8 @@ class _Search:
         return self.last
 
     def _settle_by(self, inverse: _Inverse, place: FlightPlace, x: Array) -> bool:
-        """Fit the values at the start of a flight with the derivatives of other parameters; False where this fails."""
+        """Fit the values at the start of a flight with the derivatives of other parameters; Return False if this
+        fails."""
         r, here = self._residuals_of(place, x), x[place.own].copy()
         x[place.own] += inverse.by_shared @ (x - self.begin)[: self.model.shared]
         linear, cost = self._residuals_of(place, x), self._cost(r)
@@ -159,7 +160,8 @@ class _Search:
         return False
 
     def _settle(self, place: FlightPlace, x: Array) -> None:
-        """Fit the values at the start of a flight by Gauss and Newton, with steps that are halved until they help."""
+        """Fit the values at the start of a flight by the Gauss-Newton method, with steps that are halved until they
+        help."""
         own = place.own_places
         for _ in range(_ITERATIONS):
             r, J = self.model.slopes_of_flight(place, x, own)
@@ -186,7 +188,7 @@ class _Search:
         return np.concatenate([self.model.of_flight(place, x[None, :])[0], self.model.deviations_of(place, x)])
 
     def _weights(self, r: Array) -> Array:
-        """Return the square roots of the weights that make least squares of a robust fit."""
+        """Return the square roots of the weights with which least squares equal the robust fit."""
         return np.sqrt(np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-9))) if self.robust else np.ones(len(r))
 
     def _cost(self, r: Array) -> float:

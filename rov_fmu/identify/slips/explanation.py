@@ -22,7 +22,7 @@ from rov_fmu.model.rov import Rov
 FASTEST = {"m/s": 4.0, "rad/s": 8.0}
 """The highest speed of an ROV, by unit."""
 CERTAIN = 15.0
-"""A wrong scale that lowers the cost by so much is certain."""
+"""A wrong scale is certain if it lowers the cost by at least this."""
 LIKELY = 4.0
 """A wrong scale that lowers the cost by so much is worth a warning."""
 _RHO = 1000.0
@@ -45,7 +45,7 @@ class Evidence:
     alone: Alone
 
     def undone(self, factor: float) -> "Evidence":
-        """Correct the analysis for a file with `factor` times the measured values."""
+        """Return the analysis, corrected if the values in the file are `factor` times too large."""
         k, one = factor, self.alone
         true = replace(one, inertia=k * one.inertia, a=k * k * one.a, b=k * one.b, speed=one.speed / k)
         return replace(self, alone=true)
@@ -72,7 +72,8 @@ class Files:
     given: Alone | None = None
 
     def explanations(self) -> list[Explanation]:
-        """Return the best explanation for each scale and set of files, sorted by cost, including that without files."""
+        """Return the best explanation for each scale and set of files, sorted by cost. One of them has no files: all
+        scales are right."""
         factors = _ANGLES if self.axis.is_rotation else _LENGTHS
         found = {(e.factor, e.files): e for e in sorted(self._all((1.0, *factors)), key=lambda e: -e.cost)}
         return sorted(found.values(), key=lambda e: e.cost)
@@ -131,5 +132,5 @@ def contradict(explanations: Sequence[Explanation]) -> Explanation | None:
 
 
 def _ratio(one: float, other: float) -> float:
-    """Return the ratio in decades; 0 where one of the numbers is 0, which tells no scale."""
+    """Return the ratio in decades; 0 if one of the numbers is 0, because it then contains no scale."""
     return 0.0 if one <= 0.0 or other <= 0.0 else log10(one / other)

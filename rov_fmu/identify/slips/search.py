@@ -1,7 +1,8 @@
 """Find wrong units, scales and signs in recordings and tables, with the file and the likely cause.
 
 Every recording is examined by itself first (rov_fmu/identify/slips/single_recording.py), then all recordings of an axis
-together (rov_fmu/identify/slips/explanation.py). A finding that is certain refuses the file; others become warnings.
+together (rov_fmu/identify/slips/explanation.py). If a finding is certain, the file is refused. Other findings become
+warnings.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -21,14 +22,14 @@ from rov_fmu.tank.recording import Recording, signal_name
 Tables = Mapping[str, Sequence[tuple[float, float]]]
 """Rows of a command and a number, by file."""
 BETA = 0.05, 1.2
-"""The range of β without added mass: m/β is between about the mass alone and 20 times the mass."""
+"""The range of β without added mass: m/β is between about the mass itself and 20 times the mass."""
 BETA_WITH_ADDED_MASS = 0.3, 3.0
 _ERROR_OF_MASS = 1.02
-"""The β up to which an error of 2 % of the mass or of the forces explains that β is above 1."""
+"""A β of at most this may be above 1 because of an error of 2 % of the mass or of the forces."""
 _WEAKEST_COMMANDS = 0.01
 """Commands that never exceed this are fractions taken for percent."""
 _ALIKE = 2.5
-"""The ratio below which β of two axes may be wrong by one cause."""
+"""β of two axes may have the same cause of error if their ratio is below this."""
 _FAR, _VERY_FAR = 20.0, 100.0
 """The ratio of time constants from which a file is doubtful, and from which it is refused."""
 
@@ -93,7 +94,7 @@ def beta_out_of_range(rov: Rov, axis: Axis, intervals: Mapping[str, tuple[float,
 
 
 def weak_thrust(rov: Rov, curves: Collection[str], axes: Iterable[Axis]) -> tuple[Finding, ...]:
-    """Return the tested thrust curves that must be too weak, each as one finding about every axis that they drive.
+    """Return findings about tested thrust curves that must be too weak: one for each axis that such a curve drives.
 
     All axes of such a curve have about the same β, and it is beyond those of known vehicles.
     """
@@ -116,7 +117,7 @@ def weak_thrust(rov: Rov, curves: Collection[str], axes: Iterable[Axis]) -> tupl
 def _examine_each(
     axis: Axis, recordings: Sequence[Recording], base: Rov, evidence: list[Evidence]
 ) -> Iterator[Finding]:
-    """Yield what is wrong with single recordings, and append to the evidence what each shows about the vehicle."""
+    """Yield findings about single recordings, and append the analysis of each one to `evidence`."""
     for recording in recordings:
         data = prepare(recording, base)
         strongest = float(np.abs(data.commands).max(initial=0.0))
@@ -134,7 +135,7 @@ def _examine_each(
 
 
 def _wrong_scales(axis: Axis, evidence: Sequence[Evidence], explanations: Sequence[Explanation]) -> Iterator[Finding]:
-    """Yield the files whose numbers are a multiple of what was measured, by the best explanation."""
+    """Yield a finding for each file that has a wrong scale by the best explanation."""
     best = explanations[0]
     gained = next(e.cost for e in explanations if not e.files) - best.cost
     if not best.files or gained < LIKELY:

@@ -3,8 +3,8 @@
 The velocity is modelled as a delayed first-order lag of v_ss(F), where v_ss is the steady velocity by linear or by
 quadratic drag alone, whichever explains more. Rate and delay are tried from a list; the rest is a linear fit, which has
 one solution for any scale, while a search would need a start near it. A wrong sign leads to a negative gain. Forces
-that do not follow the commands (coupling, swell) hardly change it. The result is accurate to about 30 %, which is
-enough to recognize a wrong unit or sign, but not to be reported.
+that are independent of the commands (coupling, swell) hardly affect the result. The result is accurate to about 30 %,
+which is enough to recognize a wrong unit or sign, but not to be reported.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Alone:
     errors: tuple[float, float]
     """Relative standard errors of the inertia, and of drag at the highest speed."""
     share: float
-    """The share of the variance of the velocity that it explains."""
+    """The share of the variance of the velocity that this motion explains."""
 
     @property
     def is_clear(self) -> bool:
@@ -98,7 +98,7 @@ def _held(data: PreparedRecording, force: Array, time: Array) -> Array:
 
 
 def _fits(time: Array, v: Array, steady: Array, rate: float) -> tuple[Array, Array, Array]:
-    """Fit the velocity by a gain times a lag of each of k steady velocities (k x n), from rest, and a constant.
+    """Fit the velocity by a constant plus a gain times the lagged response to each of k steady velocities (k x n).
 
     Return the gains, the remaining sums of squares, and the residuals of the best fit.
     """

@@ -168,7 +168,7 @@ def _mass_entries(equation: Equation) -> dict[tuple[str, str], str]:
 
 
 def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
-    """Return the formulas to write in place of their names. A name with an equation of its own stays."""
+    """Return the formulas that replace their names. A name stays if it has its own equation."""
     found = {
         name: formula
         for name, formula in equation.program.items()

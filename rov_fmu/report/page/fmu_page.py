@@ -37,7 +37,7 @@ from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
-"""The axes in the order in which the page names those that a vehicle does not have."""
+"""The order in which the page names the missing axes."""
 _PANEL = (3.7, 2.9)  # inches
 _PICTURES = {
     "from_above.svg": "The vehicle from above: x forward, y to starboard",
@@ -189,7 +189,7 @@ def _agreement(table: ResponseTable) -> dict[str, Any]:
 
 
 def _is_cut_off(cell: Cell) -> bool:
-    """Return True if the printed value is the computed one without its last digits, not rounded."""
+    """Return True if the printed value was truncated instead of rounded."""
     if cell.printed is None or cell.rounds_to_printed or not isfinite(cell.computed):
         return False
     return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed

@@ -39,7 +39,7 @@ class Flown:
     vehicle: Vehicle
     module: bytes
     file: str = ""
-    """The name of the vehicle file, which tells vehicles of the same name and version apart."""
+    """The name of the vehicle file, which distinguishes vehicles of the same name and version."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Live:
     keys: Sequence[tuple[Axis, str]]
     """The axes, each with the letters of its keys: that of its positive direction, and that of its negative one."""
     places: Mapping[str, str]
-    """Where the thruster is that a command drives alone."""
+    """The place of the thruster, by the command that drives only this thruster."""
     start: Mapping[str, float]
     """The start value of each variable."""
     loads: Sequence[tuple[str, float, str]]
@@ -95,7 +95,7 @@ def live(flown: Sequence[Flown]) -> Live:
 
 
 def _names(flown: Sequence[Flown]) -> list[str]:
-    """Return the names of the vehicles, if they are the same with what tells them apart: the version or the file."""
+    """Return the names of the vehicles. Equal names also have the version or the file."""
     plain = [one.vehicle.name for one in flown]
     versions = [f"{one.vehicle.name} {one.vehicle.version}" for one in flown]
     files = [f"{one.vehicle.name} ({one.file})" if one.file else one.vehicle.name for one in flown]
@@ -137,7 +137,7 @@ def _data(flown: Flown) -> dict[str, Any]:
 
 
 def _keys(layout: Layout) -> list[str]:
-    """Return the letters of the keys of each axis. Axes without letters of their own share out the spare ones."""
+    """Return the letters of the keys of each axis. Axes without their own letters get the spare ones."""
     spare = iter(_SPARE_KEYS)
     return [_KEYS[form.axis.name] if form.axis.name in _KEYS else next(spare) for form in layout.axes]
 
@@ -192,7 +192,7 @@ def _thruster(rov: Rov, thruster: Thruster, label: str) -> dict[str, Any]:
 
 
 def _places(rov: Rov) -> dict[str, str]:
-    """Return the label of the thruster that a command drives alone, by the command."""
+    """Return the label of the thruster for each command that drives only one."""
     if rov.layout.mix:
         return {}
     return {f"u_{one.name}": label for one, label in zip(rov.layout.thrusters, _labels(rov), strict=True)}

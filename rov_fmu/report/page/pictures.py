@@ -50,7 +50,7 @@ def _icon(figure: Figure, rov: Rov) -> None:
 
 
 def _signal(figure: Figure) -> None:
-    """Draw a triangle that points as signals go: they enter an icon on the left and leave it on the right."""
+    """Draw a triangle in the direction of signals, from left to right."""
     ax = figure.subplots()
     ax.fill([0.0, 1.0, 0.0], [0.0, 0.5, 1.0], color=LIGHT["blue"], linewidth=0.0)
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))

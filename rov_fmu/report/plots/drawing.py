@@ -17,7 +17,8 @@ from rov_fmu.report.plots.svg import LIGHT
 Point = tuple[float, float, float]
 
 VIEWS = {"from above": (SWAY, HEAVE, -1), "from starboard": (HEAVE, SWAY, 1)}
-"""For each view: the axis that points down, the axis along the line of sight, and 1 if that points at the viewer."""
+"""For each view: the axis that points down, the axis along the line of sight, and 1 if this axis points toward the
+viewer, else -1."""
 _LETTERS = {SURGE: "x", SWAY: "y", HEAVE: "z"}
 _INDEX = {axis: n for n, axis in enumerate(AXES.values())}
 _SMALLEST = 0.05
@@ -109,10 +110,10 @@ def size_of(rov: Rov) -> float:
 
 
 def _arranged(rov: Rov, view: str, inch: float) -> Scene:
-    """Return a view with its labels placed, in a drawing where an inch is so many metres."""
+    """Return a view with its labels placed, in a drawing in which an inch is `inch` metres."""
     down, sight, toward = VIEWS[view]
     size = size_of(rov)
-    space = Space(inch, [(-1.2 * size, 0.0)])  # the width of a drawing with few things in it
+    space = Space(inch, [(-1.2 * size, 0.0)])  # the least width of a drawing
     marks = list(_marks(rov, down, sight, toward))
     from_above = down is SWAY
     ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}

@@ -19,7 +19,7 @@ from rov_fmu.report.templates import pretty_unit, text
 from rov_fmu.tank.arrays import Array, Flags
 
 _WIDEST = 5.0
-"""Intervals are drawn from a fifth to five times the value. An arrow marks one that goes further."""
+"""Intervals are drawn from a fifth of the value to five times the value. An arrow marks an end beyond this."""
 _TICKS = [n / 1000 for n in (1, 2, 3, 5, 10, 20, 30, 40, 50, 100, 150, 200, 300, 400, 500, 750, 1000, 2000, 3000, 4000)]
 """The relative deviations that may be labelled."""
 _STANDARD_ERRORS = 1.96
@@ -146,7 +146,7 @@ def plot_known(figure: Figure, found: Sequence[Known]) -> None:
 
 
 def _ticks(sizes: Sequence[float], reach: float) -> Iterator[float]:
-    """Yield the outermost tick within reach. More of them would not fit beside each other."""
+    """Yield the outermost tick within reach. There is no room for more ticks."""
     within = [size for size in sizes if abs(log(1.0 + size)) <= reach]
     yield from within[-1:]
 

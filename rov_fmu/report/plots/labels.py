@@ -7,7 +7,7 @@ from math import cos, pi, sin
 Place = tuple[float, float]
 
 AROUND: tuple[Place, ...] = tuple((cos(n * pi / 4.0), sin(n * pi / 4.0)) for n in (0, 6, 2, 4, 7, 1, 5, 3))
-"""The directions from a thing to its name: right, up, down, left, and between these."""
+"""The directions from an object to its label: right, up, down, left, and between these."""
 _HEIGHT = 0.17
 """The height of a line of text, inches."""
 _GAP = 0.045
@@ -39,8 +39,8 @@ class Space:
     def name(self, width: float, around: Iterable[tuple[Place, float, Iterable[Place]]]) -> Place:
         """Return the centre of a name, and reserve its space; the width is in inches.
 
-        It is the first free place, or the one that hides least. `around` holds points, the distance of the name from
-        each of them, and the directions from it.
+        It is the first free place, or else the one that covers least. `around` has points, each with the distance and
+        the possible directions of the label.
         """
         half = width * self.inch / 2.0, _HEIGHT * self.inch / 2.0
         places = []
@@ -64,5 +64,5 @@ class Space:
 
 
 def _side(part: float) -> float:
-    """Return -1, 0 or 1: to which side of a point a name is, along one coordinate of the direction to it."""
+    """Return -1, 0 or 1: the side of a point on which a label is, along one coordinate of the direction to it."""
     return 0.0 if abs(part) < 0.3 else 1.0 if part > 0.0 else -1.0

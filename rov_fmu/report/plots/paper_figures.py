@@ -1,4 +1,4 @@
-"""The figures of the paper as far as it prints their data, for a publication: `rov-fmu figures FOLDER`.
+"""The figures of the paper whose data the paper prints, in a quality for publications: `rov-fmu figures FOLDER`.
 
 The curves are those of the printed equations. The only printed points are V_ss and Tau (Tables 3-7); the force at a
 measured velocity is that of the thrust curve, (11)-(13). The forces behind the thrust curves (Figures 4-6) and all
@@ -37,7 +37,7 @@ FORMATS: dict[str, dict[str, Any]] = {
 _EMBEDDED = {"svg.fonttype": "path", "pdf.fonttype": 42}
 _TEXT_SIZE = 8.0  # points, in print
 _RATIO, _WIDE_RATIO = 0.78, 0.5
-"""The height of a plot by its width, in a single column and where one plot fills both."""
+"""The height of a plot divided by its width: in one column, and if a single plot fills both columns."""
 _STEPS = (30, 50, 70)  # %
 _PAPER = "Enevoldsen et al. (2018)"
 _STEP_FIGURES = {
@@ -45,7 +45,7 @@ _STEP_FIGURES = {
     "yaw": ("figure_11b", ", Figure 11b"),
     "surge": ("surge_steps", ", which shows no such figure"),
 }
-"""The name of the figure and where the paper has it, by axis."""
+"""The name of the figure and its reference in the caption, by axis."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ _WINDOWS = (0.2, 0.3, 0.5, 0.8, 1.2)
 _VISIBLE = 0.02
 """Noise up to this share of a change of velocity does not hide the change."""
 _SETTLED = 0.3
-"""The time within which a ramped command has changed, s."""
+"""A ramped command reaches its new value within this time, s."""
 _FROM_REST = 1.25
 """The factor by which a step from rest is preferred, because it shows a delay better."""
 
@@ -67,13 +67,14 @@ def measured(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]
 
 
 def modelled(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]:
-    """Return evenly spaced times and the velocity that the sensor would measure of the model, smoothed the same."""
+    """Return evenly spaced times and the velocity of the model as the sensor would measure it, smoothed in the same
+    way."""
     is_position = simulation.recording.is_position
     return velocity(simulation.time, simulation.modelled, is_position=is_position, window=window)
 
 
 def _write_at_top(ax: Axes, x: float, words: str, align: Literal["center", "right"]) -> None:
-    """Write a few words at the upper edge of a plot; to the right they end a little before x."""
+    """Write a few words at the upper edge of a plot; right-aligned words end a little before x."""
     ax.annotate(
         words,
         (x, 1.0),

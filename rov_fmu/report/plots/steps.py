@@ -67,7 +67,7 @@ def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Dec
 def finish(
     ax: Axes, title: str, x: str, y: str = "", where: Literal["upper left", "lower right"] = "upper left"
 ) -> None:
-    """Add labels, title and legend. The axes begin at 0 if no value is below."""
+    """Add labels, title and legend. The axes begin at 0, unless a value is negative."""
     ax.set(xlabel=x, ylabel=y)
     ax.set_xlim(left=0.0)
     if ax.dataLim.y0 >= 0.0:
@@ -110,7 +110,7 @@ def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> 
 
 
 def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
-    """Plot the velocity after steps of the command for every model, and label the last one.
+    """Plot the velocity after steps of the command for every model, and label the curve of the last model.
 
     A measured V_ss is a dotted line, and a measured Tau is a point at 1 - 1/e of it.
     """

@@ -94,7 +94,7 @@ def with_even_text(draw: Draw, size: float = _STYLE["font.size"]) -> Draw:
 
 
 def image(label: str, path: Path) -> Markup:
-    """Return an SVG file from elsewhere as an image, in which no script runs and no link works. Raises FileError.
+    """Return a foreign SVG file as an image, in which no script runs and no link works. Raises FileError.
 
     The page shows it on a light ground, because the file does not follow the colours of the page.
     """
@@ -120,7 +120,8 @@ def saved(
     style: Mapping[str, Any] = MappingProxyType({}),
     **how: Any,
 ) -> bytes:
-    """Return a figure (size in inches) as Matplotlib saves it, in the common style; `how` says in which format.
+    """Return a figure (size in inches) as Matplotlib saves it, in the common style; `how` has the format and other
+    options of Matplotlib.
 
     `style` has settings of Matplotlib that differ from the common style.
     """
@@ -147,7 +148,7 @@ def _arrange(figure: Figure, form: str) -> None:
 
 
 def _without_ballast(svg: bytes) -> str:
-    """Return the picture without metadata, unused groups and ids, and digits that nobody can see."""
+    """Return the picture without metadata, unused groups and ids, and invisible digits."""
     parser = etree.XMLParser(remove_comments=True, remove_blank_text=True)
     root = etree.fromstring(svg, parser)
     root.set("stroke-linejoin", "round")

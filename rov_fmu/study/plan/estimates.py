@@ -17,7 +17,7 @@ _SHOWN = 5
 
 
 class Estimates:
-    """The estimated coefficients: they have an interval in the vehicle file, and the plan does not give them itself."""
+    """The coefficients that have an interval in the vehicle file, and that the plan itself does not give."""
 
     def __init__(self, plan: Plan, vehicle: Vehicle | None, has: Mapping[str, Variable]) -> None:
         self._plan, self._vehicle, self._has = plan, vehicle, has
@@ -29,7 +29,7 @@ class Estimates:
 
     @property
     def known(self) -> Uncertainty:
-        """The distribution that they are drawn from, also within the bounds of the FMU's variables."""
+        """The distribution of the coefficients, limited to the bounds of the FMU's variables."""
         own = np.array([(self._has[name].minimum, self._has[name].maximum) for name in self.names]).reshape(-1, 2)
         bounds = [np.maximum(self._part.bounds, own)[:, 0], np.minimum(self._part.bounds, own)[:, 1]]
         return replace(self._part, bounds=np.column_stack(bounds))

@@ -31,7 +31,7 @@ BY_NAME = "out"
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": pi, "e": e, "nan": nan, "inf": inf})
 """Numbers by their names in an expression."""
 _DEEPEST = 100
-"""Levels to which an expression may be nested; reading and evaluating it use Python's stack."""
+"""The deepest nesting of an expression. Reading and evaluating it use Python's stack."""
 _MOST_DECIMALS = 300
 _ALLOWED = "an expression has numbers, variables, operators, indices and the functions that docs/studies.md lists"
 
@@ -85,7 +85,8 @@ _OF_ONE_VALUE = (
     *("all", "any", "argmax", "argmin", "mean", "median", "prod", "ptp", "std", "sum", "var"),
     *("cumsum", "diff", "unwrap"),
 )
-"""Functions of NumPy that take one value here. Their other parameters are left out: `out` writes into an array."""
+"""Functions of NumPy with one value. Their other parameters are not allowed, because `out`, for example, writes into an
+array."""
 _OF_TWO_VALUES = ("arctan2", "hypot", "maximum", "minimum", "percentile", "searchsorted")
 FUNCTIONS: Mapping[str, Function] = MappingProxyType(
     {name: Function(getattr(np, name)) for name in _OF_ONE_VALUE}
@@ -111,7 +112,7 @@ _BINARY: Mapping[type[ast.operator], Callable[[_Value, _Value], _Value]] = {
     ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
-    ast.Pow: np.float_power,  # gives a float: neither a number of endless digits nor a complex one
+    ast.Pow: np.float_power,  # always gives a float, never a huge integer or a complex number
     ast.BitAnd: np.logical_and,
     ast.BitOr: np.logical_or,
     ast.BitXor: np.logical_xor,
@@ -296,7 +297,7 @@ class _Reader:
             named = len(self.names)
             terms.append(self.term(part))
             if function.parameters and len(self.names) == named:
-                with suppress(Exception):  # the run gives the reason
+                with suppress(Exception):  # the error is reported when the run is evaluated
                     if not isinstance(value := terms[n]({}), np.ndarray):
                         numbers[given[n]] = value
         if function.parameters:

@@ -14,7 +14,7 @@ from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, E
 
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
-"""The last part of a window; the mean over it is the steady value."""
+"""The share of a window, at its end, over which the steady value is the mean."""
 _MOST_WINDOWS = 1000
 _BAND = 0.05
 """The share of the whole change within which a response has settled."""
@@ -100,7 +100,7 @@ class Responses:
                 raise ValueError(f"there is no time {time:g} s in a run from {first:g} to {last:g} s")
 
     def wrong_times(self, given: Mapping[str, Any]) -> str:
-        """Return the mistake in the times among the constant values of a call, by parameter, or an empty text."""
+        """Check the constant times of a call. Return the mistake, or an empty text."""
         try:
             self._window(given.get("time"), None)
             self._window(given.get("start"), given.get("end"))
@@ -144,7 +144,8 @@ class Figures:
         self._constants = {**CONSTANTS, TIME: times}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
-        """Compute the figures from a run's outputs and parameters: NaN, and the reason, for one without a value."""
+        """Compute the figures from a run's outputs and parameters: A figure without a value is NaN, and the text has
+        the reason."""
         values = {**self._constants, **run}
         found, reasons = [], []
         with np.errstate(all="ignore"):

@@ -73,7 +73,7 @@ class Variable:
         return TYPES[version][self.type]
 
     def function(self, version: int) -> str:
-        """Return the end of the names of the functions that get and set it."""
+        """Return the suffix of its FMI functions, such as Real in fmi2GetReal."""
         return _FUNCTIONS[version].get(self.type, self.type)
 
 

@@ -66,14 +66,14 @@ class LogNormal(Strict):
 
 
 class Range(Strict):
-    """Numbers evenly from one to another."""
+    """Evenly spaced numbers from one to another."""
 
     first: Finite = Field(alias="from")
     """The first number."""
     last: Finite = Field(alias="to")
     """The last number."""
     count: Annotated[int, Field(ge=2, le=1_000_000)]
-    """The number of numbers, including both ends."""
+    """How many numbers, including both ends."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -149,8 +149,8 @@ class Signal(Strict):
     steps: Points | None = None
     """[[time, value], ...]: each value is held until the next time. The times are communication points."""
     ramps: Points | None = None
-    """[[time, value], ...]: straight lines between the points; two points of one time are a jump, at a communication
-    point. An FMU holds an input over a step, so it gets the value at the middle of the step."""
+    """[[time, value], ...]: straight lines between the points; two points with the same time make a jump, which must be
+    at a communication point. An FMU holds an input over a step, so it gets the value at the middle of the step."""
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -246,7 +246,7 @@ class Plan(Strict):
     step: Positive
     """Communication step, s: inputs are set, and outputs read, once a step."""
     tolerance: Positive | None = None
-    """Relative, for an FMU whose solver takes one."""
+    """The relative tolerance, for an FMU whose solver uses one."""
     time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
     """The time that a run may take, s; a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
@@ -294,8 +294,8 @@ class Plan(Strict):
     def mark(self) -> dict[str, Any]:
         """The part of the plan that the results depend on, as JSON values.
 
-        The number of runs is included for a Latin hypercube only, because it does not change the values of the other
-        samplers.
+        The number of runs is included only for a Latin hypercube. With other samplers, it does not change the values of
+        a run.
         """
         mark: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
         runs = [] if self.sampler == "latin-hypercube" else ["runs"]

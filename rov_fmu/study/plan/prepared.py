@@ -248,7 +248,7 @@ def _kept_points(plan: Plan) -> Sequence[int]:
 def _sampled(signal: Signal, times: Array, before: float) -> Array:
     """Return the signal at these times, the middles of the steps; `before` is the value before its first point.
 
-    Held over a step, the value at its middle is exact to the second order of the step.
+    An input is held over a step. With the value at the middle of the step, the error is of second order in the step.
     """
     at, values = np.array(signal.points, np.float64).T
     place = np.searchsorted(at, times, side="right") - 1

@@ -19,7 +19,8 @@ _Draw = Callable[[int, int], Array]
 
 
 class Design:
-    """The varied variables and their values: first the estimates, drawn together, then those in [vary], independent."""
+    """The varied variables and their values: first the estimates, which are drawn jointly, and then the variables of
+    [vary], which are independent."""
 
     def __init__(self, plan: Plan, variables: Mapping[str, Variable], known: Uncertainty = NOTHING) -> None:
         self._known, self._varied = known, plan.vary
@@ -103,7 +104,7 @@ def _grid(counts: Sequence[int]) -> _Draw:
 
     def draw(first: int, end: int) -> Array:
         drawn = np.empty((end - first, len(counts)))
-        _, *places = np.unravel_index(np.arange(first, end), (1, *counts))  # no variable at all is one point
+        _, *places = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
         for column, place in enumerate(places):
             drawn[:, column] = (place + 0.5) / counts[column]
         return drawn

@@ -26,7 +26,7 @@ from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
 _KIND = b'<p class="kind">Study</p>'
-"""A line that every page about a study contains."""
+"""The mark of a page of a study, by which an existing file is recognised."""
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
 _NUMBERS = 6
@@ -36,7 +36,8 @@ _REASONS = 50
 _ROWS = 60
 """The number of rows of a grid that are shown."""
 _FEW = 16
-"""Below so many blocks, even the intervals of Sobol indices are unreliable: with 2, that of 0.5 was 0.6 to 1.1."""
+"""With fewer blocks, even the intervals of Sobol indices are unreliable. With 2 blocks, the interval of a true index of
+0.5 was 0.6 to 1.1."""
 _SURE = 0.1
 """An interval with a smaller half width is narrow enough to show that an index is small."""
 _CONSTANT = 1e-6

@@ -18,15 +18,16 @@ from rov_fmu.report.templates import number, pretty_unit
 from rov_fmu.study.results.results import QUANTILES, Results
 
 _WIDTHS = {3: 3.7, 2: 5.68, 1: 11.6}
-"""The width of a plot in inches by the number of plots in its row. On a wide page, text then has one size in all."""
+"""The width of a plot in inches by the number of plots in its row. The widths make the text equally large in all plots
+on a wide page."""
 _HEIGHT = 2.6  # inches
 _BINS = 40
 _MARKED = 40
-"""A line with at most so many points has markers."""
+"""A line with at most this many points has markers."""
 _NARROW = 1e-3
 """Below this relative variation, the numbers at an axis are long, so there are fewer of them."""
 _SHOWN_INDICES = 12
-"""The number of variables in a plot of Sobol indices; the others have smaller ones."""
+"""The number of variables in a plot of Sobol indices; the other variables have smaller indices."""
 _NAME_WIDTH = 22
 """The number of characters in a line of a variable's name; correlated variables are named together."""
 _KINDS = {"blue": "$S_1$: alone", "teal": "$S_T$: with others"}
@@ -37,7 +38,7 @@ _BAR = 0.34
 
 @dataclass(frozen=True)
 class Plot:
-    """A plot: its label for screen readers, its function, its height in inches, and what stands above it."""
+    """A plot: a label for screen readers, the function that draws it, its height in inches, and the title above it."""
 
     label: str
     draw: Draw
@@ -47,7 +48,8 @@ class Plot:
 
 
 def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
-    """Return the plots for a grid whose rows are full: `name`, `text`, `row` (how many stand in its row) and `svg`.
+    """Return the plots for a grid whose rows are full: `name`, `text`, `row` (the number of plots in its row) and
+    `svg`.
 
     A plot in a row of fewer than three is drawn twice: broad for a wide page, and as narrow as the others for a phone.
     """
@@ -63,7 +65,7 @@ def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
 
 
 def _counts(plots: int) -> list[int]:
-    """Return how many plots stand in the row of each plot: three, but two in the last rows where three leave a gap."""
+    """Return how many plots stand in the row of each plot: three, except in the last rows, where two avoid a gap."""
     if plots == 1:
         return [1]
     pairs = -plots % 3
@@ -126,7 +128,7 @@ def indices_height(variables: int) -> float:
 
 
 def draw_indices(figure: Figure, rows: Sequence[dict[str, Any]]) -> None:
-    """Draw the Sobol indices of a figure as bars with their 95 % intervals; what tells nothing is grey.
+    """Draw the Sobol indices of a figure as bars with their 95 % intervals; unreliable ones are grey.
 
     A row has `name`, `S1`, `S1_95`, `S1_tells` and the same for ST, and the largest ST comes first.
     """

@@ -68,7 +68,8 @@ class Results:
         return table.to_pandas().sort_values(RUN).set_index(RUN)  # type: ignore[no-any-return]
 
     def trajectories(self, runs: Sequence[int] | None = None) -> pd.DataFrame:
-        """Return the kept outputs with a row for each `run` and time `t` (s), of all runs that ended or of these."""
+        """Return the kept outputs with a row for each `run` and time `t` (s), of the given runs, or of all runs that
+        ended."""
         rows = None if runs is None else ds.field(RUN).isin([*runs])
         table = self._dataset(TRAJECTORIES).to_table(filter=rows)
         return table.to_pandas().sort_values([RUN, TIME], kind="stable").reset_index(drop=True)  # type: ignore[no-any-return]
@@ -137,5 +138,5 @@ class Results:
 
 
 def _others(names: Sequence[str], table: str) -> str:
-    """Return the end of a message about a name that does not exist: the names that do."""
+    """Return the end of a message about an unknown name: the existing names."""
     return f", only {', '.join(names)}" if names else f", nor any other: the plan has no {table}"

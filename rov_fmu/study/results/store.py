@@ -28,7 +28,8 @@ class Store:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Make and lock the folder; remove a new one at the end if no run is done. Raises FileError, WriteError."""
+        """Create and lock the folder. At the end, a new folder is removed if no run is done. Raises FileError,
+        WriteError."""
         import locket
 
         is_new = not self.folder.exists()
@@ -111,7 +112,7 @@ class Store:
         write_whole(*outputs, Output(self.folder / RUNS / name, runs))
 
     def _clean(self) -> None:
-        """Remove what a process left that was killed while it was writing."""
+        """Remove unfinished files of a process that was killed."""
         there = {path.name for path in (self.folder / RUNS).iterdir()}
         for folder in (self.folder / RUNS, self.folder / TRAJECTORIES):
             for path in folder.iterdir():

@@ -33,7 +33,8 @@ _LEAST = 0.2
 _AHEAD = 3
 """The number of tasks submitted for each thread, so that no thread waits for the next one."""
 _CHANCES = 3
-"""After this many deaths of workers, all new tasks run in child processes, where a task may fail this often."""
+"""After this many workers have died, new tasks run in child processes. A task in a child process is given up after the
+same number of failures."""
 _GONE = (CancelledError, CommClosedError)
 """Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
@@ -120,7 +121,7 @@ class _Runs:
         self._missing, self._spent, self._on_progress = missing, spent, on_progress
         self._done_before = design.runs - sum(end - first for first, end in missing)
         self._futures: dict[Any, tuple[int, int, bool]] = {}
-        """The first run of a future, the run after its last one, and True when they are done in a child process."""
+        """For each future: its first run, the run after its last one, and whether it uses a child process."""
         self._lost: deque[tuple[int, int]] = deque()
         """The runs whose worker died; they are repeated in a child process."""
         self._deaths = 0
@@ -197,7 +198,7 @@ class _Runs:
         self._seconds = max(part.seconds / (end - first), 1e-6)
 
     def _repeat(self, first: int, end: int, separate: bool, error: KilledWorker) -> None:
-        """Repeat the runs of a worker that has died. In a child process only the run that is the cause fails."""
+        """Repeat the runs of a worker that has died. In a child process, only the run that caused the crash fails."""
         self._deaths += 1
         self._chances[first] += separate
         if self._chances[first] < _CHANCES:
@@ -264,7 +265,7 @@ def _started(**options: Any) -> LocalCluster:
 
 
 def _check_scheduler(scheduler: str) -> None:
-    """Raise FileError if no scheduler answers. A client without one would wait, and print more than a line."""
+    """Raise FileError if no scheduler answers. Without this check, the client would wait and print many lines."""
 
     async def ask() -> bool:
         async with rpc(scheduler, connection_args=Security().get_connection_args("client")) as there:

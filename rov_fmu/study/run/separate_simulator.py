@@ -19,7 +19,8 @@ class SeparateSimulator:
         self._child = self._start()
 
     def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
-        """Every recorded variable at every communication point. Raises RunError, also when the process ends."""
+        """Run once and return every recorded variable at every communication point. Raises RunError, also if the
+        process ends."""
         try:
             found: dict[str, npt.NDArray[Any]] = self._child.call("run", list(values))
         except ChildError as error:

@@ -68,7 +68,7 @@ class Trial:
     """The properties of an FMU that are measured before the study."""
 
     resets: bool
-    """True when a run after a reset equals the run of a new instance to the bit."""
+    """True if a run after a reset is bit-identical to a run of a new instance."""
     seconds: float
     """The time that a run takes."""
 
@@ -223,7 +223,7 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, separate: bool) -> 
 
 
 def lost_runs(job: Job, first: int, rows: Array, reason: str) -> Part:
-    """Return the rows of runs that did not end."""
+    """Return the rows of failed runs, all with one reason."""
     count = len(rows)
     none = np.full((count, len(job.figures)), np.nan)
     return Part(_runs_table(job, first, rows, none, [FAILED] * count, [reason] * count), None, count, 0.0)

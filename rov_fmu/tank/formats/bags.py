@@ -39,7 +39,7 @@ _ATMOSPHERE, _PRESSURE_GRADIENT = 101325.0, 1000.0 * 9.80665
 _LONGEST = 32
 """Longer arrays in messages are covariances, images or clouds, and are not read."""
 _OTHER_CLOCK = 1.0
-"""The difference between header and arrival from which they are of different clocks, s."""
+"""If the times of headers and of arrival differ by more than this, they come from different clocks, s."""
 _REPAIR = {".bag": "rosbag reindex", ".db3": "sqlite3 .recover", ".mcap": "mcap recover"}
 """The commands that repair bags."""
 _THRUSTER = re.compile(r"(?:thruster|motor|propeller|thrust)s?\D*(\d+)", re.IGNORECASE)
@@ -154,7 +154,7 @@ def _times(stamps: Mapping[str, Array]) -> tuple[dict[str, Array], list[str]]:
 
 
 def _numbers(place: str, value: Any) -> Iterator[tuple[str, float]]:
-    """Yield the numbers in a message by their places, without the header."""
+    """Yield the numbers of a message with their paths, except those of the header."""
     if isinstance(value, int | float | np.number):
         yield place, float(value)
     elif isinstance(value, np.ndarray | list | tuple):
@@ -192,7 +192,7 @@ def _is_depth(topic: Topic) -> bool:
 
 
 def _signals(topic: Topic) -> Iterator[Signal]:
-    """Yield what a topic measures."""
+    """Yield the signals of a topic."""
     time, fields = topic.time, topic.fields
     earth, body = _frames(topic)
     if _is_depth(topic):
@@ -220,7 +220,8 @@ def _is_used(output: Array) -> bool:
 
 
 def _frames(topic: Topic) -> tuple[Array, Array]:
-    """Return what turns the frame of the earth into north, east, down, and that of the body into forward, ..., down."""
+    """Return two rotation matrices: from the earth frame of the topic to north, east, down, and from its body frame to
+    forward, starboard, down."""
     earth, body = topic.frames if len(topic.frames) > 1 else ("", *topic.frames[:1], "")[:2]
     earth_words, body_words = ({*re.split("[^a-z]+", name.lower())} for name in (earth, body))
     is_frd = bool(body_words & {"ned", "frd"}) or ("ned" in earth_words and "flu" not in body_words)

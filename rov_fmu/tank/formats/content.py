@@ -1,4 +1,4 @@
-"""What a log contains, before it is applied to a vehicle: topics, commands and signals, each with its own times."""
+"""The content of a log, independent of the vehicle: topics, commands and signals, each with its own times."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Entry:
-    """What an entry of the table [topics] makes of a field: a command, or the signal of a sensor."""
+    """The meaning of a field by an entry of [topics]: a command, or the signal of a sensor."""
 
     name: str
     """The name of the column that a CSV file would have."""
@@ -49,7 +49,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a reader needs to know of a vehicle."""
+    """The information about the vehicle that a reader needs."""
 
     thrusters: Sequence[str] = ()
     """The names of the columns of commands of the thrusters, in order. Without names they are numbered from 1."""
@@ -58,7 +58,7 @@ class Wanted:
 
     @property
     def names_commands(self) -> bool:
-        """True when the table [topics] names commands, which stand instead of those that are recognised."""
+        """True if [topics] names commands. They replace the commands that would be recognised."""
         return any(not entry.quantity for entry in self.entries.values())
 
     def named(self, outputs: Iterable[Array]) -> dict[str, Array]:
@@ -74,11 +74,11 @@ class Content:
 
     file: str
     commands: Commands | None = None
-    """By the names of their columns; None where the log has no commands."""
+    """The commands by the names of their columns, or None if the log has none."""
     signals: list[Signal] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
     unread: dict[str, str] = field(default_factory=dict)
-    """What is not recognised: a description by name."""
+    """A description of everything that is not recognised, by name."""
     known: set[str] = field(default_factory=set)
     """The keys of the tables [columns] or [topics] that the log has."""
 
@@ -113,7 +113,8 @@ def content_of(
 
 
 def together(series: Mapping[str, tuple[Array, Array]]) -> Commands:
-    """Return commands that each have their own times as held commands, from the time when all have one."""
+    """Combine commands with different times into held commands at common times. They begin when every thruster has a
+    command."""
     time = np.unique(np.concatenate([times for times, _ in series.values()]))
     time = time[time >= max(times[0] for times, _ in series.values())]
     held = {
@@ -124,9 +125,9 @@ def together(series: Mapping[str, tuple[Array, Array]]) -> Commands:
 
 
 def fraction(file: str, source: str, outputs: Array) -> Array:
-    """Return outputs, which are fractions or pulses by their size, as fractions of the full command.
+    """Return outputs as fractions of the full command. Their size shows whether they are fractions or pulses.
 
-    An output that is no number is 0, and so is a pulse that stands for none. Raises DataFileError.
+    NaN, and a pulse that means no output, become 0. Raises DataFileError.
     """
     values = np.nan_to_num(outputs)
     if (np.abs(values) <= 1.0).all():

@@ -14,10 +14,10 @@ from rov_fmu.tank.tables import TABLES, columns_of
 COMMAND = "command"
 """The column with the command of a log of one axis."""
 _POSITION_NAMES = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
-"""Other names of positions that need no axis: those in the FMU, and that of the axis."""
+"""Other names of the columns depth, roll angle, pitch angle and heading: the names in the FMU and of the axis."""
 LOGGED = replace(LOGGED_COMMAND, optional=True)
 _OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kind).items() if name != COMMAND}
-"""The columns that only tables have, and logs of one axis, whose velocities need not name it."""
+"""The columns of tables and of logs of one axis. Their headers need not name the axis."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Names:
-    """The tables [columns] and [topics] of rov.toml: what unknown names stand for."""
+    """The tables [columns] and [topics] of rov.toml: the meanings of names that would otherwise be unknown."""
 
     columns: Mapping[str, str] = field(default_factory=dict)
     """Headers, by the headers of the CSV files."""
@@ -65,7 +65,8 @@ def sensors_of(axes: Iterable[Axis], *, of_one: bool) -> dict[str, Sensor]:
 
 
 def inputs_of(layout: Layout) -> dict[str, Column]:
-    """Return the columns of inputs; where each drives one thruster, a column may have the thruster's name."""
+    """Return the columns of inputs. If each input drives one thruster, its column may also have the name of the
+    thruster."""
     names = {f"u_{t.name}": (t.name,) for t in layout.thrusters} if not layout.mix else {}
     return {name: replace(LOGGED, also=names.get(name, ())) for name in layout.commands}
 

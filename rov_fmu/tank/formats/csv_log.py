@@ -33,20 +33,21 @@ from rov_fmu.tank.formats.csv_columns import (
 from rov_fmu.tank.signals import Commands, Signal
 
 _MOST_UNORDERED = 0.2
-"""The largest share of rows out of order; with more, the file holds two logs."""
+"""The largest share of rows out of order. If it is exceeded, the file contains two logs."""
 _LEAST_AFTER_CLOCK = 10
-"""The number of consecutive rows that go on from an earlier time after a clock was set back; fewer are misplaced."""
+"""The least number of consecutive rows after a clock was set back. Fewer rows are only out of order."""
 _AGAIN = 0.5
-"""The least number of earlier rows in the time of these rows, as a share of their number."""
+"""The least number of earlier rows that have times in the range of these rows, as a share of their number."""
 _IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in ("[]", "()"))
-"""The ends of headers, such as "PWM (us)", that columns of commands may have under another name."""
+"""The ends of headers in pulse widths, such as "PWM (us)": such a column may have commands."""
 _Command = tuple[Array, Array]
 
 
 def read_csv(
     path: Path, layout: Layout, axis: Axis | None, names: Names, *, is_part: bool = False
 ) -> tuple[Content, _Command | None]:
-    """Read a CSV file, and the times and the command of the axis if it has one.
+    """Read a CSV file. Return its content and, for a log of one axis, the times and the command of the axis (otherwise
+    None).
 
     A part of a dive may have only commands or only motion. Raises DataFileError.
     """
@@ -140,7 +141,8 @@ def _no_axis_in_name(path: Path, layout: Layout) -> str:
 
 
 def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Array], list[Finding]]:
-    """Return ascending time (s), the columns with commands within ±1, and what was changed. Raises DataFileError."""
+    """Return the times in ascending order (s), the columns (commands limited to ±1), and findings about the changes.
+    Raises DataFileError."""
     columns = {name: np.frombuffer(values) for name, values in table.values.items()}
     timed = np.isfinite(columns["time"])
     commanded = np.all([timed, *(np.isfinite(columns[name]) for name in commanding)], axis=0)
@@ -178,7 +180,7 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
 def _clock_set_back(time: Array) -> tuple[int, float] | None:
     """Return the row from which a log goes on at an earlier time and by how much (s), or None.
 
-    Rows that only arrived late fill a hole in the rows before them, but after a clock was set back, times come again.
+    Rows that only arrived late fill a gap between earlier rows. After a clock was set back, times occur a second time.
     """
     latest = np.maximum.accumulate(time)
     goes_on = np.concatenate([[False], (time[1:] < latest[1:]) & (np.diff(time) >= 0.0)])

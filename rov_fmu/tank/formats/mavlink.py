@@ -1,6 +1,6 @@
 """Read logs of ArduSub with pymavlink: DataFlash logs of the vehicle (.bin), telemetry of a ground station (.tlog).
 
-The sources of each signal; the first with enough samples that change is used:
+The sources of each signal. The first source that has enough samples and changes is used:
 
               .bin                        .tlog
     servos    RCOU                        SERVO_OUTPUT_RAW (port 0)
@@ -36,9 +36,9 @@ from rov_fmu.tank.formats.content import Content, Wanted
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, unwrapped
 
 _DATAFLASH = b"\xa3\x95\x80"
-"""The first bytes of a DataFlash log, which begin a message about the format of others."""
+"""The first bytes of a DataFlash log."""
 _WRAP = 2.0**32 * 1e-6
-"""The time after which the clock of SERVO_OUTPUT_RAW starts again, s."""
+"""The time after which the clock of SERVO_OUTPUT_RAW restarts at 0, s."""
 _PRESSURE_GRADIENT = 1000.0 * 9.80665
 """The pressure gradient in fresh water, Pa/m."""
 _NO_VOLTAGE = 65535
@@ -126,7 +126,8 @@ class _Messages:
     def series(
         self, sources: Iterable[tuple[str, int]], *, width: int = 1, varies: bool = True
     ) -> tuple[str, Array, Array] | None:
-        """Return message, time and numbers of the first source in the log; of several barometers, the liveliest."""
+        """Return message, time and numbers of the first source in the log; of several barometers, the one whose values
+        vary most."""
         for kind, first in sources:
             instances = [np.array(rows) for (name, _), rows in sorted(self.samples.items()) if name == kind]
             if not instances:
@@ -140,7 +141,8 @@ class _Messages:
 
 
 def read_mavlink(path: Path, wanted: Wanted) -> Content:
-    """Read the commands of the thrusters, the signals, and findings about the log. Raises DataFileError."""
+    """Read the commands of the thrusters and the signals. Findings about the log are in the result. Raises
+    DataFileError."""
     try:
         import pymavlink  # noqa: F401 (to give a clear message)
     except ImportError:
@@ -205,7 +207,7 @@ def _read_telemetry(path: Path) -> _Messages:
     A message without a time gets the time of its arrival, less the usual delay of the other messages.
     """
     log, received, damaged = _Messages(path.name), [], 0
-    delays: defaultdict[bool, list[float]] = defaultdict(list)  # True: the clock of SERVO_OUTPUT_RAW
+    delays: defaultdict[bool, list[float]] = defaultdict(list)  # by the clock: True for that of SERVO_OUTPUT_RAW
     systems: Counter[int] = Counter()
     for message in _messages(path):
         kind, at = message.get_type(), float(message._timestamp)
@@ -276,7 +278,8 @@ def _commands(path: Path, wanted: Wanted, log: _Messages) -> Commands:
 
 
 def _motors(log: _Messages, outputs: Array) -> int:
-    """Return the number of motors: by the functions of the servos, or else of the first servos with pulses."""
+    """Return the number of motors: from the functions of the servos, or else the number of consecutive servos with
+    pulses."""
     functions = [value for name, value in log.parameters.items() if re.fullmatch(r"SERVO\d+_FUNCTION", name)]
     motors = [int(value) - 32 for value in functions if 33 <= value <= 40]
     return max(motors, default=int(np.argmax(np.append(np.isin(outputs, NO_OUTPUT).all(axis=0), True))))

@@ -38,7 +38,8 @@ def position_signals(time: Array, position: Array) -> Iterator[Signal]:
 
 
 def velocity_signals(time: Array, linear: Array | None, angular: Array | None) -> Iterator[Signal]:
-    """Yield the velocities of n x 3 linear and angular velocities of the body: forward, starboard, down."""
+    """Yield a signal for each component of n x 3 linear and angular velocities of the body: forward, starboard,
+    down."""
     for axes, values in (((SURGE, SWAY, HEAVE), linear), ((ROLL, PITCH, YAW), angular)):
         if values is not None:
             for axis, column in zip(axes, values.T, strict=True):
@@ -46,6 +47,6 @@ def velocity_signals(time: Array, linear: Array | None, angular: Array | None) -
 
 
 def to_body(time: Array, velocity: Array, attitude_time: Array, R: Array) -> Array:
-    """Turn n x 3 velocities north, east and down into the body, by the attitude at the nearest earlier time."""
+    """Rotate n x 3 velocities (north, east, down) into the body frame, with the latest attitude before each time."""
     at = np.maximum(np.searchsorted(attitude_time, time, side="right") - 1, 0)
     return np.asarray(np.einsum("nji,nj->ni", R[at], velocity))

@@ -71,7 +71,7 @@ def read_ulog(path: Path, wanted: Wanted) -> Content:
 
 
 def _topic(data: object) -> Topic:
-    """Return a topic; instances of a topic other than the first have their number in the name."""
+    """Return a topic; the name of every instance but the first ends with its number."""
     name, instance, fields = data.name, data.multi_id, data.data  # type: ignore[attr-defined]
     stamp = fields["timestamp"].astype(float)
     if "timestamp_sample" in fields:
@@ -82,7 +82,8 @@ def _topic(data: object) -> Topic:
 
 
 def _commands(path: Path, topics: Sequence[Topic], wanted: Wanted) -> Commands | None:
-    """Return the commands of the thrusters, from the liveliest instance of the first kind of outputs."""
+    """Return the commands of the thrusters, from the instance whose outputs change most, of the first kind of outputs
+    that the log has."""
     for kind, array in _OUTPUTS.items():
         outputs = [
             (topic.time, np.array([values for name, values in topic.fields.items() if name.startswith(f"{array}[")]))
@@ -98,7 +99,7 @@ def _commands(path: Path, topics: Sequence[Topic], wanted: Wanted) -> Commands |
 
 
 def _signals(topics: Sequence[Topic]) -> Iterator[Signal]:
-    """Yield what the first instance of each topic measures."""
+    """Yield the signals of the first instance of each topic."""
     found: dict[str, Topic] = {}
     for topic in topics:
         found.setdefault(topic.kind, topic)
@@ -140,7 +141,7 @@ def _local_position(topic: Topic, attitude: tuple[Array, Array] | None) -> Itera
 
 
 def _odometry(topic: Topic, attitude: tuple[Array, Array] | None) -> Iterator[Signal]:
-    """Yield depth and velocities; those in a frame other than the earth's and the body's are left out."""
+    """Yield depth and velocities; velocities in another frame than earth or body are left out."""
     position, linear, angular = (
         topic.columns(*(f"{name}[{n}]" for n in range(3))) for name in ("position", "velocity", "angular_velocity")
     )

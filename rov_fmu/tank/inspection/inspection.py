@@ -1,4 +1,4 @@
-"""List what logs contain before a vehicle is known, and what of it a vehicle file would have to explain."""
+"""List the content of logs before a vehicle is known, and the headers that rov.toml would have to explain."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -33,14 +33,14 @@ _GENERAL = re.compile(
     r"^(?:(?:thr|thrusters?|motors?|propellers?|pwm|esc|servo|cmd|command|u)(?=\d|$)|(?:raw|out|output)$)",
     re.IGNORECASE,
 )
-"""What a word of the header of a command begins with or is, and what does not tell its thruster from the others."""
+"""The general parts of the headers of commands, which do not identify a thruster."""
 _UNITS_OF_COMMANDS = {"", "1", "-", "%", "pwm"}
 _NO_COMMAND = {
     *("current", "voltage", "battery", "power", "temp", "temperature", "humidity", "rpm", "speed", "rate", "load"),
     *("status", "state", "fault", "error", "mode", "id", "enabled", "armed", "cpu", "gain", "light", "lights"),
     *("rc", "stick", "joystick"),
 }
-"""The words of headers of what thrusters measure, and of what is no command of a thruster."""
+"""Words in headers of columns that are not commands of thrusters."""
 _USUAL_PULSES = 1000.0, 2000.0
 _REST = 20.0
 """The largest distance of the usual pulse of a thruster from the neutral one, µs."""
@@ -53,7 +53,8 @@ _LIKELY = {
     "pitch": {"rad": 0.5 * pi, "deg": inf},
     "voltage": {"V": 1000.0, "mV": inf},
 }
-"""The columns that are recognised by a word, and their units, each with the largest number that it is likely for."""
+"""The columns that are recognised by a word, with their units. Each unit has the largest number for which it is
+likely."""
 _WORDS = {name: name for name in _LIKELY} | dict.fromkeys(("yaw", "compass", "hdg"), "heading") | {"battery": "voltage"}
 _WANTED = {"set", "target", "desired"}
 _NOT_MEASURED = {"rate", "speed", *_WANTED}
@@ -90,10 +91,10 @@ class Inspection:
 
     path: Path
     commands: tuple[Row, ...]
-    """The commands of the thrusters, in order; or the command of an axis alone."""
+    """The commands of the thrusters in order, or the single command of an axis."""
     signals: tuple[Row, ...]
     unread: Mapping[str, str]
-    """What is not recognised: a description by name, of a column its range."""
+    """A description of everything that is not recognised, by name. For a column it is the range of its values."""
     findings: tuple[Finding, ...]
     columns: Mapping[str, str] = field(default_factory=dict)
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
@@ -134,7 +135,8 @@ def logs_of(path: Path) -> list[Path]:
 
 
 def fitting(names: Sequence[str], layouts: Iterable[Layout]) -> Layout | None:
-    """Return the first layout with as many thrusters, if the names are those of its thrusters, or numbers."""
+    """Return the first layout with the same number of thrusters. None if the names are neither its names nor
+    numbers."""
     found = next((layout for layout in layouts if len(layout.thrusters) == len(names)), None)
     fits = found and ({*names} == {thruster.name for thruster in found.thrusters} or all(map(str.isdigit, names)))
     return found if fits else None
@@ -166,7 +168,7 @@ def _names(titles: Sequence[str]) -> list[str]:
 
 
 def _particular(word: str) -> str:
-    """Return what a word of a header says beyond that it is about the command of a thruster."""
+    """Return the specific part of a word of a header."""
     return _GENERAL.sub("", word)
 
 
@@ -200,7 +202,7 @@ def _signals(content: Content) -> Iterator[Row]:
 def _numbers(path: Path, titles: Sequence[str]) -> tuple[dict[str, Array], dict[str, str]]:
     """Return the numbers of every column as they stand in the file, and their range in words.
 
-    A header that several columns have gets no numbers, because it does not tell which of them is meant.
+    A header that several columns share gets no numbers, because it is ambiguous.
     """
     names = {title: f"{n} [1]" for n, title in enumerate(titles) if titles.count(title) == 1}
     columns = {str(n): Column({"1": 1.0}, True, True) for n in range(len(titles))}
@@ -288,7 +290,7 @@ def _velocity(words: Sequence[str], unit: str) -> str:
 
 
 def _unit_of_command(title: str, numbers: Mapping[str, Array]) -> str:
-    """Return the unit of a command: that of its header, or by its size."""
+    """Return the unit of a command: from its header, or else from the size of the values."""
     _, unit = header_parts(title)
     most = float(np.abs(numbers[title]).max())
     known = unit in ("%", "1", *PULSES) or unit.startswith(PULSES)

@@ -1,4 +1,4 @@
-"""What the tables beside logs are about, and what their headers seem to mean, before a vehicle is known."""
+"""The tested curves and the likely meaning of headers of tables, before a vehicle is known."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,7 +24,7 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class TableHeaders:
-    """What the names and headers of tables tell."""
+    """The information in the names and headers of tables."""
 
     curves: tuple[str, ...] = ()
     """The thrust curves that are tested."""
@@ -41,7 +41,7 @@ def header_parts(title: str) -> tuple[str, str]:
 
 
 def headers_of_tables(folder: Path) -> TableHeaders:
-    """Return what the tables in a folder tell; a table that cannot be read tells only its name."""
+    """Return the information in the tables of a folder. Of a table that cannot be read, only the name is used."""
     columns: dict[str, str] = {}
     unknown: dict[str, None] = {}
     tested = []
