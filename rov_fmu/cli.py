@@ -280,7 +280,9 @@ def _print_built(built: "Built", seconds: float) -> None:
     flag_value=Path(),
     type=_FILE,
     metavar="[FILE.png]",
-    help="Plot to write (.png, .svg, .pdf); put it after VEHICLE. Without FILE it opens in a browser.",
+    help=(
+        "Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, the plot opens in a browser."
+    ),
 )
 def _simulate(
     vehicle: Path,
@@ -342,7 +344,9 @@ def _warn(message: str) -> None:
     "--against",
     callback=lambda _, __, given: given and find_vehicle(given),
     metavar="OTHER.toml",
-    help="Another vehicle, which flies the same commands as a ghost. A recording is chosen on the page itself.",
+    help=(
+        "Another vehicle, which is shown as a ghost and gets the same commands. You can choose a recording on the page."
+    ),
     shell_complete=_complete_vehicle,
 )
 @click.option(
@@ -385,8 +389,8 @@ def _open(path: Path, option: str) -> None:
     if not webbrowser.open(path.as_uri()):
         click.echo(
             on_terminal(
-                "rov-fmu: no browser could be opened: open this file, which needs no other, in a browser here or on "
-                f"another machine; {option} writes it where you want it"
+                "rov-fmu: no browser could be opened. Open this file in a browser, here or on another machine. "
+                f"It needs no other files. Use {option} to write it to another place"
             ),
             err=True,
         )
@@ -397,7 +401,11 @@ def _open(path: Path, option: str) -> None:
 
 @_commands.command("sitl")
 @_vehicle()
-@click.option("--frame", metavar="FRAME", help="Frame of ArduSub, such as vectored_6dof. The default is one that fits.")
+@click.option(
+    "--frame",
+    metavar="FRAME",
+    help="Frame of ArduSub, such as vectored_6dof. The default is the first frame that fits.",
+)
 @click.option(
     "--servo",
     "servos",
@@ -498,7 +506,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
 )
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do."""
-    _refuse_vehicle(fmu, f"must be an FMU; `rov-fmu build {fmu}` makes one of the vehicle with this name")
+    _refuse_vehicle(fmu, f"must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
     from rov_fmu.fmu.proof import prove
     from rov_fmu.report.console import print_proof
     from rov_fmu.report.progress import parts
@@ -530,7 +538,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     same command continues a study that was interrupted.
     """
     if workers and scheduler is not None:
-        raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
+        raise click.UsageError("study: leave --workers out, because the scheduler already has its workers")
     try:
         from rov_fmu.study.results.page import check_place, page_output
         from rov_fmu.study.results.summary import print_summary
@@ -555,7 +563,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     print_summary(results, spent)
     print_end([page.path], "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
-        raise StudyError(f"{output}: no run is done, with all its figures")
+        raise StudyError(f"{output}: no run is complete with all its figures")
 
 
 # ---- identify --------------------------------------------------------------------------------------------------------
@@ -600,7 +608,7 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
     whole = "identify", folder, "-o", f"{name}.toml", "--report", report or f"{name}.html"
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
     if axes_with_warnings(identification):
-        following = f"settle the warnings, then {following}"
+        following = f"check the warnings, then {following}"
     print_end([path for path in (output, report) if path], following)
 
 
@@ -636,7 +644,10 @@ def _inspect(path: Path) -> None:
 @click.option(
     "--command",
     type=_number("a number within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"),
-    help="Command held by every input that drives the axis, positive along it: 30 % of the full command is 0.3.",
+    help=(
+        "Held command of every input that drives the axis; positive is the positive direction of the "
+        "axis. 30 % of the full command is 0.3."
+    ),
 )
 @click.option(
     "--v-ss",

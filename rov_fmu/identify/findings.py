@@ -98,13 +98,13 @@ def _effect(form: str, form_of_file: str = "") -> Callable[[Mapping[str, Any]], 
 _LENGTH_CAUSES = {
     1000.0: "is it in mm",
     100.0: "is it in cm",
-    10.0: "is it in dm, or the scale of the sensor wrong",
+    10.0: "is it in dm, or is the scale of the sensor wrong",
     0.1: "is the unit or the scale of the sensor wrong",
-    0.01: "are metres taken for cm",
+    0.01: "are metres labelled as cm",
     0.001: "are metres taken for mm",
 }
 _ANGLE_CAUSES = {
-    pi / 180.0: "are radians taken for degrees",
+    pi / 180.0: "are radians labelled as degrees",
     180.0 / pi: "are degrees taken for radians",
     10.0: "is it in tenths of a degree, or the scale of the sensor wrong",
     100.0: "is it in hundredths of a degree",
@@ -148,11 +148,11 @@ def _weak_thrust(values: Mapping[str, Any]) -> str:
 
 _CAUSES = {
     "voltage": (
-        "the residuals grow as the voltage changes. A thrust that depends on it would explain it: put "
-        "`voltage = true` into [fit]"
+        "the residuals grow when the voltage changes. A thrust that depends on the voltage would explain "
+        "this: put `voltage = true` into [fit]"
     ),
-    "pitch": "the residuals follow the pitch. `attitude = true` in [fit] takes it into account, as far as pitch and "
-    "roll are logged; else a vehicle with the axis pitch would explain it",
+    "pitch": "the residuals follow the pitch. If pitch and roll are logged, `attitude = true` in [fit] takes "
+    "them into account. Otherwise the vehicle needs the axis pitch",
     "roll": "the residuals follow the roll. `attitude = true` in [fit] takes it into account, as far as roll and "
     "pitch are logged; else a vehicle with the axis roll would explain it",
     "depth": "the residuals follow the depth, as when the buoyancy changes with the pressure, or a tether pulls",
@@ -165,14 +165,14 @@ _CAUSES = {
     "odd one": "it explains all other recordings. Check the columns, units and signs of this log, and whether the "
     "battery, the ballast, the tether or a sensor differed",
     "scale": "the sensors of position and velocity disagree, so one of them has a wrong scale",
-    "unknown": "a force that changes slowly remains, and none of the causes that are tested explains it",
+    "unknown": "an unknown force that changes slowly acts. None of the tested causes explains it",
 }
 """What the residuals show, by cause (rov_fmu/identify/structure.py)."""
 
 
 def _unexplained(values: Mapping[str, Any]) -> str:
     start = f"{values['start']:.0f}"
-    when = "from the start on" if start == "0" else f"after the first {start} s"
+    when = "from the start" if start == "0" else f"after the first {start} s"
     return f"{values['axes']}: the model does not explain {values['files']} {when}: {_CAUSES[values['cause']]}"
 
 
@@ -183,8 +183,9 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{curve} thrust: {count:g} points for two coefficients leave no degree of freedom, so there are no intervals"
     ),
     "backward thrust": (
-        "{curve} thrust: the curve points backward below {command:.0%}; a dead band would explain it: measure forces "
-        "at weaker commands, or state it as c_0_{curve} in [known]"
+        "{curve} thrust: below a command of {command:.0%}, the curve gives thrust in the wrong "
+        "direction. A dead band would explain this: measure forces at weaker commands, or give "
+        "c_0_{curve} in [known]"
     ),
     "backward thrust in reverse": (
         "{curve} thrust: the curve in reverse points backward below {command:.0%}; a dead band would explain it: "
@@ -197,8 +198,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "from it. A time constant or a recording of a step from rest makes it identifiable"
     ),
     "no push": (
-        "{axes}: what moves at {commands} is left out: the thrust curve gives no push there (its dead band, or a slip "
-        "in one of the tables)"
+        "{axes}: the points at commands of {commands} are left out, because the thrust curve gives no "
+        "thrust there (dead band, or a mistake in one of the tables)"
     ),
     "unknown voltage": (
         "{curves} thrust is taken as measured at {voltage:.1f} V, the mean voltage of the logs. If it was measured at "
@@ -229,8 +230,9 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     # Recordings
     "correlated residuals": (
-        "{axes}: the residuals of {files} are correlated over {samples:.0f} samples, so more than the sensor's noise "
-        "(turbulence, tether, or the model); the intervals are widened for it"
+        "{axes}: the residuals of {files} are correlated over {samples:.0f} samples. They contain more "
+        "than the sensor's noise: turbulence, a tether, or an error of the model. The intervals allow "
+        "for this"
     ),
     "outliers": _OUTLIERS,
     "many outliers": f"{_OUTLIERS}. Does the sensor jump, or did something hold or push the vehicle for a time?",
@@ -240,17 +242,19 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     "disagreement": _disagreement,
     "impossible velocity": (
-        "{files}: no recording of {axes}: {quantity} tells of a velocity of {speed:.3g} {unit}, which is possible from "
-        "{low:g} to {high:g} only. Is its unit right, and that of time?"
+        "{files}: the recording of {axes} is left out: {quantity} gives a velocity of {speed:.3g} "
+        "{unit}, but only {low:g} to {high:g} is possible. Are its unit and the unit of time right?"
     ),
     "no thrust": (
-        "{axes}: all its tests are left out, because the thrust curve of {curves} gives {force:.3g} {unit} at a "
-        "command of {command:.0%}, where {axes} needs a push that way. Check the thrust tests, their signs and windows"
+        "{axes}: all its tests are left out, because the thrust curve of {curves} gives {force:.3g} "
+        "{unit} at a command of {command:.0%}, which does not push in the direction of the command. "
+        "Check the thrust tests, their signs and windows"
     ),
     "no tests of drag": (
-        "{axes}: all its tests are left out: none that counts tells its drag, and rov.toml does not give {drag}"
+        "{axes}: all tests of it are left out, because no test that counts determines its drag, and "
+        "rov.toml does not give {drag}"
     ),
-    "no fit": "{files}: no recording of {axes}, because {reason}. {cause}",
+    "no fit": "{files}: the recording of {axes} is left out, because {reason}. {cause}",
     "fitted apart": (
         "{axes}: no vehicle fits the recordings of all these axes together, so each axis is fitted alone: {reason}"
     ),
@@ -278,8 +282,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         for kind, effect in EFFECTS.items()
     },
     "delay not modelled": _effect(
-        "The motion in {axes} followed the commands {value} s late{interval}: the vehicle file has no delay; "
-        "T_d in [commands] adds one delay, the same for all axes, to the FMU."
+        "The motion in {axes} followed the commands {value} s late{interval}. The vehicle file does not "
+        "contain this delay. T_d in [commands] adds a delay to the FMU, which is the same for all axes."
     ),
     # Structure of the model
     "unexplained": _unexplained,
@@ -289,9 +293,10 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     # Units and signs
     "implausible beta": (
-        "{axes}: {beta} = {value:.3g} is not within {low:g} ... {high:g}, as of any vehicle known: it moves as if its "
-        "inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, {mass}) may cause it, "
-        "a wrong position or direction of a thruster, or a delay or a lag that the fit does not have"
+        "{axes}: {beta} = {value:.3g} is not within {low:g} ... {high:g}, the range of all known "
+        "vehicles. The vehicle moves as if its inertia were {inertia}. A wrong unit or scale (of the "
+        "motion, the commands, the thrust, {mass}) may cause it, a wrong position or direction of a "
+        "thruster, or a delay or a lag that the fit does not have"
     ),
     "inertia below mass": _effect(
         "{axes}: {beta} = {value}{interval} is above 1, so the vehicle moves as if its inertia with the added mass "
@@ -304,29 +309,29 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "({unit}), the command, and the thrust curves"
     ),
     "implausible tuned beta": (
-        "{beta} = {value:.3g} is not within the usual {low:g} ... {high:g}: the vehicle would move as if its inertia "
-        "were {inertia}, which no known vehicle does. Check the wanted Tau (s) and {mass}"
+        "{beta} = {value:.3g} is not within the usual {low:g} ... {high:g}. The vehicle would move as if "
+        "its inertia were {inertia}. No known vehicle does. Check the wanted Tau (s) and {mass}"
     ),
     "weak thrust": _weak_thrust,
     "wrong scale": _wrong_scale,
     "too fast": (
-        "{files}: {quantity} [{unit}] tells of {speed:.3g} {speed_unit}, which no ROV reaches: is its unit right, and "
-        "that of time?"
+        "{files}: {quantity} [{unit}] gives a velocity of {speed:.3g} {speed_unit}, which no ROV "
+        "reaches. Are its unit and the unit of time right?"
     ),
     "wrong sign": (
-        "{files}: moves against the command: is the sign of {quantity} or of the commands turned, or are "
-        "thrusters swapped? {positive} is +"
+        "{files}: the vehicle moves against the command. Is the sign of {quantity} or of the commands "
+        "wrong, or are thrusters swapped? {positive} is positive"
     ),
     "fractions as percent": (
-        "{files}: no command is beyond {percent:.2g} % of the full command, which moves no ROV: are fractions [1] "
-        "taken for percent [%]?"
+        "{files}: no command exceeds {percent:.2g} % of the full command, which is too weak to move an "
+        "ROV: are fractions [1] taken for percent [%]?"
     ),
     "slow time constants": (
         "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: is it in ms?"
     ),
     "fast time constants": (
-        "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: are seconds taken "
-        "for ms?"
+        "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: are seconds "
+        "labelled as ms?"
     ),
 }
 _SENTENCES = findings.SENTENCES | _OWN_SENTENCES

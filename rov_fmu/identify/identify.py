@@ -47,7 +47,7 @@ _SATURATED = 0.2
 """If a recording cannot be fitted and its thrusters were at full command for more than this share of the time,
 saturation is the likely cause."""
 _MEAN_VOLTAGE = "Mean voltage of the recordings"
-_ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
+_ASSUMED_ALPHA = "Not identifiable, because tests of motion give only the ratio of drag to thrust. Assumed to be 1"
 _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 
 
@@ -249,7 +249,7 @@ def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
         return None
     weights = np.array([_weight(tests, window, row.command) for row in rows])
     if len({abs(row.command) for row, weight in zip(rows, weights, strict=True) if weight and row.command}) < 2:
-        raise DataFileError(f"{tests.folder}: {window}*.csv: two commands at least must count")
+        raise DataFileError(f"{tests.folder}: {window}*.csv: at least two commands must count")
     commands, forces = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
     return fit_thrust(curve, commands, forces, weights, {name: q.value for name, q in tests.given.known.items()})
 
@@ -346,8 +346,13 @@ def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:
     """Return the most likely reason why a fit fails."""
     full = max(float(np.mean(np.abs(r.reaching(base.layout)).max(axis=1) >= 0.999)) for r in recordings)
     if full > _SATURATED:
-        return f"Thrusters are at full command for {full:.0%} of the time, where they may be limited by the current"
-    return "Check units and signs, the order and directions of the thrusters, their dead band, and for a taut tether"
+        return (
+            f"The thrusters are at full command for {full:.0%} of the time. There, the electric current may limit them"
+        )
+    return (
+        "Check the units and signs, the order, directions and dead band of the thrusters, and whether "
+        "the tether was taut"
+    )
 
 
 # ---- One axis --------------------------------------------------------------------------------------------------------

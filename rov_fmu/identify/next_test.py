@@ -44,7 +44,7 @@ _USEFUL = 0.9
 """A test is useful if it reduces the width of the interval to at most this share."""
 _VAGUE = 1e3
 """The assumed standard error of a coefficient that is not identifiable yet, relative to its value."""
-REPEATED = "fly the first step of the dive once more at its end, because something drifts over the dive"
+REPEATED = "repeat the first step of the dive at its end, because something drifts during the dive"
 """What to do where drift is suspected: the two steps show how much it is."""
 NO_LIMITS = TankLimits()
 NOISE = {"distance": 0.02, "depth": 0.01, "heading": 0.01, "roll angle": 0.01, "pitch angle": 0.01, "velocity": 0.02}

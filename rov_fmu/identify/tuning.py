@@ -76,14 +76,15 @@ def _each_median(rov: Rov, axis: Axis, points: Sequence[Point]) -> Rov:
     """
     if rov.loss(axis, rov.held_inputs(axis, 1.0)):
         raise TuningError(
-            f"{axis.name}: its thrust falls with the speed of advance, which tuning cannot consider: remove d"
+            f"{axis.name}: its thrust decreases with the speed of advance. Tuning cannot take this into "
+            "account: remove d"
         )
     for p in points:
         if reason := _impossible(rov, axis, p):
             raise TuningError(f"{axis.name}: {reason}")
     steady = [p for p in points if p.quantity == "V_ss"]
     if not steady:
-        raise TuningError(f"{axis.name}: there is no V_ss, which alpha is tuned by")
+        raise TuningError(f"{axis.name}: there is no V_ss, and alpha is tuned to V_ss")
     alphas = [holding_force(rov, axis, p.value) / rov.force(axis, p.command) for p in steady]
     tuned, beta = _with(rov, axis.coefficient("alpha"), alphas), axis.coefficient("beta")
     plain = tuned.replaced({beta: 1.0})
@@ -122,7 +123,7 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
                 raise table.error(n, column, reason)
             points.append(point)
     if not any(point.quantity == "V_ss" for point in points):
-        raise DataFileError(f"{path}: no row has a velocity, which alpha is tuned by: there is no V_ss")
+        raise DataFileError(f"{path}: no row has a velocity, and alpha is tuned to velocities")
     return tuple(points)
 
 
@@ -170,5 +171,5 @@ def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
     maximum = kind_of(name).maximum
     for value in wanted:
         if not 0.0 < value <= maximum:
-            raise TuningError(f"{name} = {value:g} would do it: must be above 0 and at most {maximum:g}")
+            raise TuningError(f"{name} would have to be {value:g}, but it must be above 0 and at most {maximum:g}")
     return rov.replaced({name: float(np.median(wanted))})

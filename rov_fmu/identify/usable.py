@@ -72,7 +72,10 @@ def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
     moves = np.ptp(recording.reaching(base.layout), axis=0).any() or recording.reaching(base.layout).any()
     if not moves:
         raise UnusableError(
-            f"{path}: command never changes: nothing is identifiable", finding("constant push"), axis, [recording]
+            f"{path}: the command is always 0, so nothing can be identified",
+            finding("constant push"),
+            axis,
+            [recording],
         )
     if np.ptp(values) == 0.0:
         constant = finding("constant motion", names={"quantity": quantity})
@@ -81,8 +84,8 @@ def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
     if not low <= speed <= high:
         names, numbers = {"quantity": quantity, "unit": axis.unit}, {"speed": speed, "low": low, "high": high}
         raise UnusableError(
-            f"{path}: {quantity} tells of a velocity of {speed:.3g} {axis.unit}: must be {low:g} at least and {high:g} "
-            f"at most",
+            f"{path}: {quantity} gives a velocity of {speed:.3g} {axis.unit}: must be {low:g} at least and "
+            f"{high:g} at most",
             finding("impossible velocity", names=names, numbers=numbers),
             axis,
             [recording],

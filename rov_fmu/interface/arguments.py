@@ -78,7 +78,9 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
     found = checked_values("start", given, layout.state | layout.initial, many=many)
     if quaternion := [found[name] for name in QUATERNION if name in found]:
         if angles := found.keys() & layout.initial.keys() - {"psi_0"}:
-            raise InputError(f"start[{min(angles)!r}]: the attitude is given as a quaternion, too: give one of the two")
+            raise InputError(
+                f"start[{min(angles)!r}]: the attitude is also given as a quaternion. Give only one of the two"
+            )
         if np.any(sum(map(np.abs, quaternion)) == 0.0):
             raise InputError(f"start: the quaternion {', '.join(QUATERNION)} is 0 and has no direction")
     return found
@@ -180,7 +182,7 @@ def number_of_vehicles(values: Mapping[str, Array]) -> int:
     for name, size in sizes.items():
         first, vehicles = next(iter(sizes.items()))
         if size != vehicles or size == 0:
-            raise InputError(f"{name}: has values for {size} vehicles, and {first} for {vehicles}")
+            raise InputError(f"{name}: has values for {size} vehicles, but {first} has values for {vehicles}")
     return next(iter(sizes.values()), 1)
 
 

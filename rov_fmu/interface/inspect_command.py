@@ -89,7 +89,10 @@ def _draft(
     if is_own:
         yield from _hardware(thrusters, tables.curves, signals)
     else:
-        yield from ("", "[known]  # what no log tells: write the values of your vehicle instead of those of the base")
+        yield from (
+            "",
+            ("[known]  # values that no log determines: replace the values of the base by those of your vehicle"),
+        )
     for key in BODY:
         if vehicle and key in vehicle.layout.coefficients:
             unit = vehicle.layout.coefficients[key].unit
@@ -98,7 +101,7 @@ def _draft(
     if not (vehicle and vehicle.layout.has_attitude):
         effects["attitude"] = {"roll", "pitch"}
     if fitted := [key for key, names in effects.items() if names <= signals]:
-        yield from ("", "[fit]  # what every log has the columns for: remove # to fit it")
+        yield from ("", "[fit]  # every log has the columns for these: remove # to fit them")
         yield from (f"# {key} = true" for key in fitted)
     is_csv = {one.path: one.path.suffix.lower() not in LOG_SUFFIXES for one in found}
     yield from _columns([one for one in found if is_csv[one.path]], tables)
@@ -110,7 +113,7 @@ def _draft(
     if len([one for one in found if one.commands]) == 1 and len(found) > 1:
         files = ", ".join(_quoted(one.path.name) for one in found)
         yield from ("", f"[dives.{word or 'dive'}]", f"files = [{files}]")
-        yield "# other_clock = [...]  # those of the files whose clock is not that of the commands"
+        yield "# other_clock = [...]  # files with another clock than the commands"
 
 
 def _columns(found: Sequence[Inspection], tables: TableHeaders) -> Iterator[str]:
@@ -122,7 +125,7 @@ def _columns(found: Sequence[Inspection], tables: TableHeaders) -> Iterator[str]
         yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
         yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
     if others:
-        yield "# These headers are not known. A comment tells their values. Remove the first # of a header that you"
+        yield ("# These headers are not known. The comments show their values. Remove the first # of a header that you")
         yield '# need, and write what it stands for, such as "depth [m]" or "surge velocity [m/s]".'
     yield from (f'# {_quoted(title)} = "?"{what and f"   # {what}"}' for title, what in sorted(others.items()))
 

@@ -194,7 +194,8 @@ class VehicleModel(Vehicle):
         except MemoryError as error:
             size = 8e-9 * vehicles * len(commands.time) * len(recorded)
             raise InputError(
-                f"time, record: the result takes {size:.3g} GB, more than there is: record less"
+                f"time, record: the result needs {size:.3g} GB, which is more than the available memory. Record "
+                "fewer variables"
             ) from error
         rows = found.values
         if len(commands.time) > len(times):

@@ -35,7 +35,7 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
     """
     for option, path, suffixes in (("--output", output, _TABLE_SUFFIXES), ("--plot", plot, _PLOT_SUFFIXES)):
         if path and path.suffix.lower() not in suffixes:
-            last = "; without a file, --plot comes after VEHICLE" if option == "--plot" and not path.suffix else ""
+            last = "; put --plot without a file after VEHICLE" if option == "--plot" and not path.suffix else ""
             endings = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
             raise InputError(f"{option} {path}: the name must end with {endings}{last}")
     check_targets(filter(None, (output, plot)), inputs)
@@ -114,7 +114,7 @@ def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
             hint = did_you_mean(name, names)
             raise InputError(f"--set {text}: the vehicle has no such input, state or coefficient{hint}")
         if name in found:
-            raise InputError(f"--set {text}: {name} is set before")
+            raise InputError(f"--set {text}: {name} is set twice")
         try:
             found[name] = float(value)
         except ValueError:

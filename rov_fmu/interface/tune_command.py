@@ -25,7 +25,7 @@ def tune_vehicle(
     Raises InputError about the options, FileError, and WriteError.
     """
     if points is not None and (command, V_ss, Tau) != (None, None, None):
-        raise InputError("tune: --points stands instead of --command, --v-ss and --tau")
+        raise InputError("tune: use either --points, or --command, --v-ss and --tau")
     vehicle = load_vehicle(path)
     if not vehicle.layout.has(axis):
         raise InputError(f"tune: {path}: --axis {axis.name}: the vehicle has only {', '.join(vehicle.layout.kinds)}")

@@ -101,9 +101,12 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
         print_table(_side_by_side(vehicle, t), out)
     out.print()
     for line in (
-        "non-linear: every alpha and beta is 1. scaled: those of the vehicle file. model: in closed form.",
-        "dev.: the deviation of the model from the printed value, at the end that of the scaled model from the test.",
-        "*: the printed value is not that of the model rounded to its digits. -: not printed, or not measured.",
+        (
+            "non-linear: every alpha and beta is 1. scaled: alpha and beta of the vehicle file. model: "
+            "computed in closed form."
+        ),
+        ("dev.: deviation of the model from the printed value; in the last column, of the scaled model from the test."),
+        ("*: the printed value differs from the rounded value of the model. -: not printed, or not measured."),
     ):
         paragraph(out, line)
 

@@ -128,7 +128,7 @@ def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[s
         widest = unknown[0]
         if useful := next((test for test in unknown if test.is_useful), None):
             narrows = f"narrows {useful.coefficient} by {min(1.0 - useful.narrowed, 0.99):.0%}"
-            why = narrows if useful.interval else f"tells {useful.coefficient}"
+            why = narrows if useful.interval else f"determines {useful.coefficient}"
             once = ", once the warnings are settled" if useful.axis.name in warned else ""
             yield f"To measure next{once}: {useful.axis.name}: {useful.words} ({why})."
         else:
@@ -158,8 +158,11 @@ def acting_words(kept: Iterable[FittedEffect]) -> str:
 
 def _of_recordings(found: Sequence[Unseen]) -> Table:
     """Return the table of the errors of predictions of recordings that the model was not fitted to."""
-    numbers = ("off by", "no change", "noise")
-    title = "Prediction of unseen data, RMS, beside no change at all and the sensor's noise"
+    numbers = ("error", "no change", "noise")
+    title = (
+        "Errors (RMS) of predictions of unseen data, compared with a prediction of no change and with "
+        "the sensor's noise"
+    )
     result = table(title, "", numbers, ("of",))
     result.box, result.padding = None, _GAP
     for row in found:
@@ -175,7 +178,7 @@ def _of_points(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table
     """Return the table of the RMS errors of points, by each model."""
     found = table("Relative errors of the points, RMS", "", ("model", "leave-one-out", *other))
     found.box, found.padding = None, _GAP
-    found.caption = "leave-one-out: by a fit without the points of the same thrust."
+    found.caption = "leave-one-out: prediction by a fit without the points of the same thrust."
     for c in comparisons:
         found.add_row(f"{c.result.axis.name} {c.quantity}", *(text(c.rms(column), ".1%") for column in c.columns))
     return found

@@ -173,13 +173,15 @@ def measured_and_fitted(results: Identification) -> Iterator[MeasuredAndFitted]:
 
 
 _OF_THRUST = (
-    "The measured value is that of the forces alone. The fitted one explains the forces and the recordings together. "
-    "They may differ by chance, because forces alone hardly tell a dead band from the shape of the curve, because a "
-    "thruster pushes less in motion than held at a scale, or because the scale or the battery differs"
+    "The measured value is that of the forces alone. The fitted one explains the forces and the "
+    "recordings together. They may differ by chance. Forces alone hardly distinguish a dead band "
+    "from the shape of the curve. A thruster may also push less in motion than when it is held, or "
+    "the scale may be wrong, or the battery may differ"
 )
 _OF_POINTS = (
-    "The measured value is that of the tables alone, whose numbers contain load, delay, lag and current. The fitted "
-    "one explains the tables and the recordings together, and these effects are separate from drag and β"
+    "The measured value comes from the tables alone. Their numbers include the effects of load, "
+    "delay, lag and current. The fitted one explains the tables and the recordings together, and "
+    "these effects are separate from drag and β"
 )
 
 

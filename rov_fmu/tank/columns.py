@@ -65,7 +65,7 @@ def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
     """Raise DataFileError where the commands cannot be in the unit of their header: fractions under [%] or [us]."""
     names = [name for name in commands if name in table.values]
     for units, most, mistake in (
-        (("%",), 1.0, "no command beyond 1 %: fractions under [%]? Write [1]"),
+        (("%",), 1.0, "no command exceeds 1 %. Are they fractions? Then write [1]"),
         (PULSES, 1.0, "no pulse beyond 1 us: fractions under [us]? Write [1]"),
         (PULSES, 100.0, "no pulse beyond 100 us: percent under [us]? Write [%]"),
     ):

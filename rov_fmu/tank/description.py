@@ -318,11 +318,13 @@ def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Itera
     present = [name for name in _HARDWARE_TABLES if name in data]
     for name, curve in file.curves.items():
         if curve.electric_current:
-            reason = "identification leaves it out: give it in the vehicle file that you get"
+            reason = "identification does not use it. Add it to the identified vehicle file instead"
             yield key_line(f"curves.{name}.electric_current", reason)
     if "base" in data:
         for name in present:
-            yield key_line(name, "must not stand beside base, which has its own; coefficients may be given in [known]")
+            yield key_line(
+                name, "is not allowed together with base, which has its own; coefficients may be given in [known]"
+            )
         return
     for name in ("curves", "thruster") if present else ():
         if name not in data or data[name] in ({}, []):

@@ -93,62 +93,62 @@ SENTENCES: dict[str, SentenceForm] = {
     "rows without time": "{files}: {count:#row} without a time left out",
     "rows without command": "{files}: {count:#row} without a command left out",
     "torn rows": "{files}: {count:#row} with more cells than the header left out",
-    "unread cells": "{files}: {count:#cell} of {column} without a number taken as blank",
+    "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
     "pulse beyond full thrust": "{files}: {count:#pulse} of {column} beyond full thrust taken as full thrust",
     "missing column": (
-        "{files}: no column of {column}, whose command is taken as 0 all the time: add the column unless that is right"
+        "{files}: there is no column of {column}. Its command is taken as 0. Add the column if this is wrong"
     ),
     "frozen sensors": (
-        "{files}: {sensors} do not change from {start:.4g} s on (to the end at {end:.4g} s): was the log or the sensor "
-        "cut off? What they say from then on is left out"
+        "{files}: {sensors} do not change any more after {start:.4g} s, although the log ends at "
+        "{end:.4g} s. Did the log or the sensor stop? Their later values are left out"
     ),
     # Recordings
     "too few samples": (
-        "{files}: no recording of {axes}: {count:#sample} of {quantity}, at least {least:g} are needed"
+        "{files}: the recording of {axes} is left out: it has {count:#sample} of {quantity}, and needs "
+        "at least {least:g}"
     ),
-    "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
-    "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
-    "cancelling thrusters": "{files}: no recording of {axes}: the thrusters along it cancel each other at all times",
+    "constant motion": "{files}: the recording of {axes} is left out: the {quantity} never changes",
+    "constant push": "{files}: the recording of {axes} is left out: the thrust along it never changes",
+    "cancelling thrusters": "{files}: the recording of {axes} is left out: its thrusters cancel each other all the time",
     "axis not pushed": (
         "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "
         "{axes}. If it was driven that way, check the directions of the thrusters and the signs of their commands"
     ),
     "scales differ": (
-        "{files}: the {quantity} changes by {factor:.3g} times what the velocity in {axes} says: one of the two "
-        "sensors has a wrong scale. The {quantity} is used"
+        "{files}: the {quantity} changes {factor:.3g} times as much as the velocity in {axes} implies. "
+        "One of the two sensors has a wrong scale. The {quantity} is used"
     ),
     "gaps": "{files}: {count:#gap} in {axes}: {gaps}",
     # Logs of autopilots and bags
     "source of commands": "{files}: the commands of the thrusters are those of {source}",
     "time of arrival": (
-        "{files}: {count:#message} of {topics} have no time in a header, so the time of their arrival is used"
+        "{files}: {count:#message} of {topics} without a time in the header: the time of arrival is used"
     ),
-    "other clock": (
-        "{files}: its clock is not that of the commands: how far it is off is to be fitted, within {most:g} s"
-    ),
+    "other clock": ("{files}: it has another clock than the commands. The fit finds the difference, up to {most:g} s"),
     "aligned clock": (
-        "{files}: its clock is not that of the commands, and they share no time: its first sample is taken as that of "
-        "the first command, and how far it is off is to be fitted, within {most:g} s"
+        "{files}: it has another clock than the commands, and their times do not overlap. Its first "
+        "sample is moved to the first command. The fit finds the remaining difference, up to {most:g} s"
     ),
-    "dropouts": "{files}: the autopilot lost data {count:#time}, up to {longest:.3g} s",
-    "damaged log": "{files}: damaged in places: what could be read is used",
+    "dropouts": "{files}: the autopilot lost data {count:#time}, for up to {longest:.3g} s",
+    "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "messages without time": "{files}: {count:#message} without a time left out",
-    "arrival time": (
-        "{files}: {count:#message} VFR_HUD have no time of the vehicle, so the time of their arrival is used"
-    ),
-    "several vehicles": "{files}: several vehicles in it: that of system {system} is taken",
+    "arrival time": ("{files}: {count:#message} VFR_HUD without a time of the vehicle: the time of arrival is used"),
+    "several vehicles": "{files}: the log has several vehicles. Vehicle {system} is used",
     "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
-    "reversed motors": "{files}: MOT_n_DIRECTION turns the thrusters {thrusters}",
+    "reversed motors": "{files}: MOT_n_DIRECTION reverses the thrusters {thrusters}",
     "unknown direction": (
         "{files}: the log has no parameters MOT_n_DIRECTION, so every thruster is taken to push ahead above 1500 us"
     ),
-    "unknown velocity": "{files}: {count:#velocity} left out, which the filter says it does not know",
-    "depth by pressure": ("{files}: depth by the pressure of fresh water, 1000 kg/m3; in the sea it is 2.5 % less"),
+    "unknown velocity": "{files}: {count:#velocity} left out, because the filter marks them as unknown",
+    "depth by pressure": (
+        "{files}: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water "
+        "the true depth is 2.5 % smaller"
+    ),
     # The vehicle
     "axis left out": "{axes}: neither tested nor known ({drag}), so the vehicle has no {axes}",
-    "not coupled": "surge, sway and yaw are not coupled, which needs all three",
+    "not coupled": "surge, sway and yaw are not coupled, because coupling needs all three axes",
     "unused curve": (
         "{files}: the thrusters of curve {curve} act on no axis that is tested or known, so it is not used"
     ),

@@ -83,8 +83,8 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names 
             return Log((recording,), (*content.findings, *gaps_of(recording)), frozenset(content.known))
     if not content.commands:
         raise DataFileError(
-            f"{path}: no commands of thrusters are recognised: `rov-fmu identify --inspect` lists what "
-            "is in it, and the table [topics] of rov.toml names them"
+            f"{path}: no commands of thrusters were found. `rov-fmu identify --inspect` lists the content of "
+            "the log. Name the commands in the table [topics] of rov.toml"
         )
     recordings, useless = recordings_of(path.name, layout, content.commands, content.signals, axis)
     if not recordings:
@@ -103,7 +103,9 @@ def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout,
     commanding = [content for content in contents if content.commands]
     if len(commanding) != 1:
         which = join_names(content.file for content in commanding) or "none"
-        raise DataFileError(f"{paths[0]}: one file of its dive must have the commands, and not {which}")
+        raise DataFileError(
+            f"{paths[0]}: exactly one file of the dive must have the commands. The files with commands are: {which}"
+        )
     (commands,) = (content.commands for content in commanding if content.commands)
     findings, signals = [], {}
     for content in contents:

@@ -57,7 +57,7 @@ def read_rows(
     mistakes = []
     for n, (_, command, value) in enumerate(numbers):
         if kind != "thrust" and command == 0.0:
-            mistakes.append(table.error(n, "command", "must not be zero, for nothing moves"))
+            mistakes.append(table.error(n, "command", "must not be 0, because nothing moves then"))
         elif reason := _impossible(kind, command, value, noise):
             mistakes.append(table.error(n, name, reason))
     if mistakes:
@@ -78,9 +78,9 @@ def _renamed(names: Mapping[str, str], columns: Mapping[str, Column]) -> Iterato
 def _impossible(kind: str, command: float, value: float, noise: float) -> str | None:
     """Return the reason why a value cannot have been measured, or None."""
     if kind == "thrust" and command * value < 0.0 and abs(value) > noise:
-        return "must have the sign of the command, for a thruster pushes where it is told to"
+        return "must have the sign of the command, because a thruster pushes in the commanded direction"
     if kind == "steady" and command * value <= 0.0:
-        return "must have the sign of the command: forward, down, to starboard is +"
+        return "must have the sign of the command: forward, down and starboard are positive"
     if kind == "time_constant" and value <= 0.0:
         return "must be above 0"
     return None

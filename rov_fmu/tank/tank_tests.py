@@ -170,7 +170,10 @@ def _read_description(path: Path) -> RovFile:
     except VehicleFileError:
         if path.exists():
             raise
-        words = "No such file: it must tell the vehicle's name and what no test does, such as its mass"
+        words = (
+            "there is no such file. It must give the vehicle's name, and everything that no test determines, "
+            "such as the mass"
+        )
         raise VehicleFileError(f"{path}: {words}") from None
 
 

@@ -12,7 +12,7 @@ class Current(Effect):
 
     kind = "current"
     words = "current along the axis"
-    sentence = "the water moved at {value} {unit}{interval} in {of}, which is taken out"
+    sentence = "in {of}, the water moved at {value} {unit}{interval} along the axis. The fit removes this current"
     limits = -3.0, 3.0
     deviation = 0.3
     order = 4

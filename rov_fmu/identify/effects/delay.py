@@ -12,14 +12,15 @@ class Delay(Effect):
     kind = "delay"
     words = "delay from the commands to the motion"
     sentence = (
-        "the motion of {of} follows the commands {value} s late{interval}. The vehicle file has no delay; `T_d` in "
-        "its [commands] adds one to the FMU, the same for all axes"
+        "the motion of {of} follows the commands {value} s late{interval}. The vehicle file has no "
+        "delay; `T_d` in [commands] of the vehicle file adds a delay to the FMU, which is the same for "
+        "all axes"
     )
     sentence_of_file = (
         "the motion in {of} follows the commands {value} s later{interval} than in the other recordings; this is not "
         "in the model"
     )
-    limits = -2.0, 5.0
+    limits = -5.0, 5.0
     order = 8
     is_delay = True
 

@@ -12,7 +12,10 @@ class Lag(Effect):
 
     kind = "lag"
     words = "lag of the thrusters"
-    sentence = "the thrust of {of} lags by {value} s{interval}, and is in the model"
+    sentence = (
+        "the thrust of {of} follows the commands with a time constant of {value} s{interval}. The model "
+        "contains this lag"
+    )
     begin = 0.1
     limits = 0.05, 10.0
     order = 7

@@ -20,8 +20,8 @@ class Load(Effect):
     words = "constant load"
     sentence = "a constant load of {value} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
     sentence_of_file = (
-        "in {of} a constant load acts that differs by {value} {unit}{interval} from the other recordings (other "
-        "ballast, a tether, a current); this is not in the model"
+        "in {of}, the constant load differs by {value} {unit}{interval} from the other recordings "
+        "(ballast, tether or current). The model does not contain this difference"
     )
     order = 6
 

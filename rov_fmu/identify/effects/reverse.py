@@ -28,7 +28,7 @@ class ReverseThrust(_Ratio):
 
     kind = "reverse thrust"
     words = "thrust in reverse, by that forward"
-    sentence = "{of} thrust in reverse is {value} times that ahead{interval}, and is in the model"
+    sentence = "{of} thrust in reverse is {value} times the thrust ahead{interval}. The model contains this"
     order = 3
 
     @classmethod
@@ -47,7 +47,7 @@ class ReverseDrag(_Ratio):
     """The drag of an axis in reverse."""
 
     kind = "reverse drag"
-    words = "drag in reverse, by that forward"
+    words = "ratio of the thrust in reverse to the thrust ahead"
     sentence = "drag of {of} in reverse is {value} times that ahead{interval}, and is in the model"
     order = 1
 

@@ -20,7 +20,7 @@ class Voltage(Effect):
     kind = "voltage"
     words = "exponent of the voltage in the thrust"
     sentence = (
-        "the thrust of {of} is proportional to the voltage to the power of {value}{interval}, and that is in the model"
+        "the thrust of {of} is proportional to the voltage to the power of {value}{interval}. The model contains this"
     )
     begin = likely = 1.5
     limits = 1.0, 4.0

@@ -7,7 +7,7 @@ from rov_fmu.identify.points.forms import widened
 from rov_fmu.model.layout import HEAVE, REVERSE, Axis
 from rov_fmu.model.rov import Rov
 
-LEFT_OUT = "Left at 0: neither the information criterion (AICc) nor leave-one-thrust-out misses it"
+LEFT_OUT = "Left at 0, because neither AICc nor the leave-one-thrust-out error is better with it"
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def free_coefficients(
     a_d, b_d, beta = drag_and_beta(axis)
     assumed: dict[str, tuple[float, str]] = {}
     if b_d not in known and a_d not in known and len(levels(used)) < 2:
-        assumed[b_d] = (0.0, "Linear and quadratic drag are not identifiable apart from one thrust; assumed 0")
+        assumed[b_d] = (0.0, "Linear and quadratic drag cannot be separated with one thrust only. Assumed to be 0")
     if beta not in known and not any(p.quantity == "Tau" for p in used):
         assumed[beta] = (1.0, f"{axis.inertia}/{beta} is not identifiable from V_ss alone; assumed 1")
     return drag_and_beta(axis, {*known, *assumed}), assumed

@@ -68,8 +68,8 @@ def check_limits(
             files = ", ".join(dict.fromkeys(r.file for r in own))
             raise NoFitError(
                 files,
-                f"no {axis.name} of a vehicle with this thrust and mass moves so: {what} would do it best. "
-                f"Check units, signs, and the order and directions of the thrusters",
+                f"no vehicle with this thrust and mass moves like this in {axis.name}. The best fit ends "
+                f"at a limit: {what}. Check the units, the signs, and the order and directions of the thrusters",
             )
 
 
@@ -85,8 +85,8 @@ def check_thrust(rov: Rov, data: Sequence[PreparedRecording]) -> None:
             axes = join_names(dict.fromkeys(recording.axis.name for recording in own))
             raise NoFitError(
                 files,
-                f"no {curve.name} thrust moves a vehicle so in {axes}: {what} would do it best. "
-                f"Check units, signs, and the order and directions of the thrusters",
+                f"no possible {curve.name} thrust explains the motion in {axes}. The best fit has "
+                f"{what}. Check the units, the signs, and the order and directions of the thrusters",
             )
 
 

@@ -47,16 +47,20 @@ class Estimates:
         if self._vehicle and not self._vehicle.intervals:
             yield key_line(_KEY, "no coefficient of this vehicle has an interval", plan.vary_from)
         elif self._vehicle and not self.names and not plan.vary:
-            yield key_line(_KEY, "nothing varies, for [set] gives all that has an interval there", plan.vary_from)
+            yield key_line(
+                _KEY, "nothing varies, because [set] gives every coefficient that has an interval", plan.vary_from
+            )
         if self.names and plan.sampler == "grid":
-            yield key_line(_KEY, "a grid needs values or a range, and what is estimated has none", plan.vary_from)
+            yield key_line(
+                _KEY, "a grid needs values or a range, but estimated coefficients have distributions", plan.vary_from
+            )
         for name, value in zip(self.names, self._part.values.tolist(), strict=True):
             if reason := unsettable(name, self._has):
                 yield key_line(_KEY, reason, plan.vary_from)
             elif reason := self._has[name].wrong(value):
-                yield key_line(_KEY, f"the {name} of this vehicle {reason} in the FMU", plan.vary_from)
+                yield key_line(_KEY, f"{name} of this vehicle does not fit the FMU: it {reason}", plan.vary_from)
         if plan.sampler == "saltelli" and len(self.names) > len(groups) + len(plan.vary) == 1:
-            reason = "Sobol indices tell apart what is independent, and all that varies is correlated"
+            reason = "Sobol indices need independent variables, but all that vary are correlated"
             yield key_line("sampler", reason, plan.sampler)
 
     def warnings(self) -> Iterator[str]:

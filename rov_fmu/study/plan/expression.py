@@ -315,7 +315,7 @@ def _called(compute: Callable[..., _Value], terms: list[_Term], names: list[str]
         if isinstance(found, np.ndarray) and found.ndim == 0:
             return found[()]
         if not isinstance(found, float | np.number | np.bool_ | np.ndarray):
-            raise TypeError("a function is given a number where it needs an array")
+            raise TypeError("a function needs an array, and gets a number")
         return found
 
     return call

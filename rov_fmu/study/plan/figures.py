@@ -144,8 +144,10 @@ class Figures:
         self._constants = {**CONSTANTS, TIME: times}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
-        """Compute the figures from a run's outputs and parameters: A figure without a value is NaN, and the text has
-        the reason."""
+        """Compute the figures from the outputs and parameters of a run.
+
+        A figure without a value is NaN, and the text has the reason.
+        """
         values = {**self._constants, **run}
         found, reasons = [], []
         with np.errstate(all="ignore"):

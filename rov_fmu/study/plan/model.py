@@ -117,7 +117,7 @@ def unsettable(name: str, has: Mapping[str, Variable]) -> str:
     """Return why no variable of this name can be set, or an empty text."""
     if name not in has:
         return unknown(name, has)
-    return "" if has[name].can_be_set else "the FMU computes it, and it cannot be set"
+    return "" if has[name].can_be_set else "it cannot be set, because the FMU computes it"
 
 
 def unknown(name: str, names: Mapping[str, object]) -> str:

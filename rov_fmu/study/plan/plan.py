@@ -192,13 +192,13 @@ class InputFile(Strict):
 
 def _once(names: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(names)) < len(names):
-        raise ValueError("must name each once")
+        raise ValueError("must name each variable once")
     return names
 
 
 def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
     if list(times) != sorted(set(times)):
-        raise ValueError("must be times one after another")
+        raise ValueError("must be times in ascending order")
     return times
 
 
@@ -331,13 +331,13 @@ def check_plan(plan: Plan) -> Iterator[str]:
     elif plan.keep:
         yield from _unreachable(plan, plan.keep)
     if plan.sampler == "grid" and plan.runs is not None:
-        yield key_line("runs", "a grid has as many as it has points; leave this out", plan.runs)
+        yield key_line("runs", "a grid has one run for each point: leave this key out", plan.runs)
     if plan.sampler == "grid" and plan.points > _MOST_RUNS:
         yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {plan.points:.3g}")
     if plan.sampler != "grid" and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
-        yield "must have [keep] or [figures], or nothing remains of a run"
+        yield "must have [keep] or [figures]. Otherwise nothing of a run is stored"
 
 
 def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:

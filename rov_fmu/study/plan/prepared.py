@@ -169,7 +169,7 @@ def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
         elif reason := _no_input(name, plan, has):
             yield key_line(key, reason)
         elif signal.ramps and not has[name].is_continuous:
-            yield key_line(key, "must be steps, for it is not continuous")
+            yield key_line(key, "must be steps, because the variable is not continuous")
         else:
             for n, reason in _out_of_bounds(signal, has[name]):
                 yield key_line(key, reason, signal.points[n][1])

@@ -53,7 +53,7 @@ def check_place(folder: Path) -> None:
     """Raise FileError if the page would overwrite another file."""
     path = folder / PAGE
     if path.exists() and _KIND not in path.read_bytes():
-        raise FileError(f"{path}: is no page of this tool and would be overwritten: choose another folder")
+        raise FileError(f"{path}: is not a page of this tool, and would be overwritten. Choose another folder")
 
 
 def study_page(results: Results) -> str:

@@ -69,9 +69,9 @@ class Store:
                     f"{self.folder}: holds runs of another plan ({', '.join(changed)} changed): choose another folder"
                 )
         elif self.done():
-            raise FileError(f"{self.folder}: holds runs without {STUDY}, which tells what they are of")
+            raise FileError(f"{self.folder}: has runs, but {STUDY}, which describes them, is missing")
         if (end := max((end for _, end in self.done()), default=0)) > runs:
-            raise FileError(f"{self.folder}: holds runs up to number {end - 1}, and the plan has {runs} alone")
+            raise FileError(f"{self.folder}: has runs up to number {end - 1}, but the plan has only {runs} runs")
         self._clean()
         head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs, "plan": dict(plan), "fmu": fmu}
         text = json.dumps({**head, **description}, indent=2, ensure_ascii=False)
@@ -88,7 +88,9 @@ class Store:
         except ValueError:
             known = False
         if not known:
-            raise FileError(f"{path}: is not the description of a study, or of another version of this tool")
+            raise FileError(
+                f"{path}: is not the description of a study, or was written by another version of this tool"
+            )
         return dict(found)
 
     def done(self) -> list[tuple[int, int]]:

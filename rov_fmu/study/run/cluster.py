@@ -84,7 +84,7 @@ def execute(
         try:
             client.register_plugin(Delivery(job, own_cluster=scheduler is None))
         except Exception as error:  # whatever a worker may raise
-            needs = "a worker cannot take the study; it needs the same rov-fmu[study] as here"
+            needs = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
             raise StudyError(f"{needs}: {brief(str(error))}") from error
         spent.started = perf_counter() - begin
         begin += spent.started
@@ -94,7 +94,7 @@ def execute(
             raise
         except Exception as error:  # a client that has lost its scheduler raises various exceptions
             if isinstance(error, _GONE) or client.status != "running":
-                raise StudyError("the scheduler is gone; what is done is kept") from error
+                raise StudyError("the connection to the scheduler is lost. Finished runs are kept") from error
             raise
         finally:
             spent.elapsed = perf_counter() - begin
@@ -256,7 +256,7 @@ def _started(**options: Any) -> LocalCluster:
     """Start workers on this machine. Raises StudyError."""
     script = getattr(sys.modules["__main__"], "__file__", None)
     if script and not Path(script).exists():
-        raise StudyError(f"workers cannot be started of {script}, which is no file; {_GUARD}")
+        raise StudyError(f"workers cannot be started, because {script} is not a file; {_GUARD}")
     try:
         with ctrl_c_withheld():
             return LocalCluster(**options)

@@ -111,10 +111,15 @@ def _wrong_columns(
         near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
         hint = f"; is it the column {' or '.join(near)}?" if near else ""
         hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
-        yield f"no column of commands: {wanted}, each in [%], [1] or [us]{hint or renaming}"
+        yield (
+            f"there is no column of commands. Possible columns: {wanted}, each in [%], [1] or [us]{hint or renaming}"
+        )
     if len(found) > 1:
         titles = ", ".join(shown(headers[names[0]]) for names in found.values())
-        yield f"columns {titles}: the commands of the axis, of the inputs or of the thrusters, not several"
+        yield (
+            f"columns {titles}: a log must have the commands of the axis, of the inputs or of the thrusters, "
+            "but only one of these"
+        )
     if not any(name in headers for name in sensors):
         titles = " or ".join(f"'{name} [{next(iter(s.column.units))}]'" for name, s in sensors.items())
         yield f"column {titles} is missing{renaming}"
@@ -156,7 +161,9 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
         reason = f"the clock goes back by {seconds:.3g} s, and on from there over times that were logged before: "
         raise table.error(int(rows[row]), "time", f"{reason}split the log before this line into two files")
     if unordered.size > _MOST_UNORDERED * rows.size:
-        raise table.error(int(rows[unordered[0]]), "time", "the time goes back, and stays back: two logs in one file?")
+        raise table.error(
+            int(rows[unordered[0]]), "time", "the time goes back and does not return. Are there two logs in one file?"
+        )
     rows = rows[np.argsort(time, kind="stable")]
     time = columns["time"][rows]
     first = np.concatenate([[True], np.diff(time) > 0.0])

@@ -185,7 +185,7 @@ def _read_dataflash(path: Path, head: bytes) -> _Messages:
         init_arrays_fast = init_arrays  # the output of the compiled one cannot be redirected
 
     if head != _DATAFLASH:
-        raise DataFileError(f"{path}: no DataFlash log: it must begin with the bytes A3 95 80")
+        raise DataFileError(f"{path}: is not a DataFlash log, which begins with the bytes A3 95 80")
     log, untimed = _Messages(path.name), 0
     with closing(Reader(str(path))) as reader:
         while message := reader.recv_match(type=[*_NUMBERS, *_PARAMETERS]):
