@@ -66,7 +66,10 @@ def _key(texts: dict[str, str]) -> str:
 
 
 def _find(folder: Path, key: str) -> Path | None:
-    """Return the library with this key in a folder, or None. A damaged file lacks its digest in its name."""
+    """Return the library with this key in a folder, or None.
+
+    The name of a library contains the digest of its content, so a damaged library is not returned.
+    """
     for path in folder.glob(f"{key}-*"):
         if path.name == _name(key, path.read_bytes()):
             return path

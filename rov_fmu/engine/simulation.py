@@ -18,15 +18,16 @@ Array = NDArray[np.float64]
 _POLL = 0.5
 """The waiting thread looks for Ctrl-C after this number of seconds, because Ctrl-C does not end a wait on Windows."""
 _SHORT = 30
-"""Up to this number of steps take less time than starting a thread, and are over before anyone presses Ctrl-C."""
+"""A simulation of at most this many steps takes less time than starting a thread, and is over before anyone presses
+Ctrl-C."""
 _BRIEF = 100_000
-"""Up to this number of steps are over in about 0.1 s, so one worker computes them without a thread of its own."""
+"""A simulation of at most this many steps takes about 0.1 s, so a single worker runs it without a thread of its own."""
 _SHARES = 8
 """The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
 
 TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
-"""The struct `table` of engine.c: the address of an array indexed by vehicle and time, and its two
-strides, counted in doubles."""
+"""The struct `table` of engine.c. It has the address of an array of numbers by vehicle and time, and the two strides of
+this array in doubles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +57,9 @@ def simulate(
     """Simulate vehicles over the same rising times (s), with all inputs held from each time to the next.
 
     `values` contains inputs, states at the first time, and coefficients by name. Each broadcasts to vehicles x times.
-    By default, inputs and states are 0, and coefficients are those of the vehicle. `record` names the variables to
-    record, by default the states. The results do not depend on the number of workers.
+    Inputs that are not given have their usual values (`Layout.usual_inputs`): no command, load or current, and the
+    usual voltage. States that are not given are 0, and coefficients that are not given are those of the vehicle.
+    `record` names the variables to record, by default the states. The results do not depend on the number of workers.
 
     The attitude of a vehicle with roll or pitch begins at the Euler angles phi_0, theta_0 and psi_0, which are 0 by
     default, or at the quaternion among the states.

@@ -39,7 +39,8 @@ class EquationSource:
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
         equation = self.equation
-        later = [*equation.forces.values(), *(formula for both in equation.lagging.values() for formula in both)]
+        later = [*equation.forces.values(), *equation.outputs.values()]
+        later += [formula for both in equation.lagging.values() for formula in both]
         used = {name for formula in later for name in names(formula)} | {*self.layout.thrust}
         lasting = [name for name in equation.thrust if name in used]
         return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
@@ -68,11 +69,11 @@ class EquationSource:
         return lines
 
     def forces(self) -> list[str]:
-        """Return statements that compute the accelerations by the forces of the thrusters and the loads."""
+        """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
         return [f"q->{name} = {self._c(formula)};" for name, formula in self.equation.forces.items()]
 
     def directions(self) -> list[tuple[str, int]]:
-        """Return each coefficient that depends on a direction, with the place of its velocity among the monitored."""
+        """Return each coefficient that depends on a direction, with the index of its velocity in `monitored`."""
         return [(name, self.equation.monitored.index(d.velocity)) for name, d in self.equation.directed.items()]
 
     def starts(self) -> list[str]:
@@ -91,7 +92,10 @@ class EquationSource:
         return [(curve, [t.name for t in layout.thrusters if t.curve == curve]) for curve in lagging]
 
     def coasting(self) -> list[str]:
-        """Return the integrals with constant rates while all velocities are steady: all, but x and y not in a turn."""
+        """Return the integrals whose rates are constant while all velocities are steady.
+
+        These are all integrals except the x and y of a vehicle that has a heading. With an attitude there are none.
+        """
         if self.layout.has_attitude:
             return []
         return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
@@ -111,13 +115,17 @@ class EquationSource:
         return "cos_psi" in self.equation.inputs_of[name] or "sin_psi" in self.equation.inputs_of[name]
 
     def group(self, name: str) -> str:
-        """Return the first state of a state's group. The heading and the horizontal position are groups of two."""
+        """Return the first state of the group of a state. The sizes of a group are added.
+
+        Without an attitude, the groups of several states are the cosine and the sine of the heading, and the horizontal
+        position. With an attitude, they are each row of the rotation matrix, and the position.
+        """
         if self.layout.has_attitude:
             return "x" if name in ("y", "z") else f"R_{name[2]}1" if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def dynamic(self) -> int:
-        """Return the number of components that may settle. They come first, so the C code needs only their number."""
+        """Return the number of components that may settle. These come first, so the C code needs only their number."""
         equation = self.equation
         assert equation.components[: len(equation.dynamic)] == equation.dynamic
         return len(equation.dynamic)
@@ -161,7 +169,10 @@ class EquationSource:
         return to_c(formula, lambda name: known[name])
 
     def blocks(self) -> list[tuple[str, ...]]:
-        """Return groups of states whose coefficients are computed together. No group depends on a later one."""
+        """Return blocks: groups of neighbouring states whose Taylor coefficients are computed together.
+
+        No block depends on a later one.
+        """
         depth: dict[str, int] = {}
         used = self.equation.used
         for group in self.equation.components:
@@ -179,10 +190,10 @@ class EquationSource:
         return next(i for i, block in enumerate(self.blocks()) if name in block)
 
     def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
-        """Return the products of a block as runs over neighbouring states, and the C expression of each product.
+        """Return the products of a block in runs, and the C expression of each product.
 
-        A run multiplies one state by several neighbouring ones: (that state, the first neighbour, how many). For
-        squares, that state is "".
+        A run multiplies one state by several neighbouring states. It consists of that state, the first neighbour and
+        the number of neighbours. For squares, the first item is empty.
         """
         states = self.equation.states
         pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
@@ -238,7 +249,10 @@ class EquationSource:
         return sum(1 << other for other in {self.component_of(name) for name in self._inputs(group)})
 
     def needed_with(self, group: Sequence[str]) -> int:
-        """Return bits for the states that let a component act on others unless they are 0, or all bits for always."""
+        """Return one bit for each state by which a component is multiplied in other rows.
+
+        While all these states are 0, the component acts on nothing. All bits are set when it may always act.
+        """
         always, partners = 2**32 - 1, 0
         needed = {*self.equation.monitored, *(self.equation.heading if self.layout.has_attitude else ())}
         if self.equation.used.isdisjoint(group) or not needed.isdisjoint(group):
@@ -270,14 +284,17 @@ class EquationSource:
         return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
 
     def _results(self, formulas: Mapping[str, str]) -> list[str]:
-        """Return statements that assign results, after the entries of the rotation matrix in them."""
+        """Return statements that assign results. Before them come the parts of the orientation that they contain."""
         heading = self.equation.heading
         needed = _needed(heading, {name for formula in formulas.values() for name in names(formula)})
         lines = [f"const double {name} = {self._c(heading[name], heading)};" for name in needed]
         return lines + [f"{place} = {self._c(formula, heading)};" for place, formula in formulas.items()]
 
     def beginning(self) -> list[str]:
-        """Return statements that set the commands that act, and compute the attitude from its parameters."""
+        """Return statements for the start.
+
+        They set the delayed commands to their start values, and compute the attitude from its parameters.
+        """
         lines = [f"at[REF_{name}] = {meta.start!r};" for name, meta in self.layout.delayed.items()]
         local: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
@@ -309,7 +326,10 @@ class EquationSource:
         return lines
 
     def tangent_lines(self) -> list[str]:
-        """Return statements that add the changes of the calculated variables to d, which holds all other changes."""
+        """Return statements that write the changes of the calculated variables to d.
+
+        Before, d has the changes of all other variables.
+        """
         equation = self.equation
         given = self.variables - {*self.layout.thrust}
         text = {name: f"at[REF_{name}]" for name in given}

@@ -14,7 +14,7 @@ from rov_fmu.model.rov import Rov
 
 
 class Stepper:
-    """One vehicle that moves on step by step. The inputs are held over each step, and each step is exact.
+    """One vehicle that is stepped from time 0 on. The inputs are held over each step, and each step is exact.
 
     All arrays and pointers are made once, so a step costs little more than its computation.
     """
@@ -28,7 +28,8 @@ class Stepper:
         layout = rov.layout
         self._commands = tuple(layout.commands)
         self._dead_time = rov["T_d"] if layout.has_dead_time else 0.0
-        rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)  # commands wait here, and not in the engine
+        # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
+        rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)
         places, states = rov.layout.places, [*rov.layout.state]
         rates = {f"der({name})": places[name] + len(states) for name in states}
         self._numbers = np.zeros(len(places) + len(states))
@@ -57,7 +58,7 @@ class Stepper:
         """The time, s."""
 
     def step(self, commands: Sequence[float], h: float) -> list[float]:
-        """Hold the commands (in the order of the vehicle's inputs) for h > 0 seconds. Return the recorded variables.
+        """Hold the commands, in the order of `layout.commands`, for h > 0 seconds. Return the recorded variables.
 
         They are those at the end of the step. Raises OverflowError if the motion cannot be computed.
         """

@@ -13,11 +13,13 @@ from .formula import names, tangent
 from .layout import Layout
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
-"""The kinds of factors (FMI 2.0, section 2.2.8). An importer knows most about a constant factor, then less and less."""
+"""The kinds of factors (FMI 2.0, section 2.2.8).
+
+They are in this order: an importer knows most about a constant factor, and least about a dependent one."""
 
 
 def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
-    """Return for each rate and calculated variable the inputs and states that it depends on, each with its kind.
+    """Return, for each rate and each calculated variable, the inputs and states that it depends on, each with its kind.
 
     The rate of a state is called `der(<state>)`. Inputs and states without influence are left out.
     """

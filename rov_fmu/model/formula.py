@@ -1,8 +1,8 @@
 """Formulas as text. They are evaluated in Python, differentiated, and translated to C.
 
 A formula is a Python expression of names, numbers, + - * /, comparisons, `and`, `or`, a choice `a if test else b`, and
-the functions sin, cos, abs, sqrt, pow, log and atan2. A name that is called and is none of these is a
-thrust table. Its value is a float.
+the functions sin, cos, abs, sqrt, pow, log and atan2. Any other name that is called is the name of a thrust table. The
+value of a formula is a float.
 """
 
 import ast
@@ -67,7 +67,10 @@ def joined(parts: Iterable[str]) -> str:
 
 
 def weighted(parts: Sequence[tuple[float, str]]) -> str:
-    """Write a weighted sum as one formula. Each part must be a product, or need no brackets in one."""
+    """Write a weighted sum as one formula.
+
+    Each part must be a formula that needs no brackets as a factor, and must not begin with a minus.
+    """
     return joined(
         part if weight == 1.0 else f"-{part}" if weight == -1.0 else f"{weight!r} * {part}" for weight, part in parts
     )
@@ -93,7 +96,8 @@ def compiled(
     """Compile formulas into one function. It takes values by name, and adds the values of the formulas to them.
 
     The formulas are evaluated in their order, and each may use those before it. `tables` are the functions that they
-    call besides FUNCTIONS, by their names. Raises ValueError when one of the texts is not a formula.
+    call besides FUNCTIONS, by their names. Raises SyntaxError when a text is not Python, and ValueError when it is not
+    a formula.
     """
     lines: list[ast.stmt] = []
     for name, formula in formulas.items():
@@ -140,7 +144,7 @@ def to_c(formula: str, name_in_c: Callable[[str], str]) -> str:
 
 
 def _c(node: ast.expr, name_in_c: Callable[[str], str]) -> tuple[str, int]:  # noqa: PLR0911 - a case for each syntax
-    """Return an expression in C, and its precedence. It is 9 for expressions that never need parentheses."""
+    """Return an expression in C and its precedence, which is 9 for expressions that never need parentheses."""
 
     def part(node: ast.expr, least: int) -> str:
         text, precedence = _c(node, name_in_c)

@@ -1,9 +1,11 @@
 """The layout of a vehicle, and the declarations of its coefficients and variables (standard library only).
 
-A layout says which axes, thrust curves and thrusters a vehicle has, without the numbers.
+A layout says which axes, thrust curves, thrusters and fins a vehicle has, and which coefficients. It does not contain
+the values of the coefficients.
 
-Signs and symbols follow Fossen/SNAME and the paper: body frame x forward, y starboard, z down; earth frame
-north-east-down; u, v, w, r are surge, sway, heave and yaw velocity through the water. Heave is positive down.
+Signs and symbols follow Fossen/SNAME and the paper. The axes of the body frame are x forward, y starboard and z down.
+The earth frame is north-east-down. u, v, w are the velocities in surge, sway and heave through the water, and p, q, r
+are the angular velocities in roll, pitch and yaw. Heave is positive down.
 
 A coefficient is declared by its key in the vehicle file. Its name in the FMU also contains the axis or the curve to
 which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the curve t200 gives a_t_t200_reverse.
@@ -27,7 +29,7 @@ class Axis:
 
     name: str
     velocity: str
-    """The symbol of the velocity: u, v, w or r. The names of the axis's coefficients end in it."""
+    """The symbol of the velocity: u, v, w, p, q or r. The names of the coefficients of the axis end in it."""
     unit: str
     """The unit of the velocity."""
     positive: str
@@ -43,7 +45,7 @@ class Axis:
     external: str
     """The name of the input for a force or torque from outside."""
     inertia: str
-    """The coefficient that resists acceleration, together with the added mass: m_rov or I_r."""
+    """The coefficient that resists acceleration, together with the added mass: m_rov, I_p, I_q or I_r."""
     equations: tuple[str, str]
     """The numbers of the paper's equations of drag and motion."""
     place: int
@@ -174,12 +176,15 @@ class Declaration:
     nominal: float = 1.0
     tunable: bool = False
     start: float = 0.0
-    """The value of an input that is not given, and of a command that acts before the first one."""
+    """The value of an input that is not given. A delayed command also has it until the first change arrives."""
 
 
 @dataclass(frozen=True)
 class CoefficientKind:
-    """A kind of coefficient. `unit` and `words` contain fields {...} for the texts of an axis or a curve."""
+    """A kind of coefficient.
+
+    `unit` and `words` are templates. Their fields {...} are filled with the texts of an axis or a curve.
+    """
 
     unit: str
     words: str
@@ -189,7 +194,7 @@ class CoefficientKind:
     tunable: bool = False
 
     def meta(self, **of: str) -> Declaration:
-        """Return the declaration of this coefficient of one axis or curve, whose texts are `of`."""
+        """Return the declaration of this coefficient for one axis or curve. `of` has the texts for the fields."""
         words = self.words.format(**of)
         return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
 
@@ -217,11 +222,13 @@ CROSS = {
     "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic damping a_d in {axis} by {other}", -1e6, 1e6),
     "lift": CoefficientKind("{load}.s2/{lengths}", "Lift in {axis} by {axes}", -1e6, 1e6),
 }
-"""Coefficients of two or three axes. Names end in the velocities: m_a_uq; of lift, they begin with the force: Y_ur."""
+"""The coefficients of two or three axes.
+
+Their names end in the velocities, as in m_a_uq. The name of a lift begins with the letter of the force, as in Y_ur."""
 COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
 """The coefficients of all commands together."""
 _QUARTER = 1.5708
-"""A quarter of a turn, rad, rounded up as people write it."""
+"""A quarter of a turn, rad. It is rounded up, because a file may have 1.5708."""
 ARM = {
     "R": CoefficientKind("m", f"Distance from the centre of mass to a rear thruster R, {cited('(4)')}", 0.0, 100.0),
     "gamma": CoefficientKind(
@@ -275,7 +282,7 @@ AXIS = {
     "F_0": CoefficientKind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
 _AT_ZERO = "; at 0 the velocity never changes"
-"""What the description of β says where β may be 0."""
+"""The end of the description of β for the axes whose β may be 0."""
 TUNING = {
     "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
     "beta": CoefficientKind(
@@ -300,18 +307,21 @@ class ThrustTable:
     forces: tuple[float, ...]
     """The force at each command, N."""
     slopes: tuple[float, ...]
-    """The derivative of the force by the command at each command, N."""
+    """The derivative of the force with respect to the command, at each command, N."""
     voltage: float = 0.0
     """The voltage at which the table was measured, V; 0 if the curve has only this table."""
 
     def force(self, command: float) -> float:
-        """Return the force at a command between -1 and 1: the cubic that has the forces and slopes at its ends."""
+        """Return the force at a command between -1 and 1.
+
+        It is the cubic that has the forces and the slopes at the ends of the interval of the command.
+        """
         n, h, t = self._place(command)
         f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
         return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
 
     def slope(self, command: float) -> float:
-        """Return the derivative of `force`."""
+        """Return the derivative of `force` with respect to the command."""
         n, h, t = self._place(command)
         f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
         return (a + t * (2.0 * (3.0 * (g - f) - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * (g - f)))) / h
@@ -325,7 +335,11 @@ class ThrustTable:
 
 @dataclass(frozen=True)
 class Curve:
-    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) the sum for `together` thrusters, mirrored for c < 0."""
+    """A thrust curve.
+
+    For c > 0, the force of `together` thrusters is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
+    mirrored, unless it has coefficients for reverse. Tables replace both.
+    """
 
     name: str
     keys: tuple[str, ...] = ("a_t", "b_t")
@@ -338,7 +352,7 @@ class Curve:
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
 
     def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key: that of forward when the curve has none for reverse."""
+        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
         return coefficient_name(key if key in self.keys else key.removesuffix(REVERSE), self.name)
 
     @property
@@ -348,6 +362,8 @@ class Curve:
 
 
 Vector = tuple[float, float, float]
+FAINT = 1e-9
+"""Smaller effects, in N per N or m, are rounding errors of a direction."""
 
 
 def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
@@ -360,7 +376,10 @@ def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
 
 @dataclass(frozen=True)
 class Thruster:
-    """A thruster and its place. Its torque about z follows from its position, or is ±R sin γ F by its arm, (4)."""
+    """A thruster. Its moments follow from its position.
+
+    A thruster with an arm instead of a position has only the torque ±R sin γ F about z, (4).
+    """
 
     name: str
     curve: str
@@ -374,7 +393,10 @@ class Thruster:
     description: str = ""
 
     def effect(self, axis: Axis) -> float:
-        """Return the force along an axis, or the torque, of a force of 1 N. An arm's torque is in units of R sin γ."""
+        """Return the force along an axis, or the torque about it, of a thrust of 1 N.
+
+        The torque by an arm is in units of R sin γ.
+        """
         if self.position is None and axis.is_rotation:
             return float(self.arm) if axis is YAW else 0.0
         return effect_along(axis, self.direction, self.position or (0.0, 0.0, 0.0))
@@ -382,7 +404,7 @@ class Thruster:
 
 @dataclass(frozen=True)
 class Fin:
-    """A control surface: its lift, which is proportional to its angle, and its place."""
+    """A control surface. Its lift is proportional to its angle."""
 
     name: str
     direction: tuple[float, float, float]
@@ -411,16 +433,16 @@ class VehicleAxis:
     """The keys of AXIS that the vehicle has. It always has α and β."""
 
     def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key: that of forward when the axis has none for reverse."""
+        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
         return self.axis.coefficient(key if key in self.keys else key.removesuffix(REVERSE))
-
-
-FAINT = 1e-9  # a smaller effect, in m or N per N, is a rounding error of a direction
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The axes, curves and thrusters of a vehicle, without numbers."""
+    """The structure of a vehicle: everything except the values of its coefficients.
+
+    It has the axes, curves, thrusters, fins and inputs.
+    """
 
     axes: tuple[VehicleAxis, ...]
     """The axes in the order of AXES."""
@@ -498,12 +520,12 @@ class Layout:
 
     @cached_property
     def memory(self) -> tuple[str, ...]:
-        """The variables besides the states that a step continues: the heading, which counts turns."""
+        """The variables that a step continues besides the states: the heading, which counts turns, of a quaternion."""
         return ("psi",) if self.has_attitude else ()
 
     @cached_property
     def driven(self) -> "tuple[Thruster | Fin, ...]":
-        """The thrusters and the fins, which commands drive."""
+        """Everything that commands drive: the thrusters and the fins."""
         return (*self.thrusters, *self.fins)
 
     @cached_property
@@ -521,7 +543,7 @@ class Layout:
         return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
 
     def signs(self, axis: Axis) -> dict[str, float]:
-        """Return the commands that drive an axis in its positive direction: 1 or -1 for every input that acts on it.
+        """Return the sign of each command that acts on an axis: 1 or -1, whichever drives it in its positive direction.
 
         When the thrusters are symmetric, these commands leave the other axes at rest.
         """
@@ -573,7 +595,7 @@ class Layout:
     def commands(self) -> dict[str, Declaration]:
         """The inputs that drive the thrusters and the fins: fractions of the full command, or of the largest angle.
 
-        They are pulse widths instead if the vehicle has these.
+        If the vehicle has `pulse`, they are pulse widths instead.
         """
         if self.mix:
             words = {name: f"Command u_{name} of {_listed(gains)}" for name, gains in self.mix.items()}
@@ -652,7 +674,10 @@ class Layout:
 
     @cached_property
     def pose(self) -> dict[str, Declaration]:
-        """The position and heading, as far as the axes change them; these states follow the velocities."""
+        """The position, and the heading or the quaternion, as far as the axes change them.
+
+        These states come after the velocities.
+        """
         found = {}
         if self.has_attitude:
             if self.has(SURGE, SWAY, HEAVE):
@@ -684,9 +709,10 @@ class Layout:
 
     @cached_property
     def thrust(self) -> dict[str, Declaration]:
-        """The calculated variables that are neither states nor rates: thrust and torque, before the tuning α.
+        """The calculated variables that are neither states nor rates.
 
-        They are the forces that are not states, and the torque of the thrusters of each curve.
+        They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, and the Euler
+        angles of a vehicle with an attitude. Forces and torques are those before the tuning α.
         """
         found = {
             f"F_{t.name}": _thrust(t, self.curve_of[t.name])
@@ -713,7 +739,7 @@ class Layout:
 
     @cached_property
     def at_rest(self) -> dict[str, float]:
-        """The states of the vehicle at rest in the origin, level and heading north."""
+        """The states of a vehicle that is at rest at the origin, is level and heads north."""
         return dict.fromkeys(self.state, 0.0) | ({"eta": 1.0} if self.has_attitude else {})
 
     @cached_property
@@ -725,7 +751,7 @@ class Layout:
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """The place of each variable in the arrays of the C code. The place of der(x) is len(state) after that of x."""
+        """The index of each variable in the arrays of the C code. That of der(x) is the index of x plus len(state)."""
         found = {name: place for place, name in enumerate([*self.inputs, *self.state])}
         first = len(found) + len(self.state)
         return found | {

@@ -5,8 +5,8 @@ The effective mass matrix has the entries M_ij = (rigid body + added mass)_ij / 
 
     P' = P x omega + force,    L' = L x omega + P x v + moment.
 
-An axis without entries off the diagonal keeps its acceleration per load gain_i = beta_i/m_i. Other axes form blocks,
-and formulas for the inverse of a block follow from its factors M = L D L^T.
+An axis without entries off the diagonal has the acceleration per load gain_i = beta_i/m_i. The other axes form blocks.
+The inverse of a block follows from its factors M = L D L^T.
 """
 
 from collections.abc import Iterable, Mapping
@@ -36,7 +36,7 @@ class MassMatrix:
     entries: Mapping[tuple[str, str], str]
     """The formulas of the effective entries off the diagonal, by two velocities in the order of the axes.
 
-    The vehicle may lack one of the two axes. Such an entry is a momentum along the axis, or about it, that it lacks."""
+    The vehicle may lack one of the two axes. The entry then gives a momentum along or about the missing axis."""
 
     @cached_property
     def blocks(self) -> tuple[tuple[str, ...], ...]:
@@ -51,7 +51,10 @@ class MassMatrix:
         return not any(axis in block for block in self.blocks)
 
     def inverse(self, axis: str) -> dict[str, str]:
-        """Return a row of the inverse: the names of the accelerations of an axis by a unit load along other axes."""
+        """Return a row of the inverse.
+
+        For each axis that acts on this one, it has the name of the acceleration per load along that axis.
+        """
         for block in self.blocks:
             if axis in block:
                 return {other: f"inverse_{_pair(axis, other)}" for other in block}
@@ -114,7 +117,10 @@ class MassMatrix:
         return f"{inverse} / gain_{a}" if a == b and self._is_alone(a) else f"{inverse} * mass_{a}{b}"
 
     def _products(self, axis: str) -> dict[tuple[str, str], list[tuple[str, tuple[str, str]]]]:
-        """Return the right side of Kirchhoff's equations for an axis: for each product, entries with their signs."""
+        """Return the right side of Kirchhoff's equations for an axis.
+
+        For each product of two velocities, it has entries of the mass matrix with their signs.
+        """
         found: dict[tuple[str, str], list[tuple[str, tuple[str, str]]]] = {}
         for sign, momentum, velocity in _KIRCHHOFF[axis]:
             if velocity not in self.gains:

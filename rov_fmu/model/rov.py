@@ -66,7 +66,7 @@ class Rov:
     # ---- Thrust ----
 
     def curve_force(self, curve: Curve, command: float) -> float:
-        """Return the steady thrust (2) of one thruster (N) for a command."""
+        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage."""
         values = {"u_one": command, "voltage": self.layout.voltage or 0.0}
         *_, force = _thrust_of(curve)({**self.coefficients, **values}).values()
         return force
@@ -108,7 +108,7 @@ class Rov:
         }
 
     def thrust(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the calculated variables of the thrusters by name."""
+        """Return the values of `layout.thrust` by name: thrust, torque and Euler angles."""
         found = self._formulas.calculate(self._values(inputs, state))
         for name in self.layout.memory:
             found[name] = unwrapped(found[name], state.get(name, found[name]))
@@ -128,9 +128,10 @@ class Rov:
         return {name: found[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
-        """Return the states after h > 0 seconds with the inputs held. The result is exact up to rounding for any h.
+        """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
-        It is not finite when the motion overflows or takes too many pieces (rov_fmu/model/step.py).
+        The result is exact up to rounding for any h. It is not finite when the motion overflows or takes too many
+        pieces (rov_fmu/model/step.py).
         """
         after = step(self._formulas.table, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.memory)}

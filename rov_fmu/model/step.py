@@ -20,12 +20,13 @@ from .equation import Equation
 from .formula import compiled, names
 
 ORDER = 20
-"""The order of the series. A higher order costs more than its longer pieces save."""
+"""The order of the series. A higher order costs more than its longer pieces save. The C code has its own order."""
 MOST_PIECES = 10_000
-"""The most pieces of a step, enough for 1,000 s at rates of 10/s that never settle. A longer step is not computed."""
+"""The largest number of pieces of a step. It is enough for 1,000 s of motion that changes at 10/s and never settles. A
+step that needs more is not computed."""
 
 _EPSILON = 2.0**-53  # half a unit in the last place of 1
-_FADED = 1e-40  # a state below this share of its largest size has no influence any more, whatever the drag
+_FADED = 1e-40  # a state below this share of its largest size has no effect any more, whatever the drag is
 _RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers beyond ORDER are below rounding
 _SMALLEST = 1e-322  # rounding keeps smaller numbers from fading any further
 _SHORTEST = 2.0**-20  # within this share of a piece, the drag of a velocity that just touches 0 is negligible
@@ -130,7 +131,7 @@ class Motion:
     def hold(self) -> None:
         """Compute the coefficients for both directions of the velocities.
 
-        Before that, the lags whose forces have all arrived are ended: each force becomes exactly the steady thrust.
+        First, end the lags whose forces have all arrived: each of these forces becomes exactly the steady thrust.
         """
         table, values = self.table, self.values
         for progress, forces in table.equation.lags.items():
@@ -227,7 +228,10 @@ class Motion:
         self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(end)]
 
     def follow_circle(self, first: Sequence[float], second: Sequence[float], w: float, angle: float) -> None:
-        """Follow the heading through a rotation with constant velocities; every whole turn changes it alike."""
+        """Follow the heading through a rotation with constant velocities.
+
+        Every whole turn changes it by the same angle.
+        """
         start = self.y
 
         def y_at(t: float) -> list[float]:
@@ -354,7 +358,7 @@ def _change(c: Sequence[float], t: float) -> float:
 def usable_time(c: Sequence[float]) -> float:
     """Return the time at which the terms decrease like the powers of _RATIO from the first three to the last three.
 
-    Of three neighbours, the largest counts, because every second or third coefficient of a series may be 0.
+    Of three neighbouring coefficients the largest counts, because every second or third coefficient may be 0.
     """
     first = next((n for n, x in enumerate(c) if x != 0.0), len(c))
     reach = inf
@@ -366,7 +370,10 @@ def usable_time(c: Sequence[float]) -> float:
 
 
 def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
-    """Return how long a velocity certainly keeps its sign, at most `length`, and whether it is 0 at that time."""
+    """Return a time up to which a velocity certainly keeps its sign, and whether the velocity is 0 at that time.
+
+    The time is at most `length`.
+    """
     first = next((n for n, x in enumerate(c) if x != 0.0), None)
     shortest = _SHORTEST * length
     while first is not None and length > shortest:
