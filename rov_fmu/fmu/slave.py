@@ -1,9 +1,9 @@
 """The FMU in pure Python: connect rov_fmu/model/rov.py to PythonFMU's Fmi2Slave.
 
 In the FMU this file is the slave module; variables.json (the declaration) and a copy of the model lie in its folder.
-PythonFMU 0.7 cannot return fmi2Discard, and an exception must not reach it: it then releases its objects twice, which
-ends the importer at a later call. When a value is refused, a message with the status is logged, the old value is kept,
-and the call returns fmi2OK.
+PythonFMU 0.7 cannot return fmi2Discard. An exception must not reach it, because PythonFMU then releases its objects
+twice, and a later call ends the importer. When a value is refused, a message with the status is logged, the old value
+is kept, and the call returns fmi2OK.
 """
 
 import json
@@ -161,7 +161,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def _warn_once(self, what: int | str, text: str) -> None:
         if what not in self.warned:
             self.warned.add(what)
-            self.log(f"{text}; said once.", Fmi2Status.warning)
+            self.log(f"{text}; logged once.", Fmi2Status.warning)
 
     def _is_calculated(self, reference: int) -> bool:
         return bool(self.declared[reference]["initial"] == "calculated")
