@@ -41,7 +41,7 @@ class Built:
     beside: Sequence[Path]
     """The other files that were written."""
     lost: Sequence[str] = ()
-    """The folders of binaries/ that the FMU had which this one replaced, and that this one does not have."""
+    """The folders of binaries/ that the replaced FMU had and this one does not have."""
 
 
 def build(

@@ -292,7 +292,8 @@ def _simulate(
 ) -> None:
     """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
 
-    Inputs and states that are not set are 0. Without -o and --plot the values at the end are printed.
+    Inputs that are not set have their usual values, and states that are not set are 0. Without -o and --plot the values
+    at the end are printed.
     """
     from rov_fmu.interface.model import load
     from rov_fmu.interface.simulate_command import check_outputs, moves, print_final, run, title, write_results

@@ -1,4 +1,4 @@
-"""Read the experiments that any FMU may contain by the layered standard FMI-LS-REF."""
+"""Read the experiments that any FMU may contain. Their format is the layered standard FMI-LS-REF."""
 
 import posixpath
 import zipfile
@@ -21,7 +21,7 @@ _DEFAULT_TOLERANCE = 1e-3
 _DEFAULT_STEPS = 500
 """The number of communication steps if neither the experiment nor the FMU has a step size."""
 _MOST_STEPS = 1_000_000
-"""The largest number of communication steps of an experiment; FMPy takes minutes for so many."""
+"""The largest number of communication steps of an experiment. FMPy needs minutes for this number."""
 _NON_NUMERIC = ("String", "Binary", "Clock")
 """The types whose variables cannot be columns of numbers."""
 
@@ -72,12 +72,15 @@ class ReferenceResults:
         except FileNotFoundError as error:
             raise FileError(f"{fmu}: {NO_FILE}") from error
         except zipfile.BadZipFile as error:
-            raise FileError(f"{fmu}: is no FMU, or a damaged one: {error}") from error
+            raise FileError(f"{fmu}: is not an FMU, or is damaged: {error}") from error
         if MANIFEST not in self._archive.namelist():
             raise self._manifest.error("there is no such file: the FMU carries no reference results")
 
     def experiments(self, description: Any) -> list[Experiment]:
-        """Return all experiments but those of uncertainty analyses. `description` is FMPy's description of the FMU."""
+        """Return all experiments except those of uncertainty analyses.
+
+        `description` is FMPy's description of the FMU.
+        """
         variables = {v.name: v for v in description.modelVariables}
         found: list[Experiment] = []
         for related in _children(self._xml(self._manifest, "fmiReferences"), "Related"):
@@ -147,7 +150,7 @@ class ReferenceResults:
         def check_column(name: str) -> None:
             variable = _variable(place, name, variables)
             if variable.type in _NON_NUMERIC or getattr(variable, "dimensions", None):
-                raise place.error(f"column {shown(name)}: the variable is no single number")
+                raise place.error(f"column {shown(name)}: the variable is not a single number")
 
         return series(self._text(place), place.error, check_column)
 

@@ -1,4 +1,4 @@
-"""Write the experiments and expected results that the FMU contains by the layered standard FMI-LS-REF.
+"""Write the experiments and the expected results in an FMU. Their format is the layered standard FMI-LS-REF.
 
 The experiments are steps of each axis from rest, with and without the vehicle's tuning, at the commands of the
 published tables if the vehicle has them; and a manoeuvre of all axes. The expected results are computed in plain
@@ -35,7 +35,8 @@ _STEPS = 10
 _LONGEST_TAU = 10.0
 """The longest Tau that an experiment uses (s)."""
 _HORIZON = 40.0
-"""The longest experiment in time constants; a vehicle turns by as many radians at most. Half of it with an attitude."""
+"""The longest experiment, in time constants. In this time a vehicle turns by at most as many radians. With an attitude,
+half of this number is used."""
 _COUPLING_FACTOR = 4.0
 """The weight of the coupling in `_horizon`: small differences grow in coupled motion, so experiments are shorter."""
 _NEGLIGIBLE = 1e-8
@@ -129,7 +130,8 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
                 times = [time_units[name] * n for n in _MULTIPLES]
                 trajectory = _trajectory(rov, [(inputs, times)])
                 files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
-                files[references] = _csv(_moving(trajectory, rov.layout.velocities | _place(rov.layout)))
+                pose = _pose_without_quaternion(rov.layout)
+                files[references] = _csv(_moving(trajectory, rov.layout.velocities | pose))
                 yield ExperimentFiles(
                     experiment,
                     _description(rov, axis, percent, name if len(sets) > 1 else "", table, row),
@@ -155,7 +157,10 @@ def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
 
 
 def _horizon(rov: Rov, inputs: Values) -> float:
-    """Return up to _HORIZON times the shortest time constant, but at most the time of a turn by as many radians (s).
+    """Return the longest time of an experiment, s.
+
+    It is _HORIZON times the shortest time constant, or the time in which the vehicle turns by _HORIZON radians if that
+    is less.
 
     The time constant of a restoring force is that of the oscillation that follows from it.
     """
@@ -187,7 +192,7 @@ def _swings(rov: Rov) -> list[float]:
 def _coupling_rate(rov: Rov, inputs: Values) -> float:
     """Return how fast axes of a vehicle with an attitude change each other's velocities near the steady ones (1/s).
 
-    Velocities are divided by the roots of their effective masses, as in the kinetic energy, to compare all axes.
+    Velocities are multiplied by the roots of their effective masses, as in the kinetic energy, to compare all axes.
     """
     root, size = {}, {}
     for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
@@ -256,7 +261,8 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
     held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
     trajectory = _trajectory(rov, held)
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
-    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.velocities | _place(layout) | layout.lagging))
+    compared = layout.velocities | _pose_without_quaternion(layout) | layout.lagging
+    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, compared))
     yield ExperimentFiles(
         "manoeuvre",
         "All axes at once, with loads, a current and reversals, then all off",
@@ -318,16 +324,16 @@ def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> l
     return found
 
 
-def _place(layout: Layout) -> dict[str, Declaration]:
+def _pose_without_quaternion(layout: Layout) -> dict[str, Declaration]:
     """Return the position, and the heading where it is a state.
 
-    A quaternion is left out: after more than half a turn, its sign depends on how the turn is divided into steps.
+    The quaternion is left out. After more than half a turn, its sign depends on the division of the turn into steps.
     """
     return {name: meta for name, meta in layout.pose.items() if name not in QUATERNION}
 
 
 def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[_Row]:
-    """Keep the variables that do not stay at zero except for rounding."""
+    """Keep the variables that move. The others are 0 except for rounding."""
     names = [
         name
         for name, meta in variables.items()

@@ -1,9 +1,9 @@
 """Declare every variable of the FMU once.
 
-modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
-derived from `variables`. Their order is: inputs, state, derivatives, thrust, commands that act after the dead time,
-coefficients, attitude at the start. The value reference of a variable is its place in this order: from 0 in FMI 2.0,
-from 1 in FMI 3.0.
+modelDescription.xml, the table VARIABLES in interface.h, the documentation and the registration with PythonFMU are
+derived from `variables`. The numbers REF_<name> in model.h come from `Layout.places`, which has the same order: inputs,
+states, derivatives, calculated variables, commands that act after the dead time, coefficients, attitude at the start.
+The value reference of a variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
 from collections import Counter
@@ -44,7 +44,7 @@ _BASE = {
 }
 """The exponents of the FMI base units in each symbol of a unit."""
 _SIZES = {"us": 1e-6}
-"""The sizes of the units that are no SI units."""
+"""The sizes of the units that are not SI units."""
 _DISPLAYS = {
     "1": ("%", 100.0),
     "rad": ("deg", degrees(1.0)),
@@ -96,7 +96,7 @@ class Variable:
         return self.value_reference + 1
 
     def reference(self, fmi: int) -> int:
-        """Return the value reference in a version of FMI. In 3.0 it is the index, as OMSimulator confuses the two."""
+        """Return the value reference in a version of FMI. In 3.0 it is the index, because OMSimulator needs it."""
         return self.value_reference if fmi == 2 else self.index
 
     @property
@@ -140,7 +140,7 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
 
 
 def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[str, str]) -> Declaration:
-    """Describe a horizontal velocity over ground by its terms. ψ is 0 without yaw."""
+    """Describe a horizontal velocity over ground by its terms. Without yaw, ψ is 0."""
     turns = layout.has(YAW)
     words = [
         term if turns else f"+ {v}" for v, term in terms.items() if v in layout.velocities and (turns or "cos" in term)
@@ -202,12 +202,14 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
         )
     for name, meta in layout.initial.items():
         add(name, meta, "parameter", "fixed", initial="exact", start=0.0)
+    places = {v.name: v.value_reference for v in result if v.derivative_of is None}
+    assert places == layout.places, "the C code has another order of the variables"
     return tuple(result)
 
 
 LOG_CATEGORIES = {
     "logEvents": "Changes of mode: initialization, event mode, reset, termination",
-    "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
+    "logStatusWarning": "A command that saturates, or a call that the standard does not allow; each is logged once",
     "logStatusDiscard": "A refused value, of a variable or of a solver's state: not finite, or outside min ... max",
     "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
     "logAll": "All of these categories at once",
@@ -216,11 +218,12 @@ LOG_CATEGORIES = {
 
 
 def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str:
-    """Return interface.h: the variables as the FMI layer needs them, and the functions' names in a static library."""
+    """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
+    declared = variables(rov)
     return render(
         "interface.h.j2",
-        variables=variables(rov),
-        first_reference=variables(rov)[0].reference(fmi),
+        variables=declared,
+        first_reference=declared[0].reference(fmi),
         identifier=identifier,
         token=token,
         fmi=fmi,

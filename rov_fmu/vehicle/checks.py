@@ -1,4 +1,4 @@
-"""Checks whether the tables of a vehicle file describe a vehicle; each mistake gives one line."""
+"""Checks that the tables of a vehicle file describe a possible vehicle. Each mistake gives one line."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import sin
@@ -44,7 +44,7 @@ _TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "es
 def readable_parts(
     data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object], model: type[_Model]
 ) -> tuple[_Model, set[str]]:
-    """Return the file without the tables that have a mistake of form, and the names of its top tables that have one."""
+    """Return the file without the tables that could not be read, and the names of the top-level tables among these."""
     parts: dict[str, Any] = dict(data)
     wrong: dict[str, set[int | str | None]] = {}
     for place in (problem["loc"] for problem in problems):
@@ -62,7 +62,10 @@ def readable_parts(
 
 
 def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
-    """Yield a line for each mistake. A check that needs one of the `lost` tables, which have a mistake, is left out."""
+    """Yield a line for each mistake.
+
+    `lost` are the tables that could not be read. Checks that need one of them are left out.
+    """
     wrong_names = [*_check_names(parts, lost, data)]
     yield from wrong_names
     yield from _check_keys(parts)
@@ -182,7 +185,7 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
         given = given_quantities(curve, CURVE)
         place, key = f"curves.{name}", "table" if curve.table else "tables" if curve.tables else None
         if curve.table and curve.tables:
-            yield key_line(f"{place}.tables", "must not stand beside table")
+            yield key_line(f"{place}.tables", "must not be given together with table")
         if key:
             replaced = (
                 "a_t",
@@ -194,7 +197,9 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
                 *(("V_0", "n_V") if curve.tables else ()),
             )
             yield from (
-                key_line(f"{place}.{other}", f"must not stand beside {key}") for other in replaced if other in given
+                key_line(f"{place}.{other}", f"must not be given together with {key}")
+                for other in replaced
+                if other in given
             )
         else:
             yield from (
@@ -303,7 +308,7 @@ def _check_needed_keys(
 
 
 _WITHOUT_TILTING = {"W": HEAVE, "B": HEAVE, "x_G": YAW, "y_G": YAW}
-"""The axes in which some keys of RESTORING act without roll and pitch."""
+"""For some keys of RESTORING, the axis in which they act even without roll and pitch."""
 
 
 def _users(key: str) -> str:
@@ -355,7 +360,9 @@ def _check_arm(parts: Parts, layout: Layout) -> Iterator[str]:
     if layout.has_arm and parts.arm and parts.arm.R and parts.arm.gamma:
         for name, factor in (("R", parts.arm.R.value), ("gamma", sin(parts.arm.gamma.value))):
             if factor == 0.0:
-                yield key_line(f"arm.{name}.value", "must be more than 0, or the arm R sin γ is none", factor)
+                yield key_line(
+                    f"arm.{name}.value", "must be more than 0, because otherwise the arm R sin γ is 0", factor
+                )
 
 
 def _check_coupling(parts: Parts, layout: Layout) -> Iterator[str]:
@@ -383,7 +390,7 @@ def _check_estimates(rows: Mapping[str, Estimated], quantities: Mapping[str, Qua
             hint = did_you_mean(name, quantities)
             mistakes.append(key_line(key, f"there is no such coefficient of this vehicle{hint}"))
         elif not (quantity and quantity.interval):
-            mistakes.append(key_line(key, f"{name} has no interval, so it is no estimate"))
+            mistakes.append(key_line(key, f"{name} has no interval, so it is not an estimate"))
         for other, value in row.correlation.items():
             if reason := _wrong_correlation(name, other, rows):
                 mistakes.append(key_line(f"{key}.correlation.{other}", reason, value))

@@ -16,7 +16,9 @@ from rov_fmu.vehicle.schema import where
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
-"""Thrusters can drive two axes only together if the sine of the angle between the axes' rows of effects is smaller."""
+"""The least sine of an angle that is not a rounding error.
+
+It decides whether the thrusters can drive two axes separately, and whether a thruster pushes sideways."""
 
 
 def check_layout(layout: Layout) -> Iterator[str]:
@@ -36,7 +38,7 @@ def check_thruster_places(layout: Layout) -> Iterator[str]:
     for thruster in layout.thrusters:
         key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
         if thruster.arm and thruster.position:
-            yield key_line(f"{key}.arm", "must not stand beside position")
+            yield key_line(f"{key}.arm", "must not be given together with position")
         elif thruster.arm and x <= 0.0:
             yield key_line(f"{key}.arm", "must be of a thruster that pushes ahead; give its position instead")
         elif thruster.arm and thruster.curve in losing:
@@ -169,7 +171,10 @@ def doubts(rov: Rov) -> Iterator[str]:
 
 
 def _doubts_of_damping(rov: Rov) -> Iterator[str]:
-    """Doubt a linear damping that adds energy to some motions: its symmetric part has a negative eigenvalue."""
+    """Yield a line if the linear damping adds energy to some motions.
+
+    Its symmetric part then has a negative eigenvalue.
+    """
     cross = {(a, b): rov[cross_name("b_d", a, b)] for key, a, b, *_ in rov.layout.cross if key == "b_d"}
     if not cross:
         return
@@ -197,7 +202,7 @@ def _doubts_of_damping(rov: Rov) -> Iterator[str]:
 
 
 def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
-    """Doubt a battery whose voltage is far above that at which a curve was measured."""
+    """Yield a line if the voltage of the battery is far above that at which a curve was measured."""
     voltage = rov.layout.voltage or 0.0
     for curve in rov.layout.curves:
         if "V_0" in curve.keys and voltage > _FAR_ABOVE * (V_0 := rov[curve.coefficient("V_0")]):
@@ -207,7 +212,7 @@ def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
 
 
 def _doubts_of_weight(rov: Rov) -> Iterator[str]:
-    """Doubt a weight that does not fit the mass, and a buoyancy that turns the vehicle upside down."""
+    """Yield a line if the weight does not fit the mass, and one if the buoyancy turns the vehicle upside down."""
     k = rov.coefficients
     if "W" not in k:
         return

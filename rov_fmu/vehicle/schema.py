@@ -55,7 +55,7 @@ NOT_GIVEN = "not given"
 MOST = 32
 """The largest number of thrusters, curves or inputs."""
 _MOST_COEFFICIENTS = 1000
-"""The largest number of coefficients in a table; it exceeds that of the largest vehicle."""
+"""The largest number of coefficients in a table. The largest possible vehicle has fewer."""
 
 
 def _coefficients(
@@ -283,7 +283,7 @@ OpenAxes = table_of("_OpenAxes", Strict, _open_axes, Axes.__doc__)
 
 
 _FARTHEST = 100.0
-"""The largest coordinate of a thruster from the centre of mass, in m."""
+"""The largest coordinate of a position, m."""
 
 
 def _vector(vector: object) -> object:
@@ -484,7 +484,7 @@ class Hardware(Strict):
         return bool(self.commands and self.commands.T_d)
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
-        """Return what these tables give for each coefficient of a vehicle; None where they do not give it."""
+        """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
         found: dict[str, Quantity | None] = {}
         fins = {fin.name: fin for fin in self.fin}
         for name, (first, *keys) in where(of):
@@ -543,7 +543,7 @@ class File(Parts):
 
 
 def where(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the name of each coefficient in the FMU, and its place in the vehicle file: the tables and the key."""
+    """Yield the name of each coefficient in the FMU, and its tables and its key in the vehicle file."""
     yield from ((key, ("body", key)) for key in (*BODY, *RESTORING) if key in of.coefficients)
     yield from ((key, ("arm", key)) for key in ARM if key in of.coefficients)
     yield from ((key, ("commands", key)) for key in COMMANDS if key in of.coefficients)

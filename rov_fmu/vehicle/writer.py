@@ -21,13 +21,16 @@ from rov_fmu.vehicle.thrust_table import CurrentTable
 from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
 
 _DECIMALS = 6
-"""The decimals of a correlation, which is close to 1 if the tests hardly separate two coefficients."""
+"""The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
 _DIGITS = 6
 """The significant digits of a number: more than any tank test gives, but few enough to be equal on every machine."""
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
-    """Return the text of a vehicle file in a folder. Raises ValueError if it cannot name a folder or a report."""
+    """Return the text of a vehicle file in a folder.
+
+    Raises ValueError if a file or folder of the vehicle is outside the folder, so that the vehicle file cannot name it.
+    """
     document = tomlkit.document()
     if made := vehicle.provenance:
         comment = f"Made from {made.data}: [provenance] tells how, and `interval` is 95 % confidence."
@@ -152,9 +155,10 @@ def write_vehicle(vehicle: Vehicle, path: Path) -> None:
 
 
 def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str) -> None:
-    """Write a copy of the vehicle file `source` with other values of some coefficients. Raises as write_vehicle does.
+    """Write a copy of the vehicle file `source` with other values of some coefficients.
 
-    `reason` becomes the source of the coefficients that change. Everything else in the file stays as it is.
+    `reason` becomes the source of the coefficients that change. Everything else in the file stays as it is. Raises
+    VehicleFileError or OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
     places = dict(where(vehicle.layout))
