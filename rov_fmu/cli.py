@@ -349,7 +349,7 @@ def _warn(message: str) -> None:
 )
 def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.fmu.module import module
+    from rov_fmu.fmu.module import web_module
     from rov_fmu.io.output import Output
     from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page
@@ -361,7 +361,7 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
         check_targets([output], [*paths, *(file for one in loaded for file in one.files)])
         check_written(output, PAGE)
     page = fly_page(
-        [Flown(one, module(one.rov), name) for one, name in zip(loaded, _short_names(paths), strict=True)]
+        [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, _short_names(paths), strict=True)]
     ).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))

@@ -101,7 +101,7 @@ static int delayed_step(const double at[], const model_numbers *n, const delay_l
             }
             memcpy(now + FIRST_DELAYED, arrived < kept ? line->commands[arrived] : at, sizeof line->commands[0]);
         }
-        const int more = model_step(now, n, until - passed, next, heading);
+        const int more = motion_step(now, n, until - passed, next, heading);
         if (more == 0) {
             return 0;
         }

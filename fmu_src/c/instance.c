@@ -262,7 +262,7 @@ static outcome set_states(fmu *f, const double x[], size_t n)
                     f->now.values[FIRST_STATE + i]);
         }
     }
-    if (!model_has_attitude(x)) {
+    if (!model_has_direction(x)) {
         DISCARD(f, "the quaternion is 0, which has no direction; the states are not changed.");
     }
     memcpy(&f->now.values[FIRST_STATE], x, N_STATES * sizeof x[0]);

@@ -274,7 +274,7 @@ static bool motion_coasts(motion *m, double rest, double *heading)
 
 /* Compute the states after h > 0 seconds with the inputs held. They are finite unless a result overflows. Return the
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
-static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
+static int motion_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
 {
     const double *const state = at + FIRST_STATE;
     double done = 0.0, lost = 0.0; /* the length of all pieces so far, and its rounding error */
@@ -371,7 +371,7 @@ static inline int delayed_step(const double at[], const model_numbers *n, const 
                                double next[N_STATES], double *heading)
 {
     (void)line, (void)t;
-    return model_step(at, n, h, next, heading);
+    return motion_step(at, n, h, next, heading);
 }
 
 static inline void delay_commit(const double at[], const delay_line *line, double t, double h)

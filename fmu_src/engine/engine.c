@@ -33,7 +33,7 @@ static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
 static void begin(double at[], const model_numbers *numbers, double *heading)
 {
     double state[N_STATES];
-    const bool is_given = HAS_ATTITUDE && model_has_attitude(at + FIRST_STATE);
+    const bool is_given = HAS_ATTITUDE && model_has_direction(at + FIRST_STATE);
     memcpy(state, at + FIRST_STATE, sizeof state);
     model_begin(at, heading);
     if (is_given) {

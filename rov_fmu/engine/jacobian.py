@@ -78,12 +78,12 @@ class _Formulas:
         changing = [*layout.inputs, *layout.state, *layout.delayed, *coefficients]
         given = {name: f"d_{name}" for name in changing}
         formulas = {**equation.program, **equation.forces, **self.table.coefficient_formulas}
-        self.hold, self.held = _with_tangents(formulas, given, equation)
+        self.held_formulas, self.held = _with_tangents(formulas, given, equation)
         lagging = {force: after for force, (_, after) in equation.lagging.items()}
         progress = {name: f"d_{name}" for name in equation.lags}
-        self.arrive, _ = _with_tangents(lagging, {**self.held, **given, **progress}, equation)
+        self.lag_formulas, _ = _with_tangents(lagging, {**self.held, **given, **progress}, equation)
         moved = {name: f"d_{name}" for name in equation.states}
-        self.finish, self.finished = _with_tangents(equation.ends, {**given, **moved}, equation)
+        self.end_formulas, self.finished = _with_tangents(equation.ends, {**given, **moved}, equation)
         pairs = self.table.products
         self.first = np.array([pair[0] for pair in pairs], int)
         self.second = np.array([pair[1] for pair in pairs], int)
@@ -139,7 +139,7 @@ class _Tangents(Motion):
         """The derivatives of the states of the table (states of the table x directions)."""
 
     def _at(self, more: Mapping[str, float]) -> dict[str, object]:
-        return self.formulas.hold({**self.values, **more, **self.changes})
+        return self.formulas.held_formulas({**self.values, **more, **self.changes})
 
     def _change(self, found: Mapping[str, object], name: str) -> Array:
         return np.asarray(found.get(f"d_{name}", self.changes.get(f"d_{name}", self.zero)), float)
@@ -210,7 +210,7 @@ class _Tangents(Motion):
         values = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
         changes = {f"d_{name}": self.d[self.table.place[name]] for name in values}
         steady = self._at({})
-        found = self.formulas.arrive({**steady, **values, **changes})
+        found = self.formulas.lag_formulas({**steady, **values, **changes})
         self.changes |= {f"d_{force}": self._change(found, force) for force in self.table.equation.lagging}
         for name in values:
             self.d[states.index(name)] = 0.0
@@ -229,7 +229,7 @@ class _Tangents(Motion):
             moved = {name: self.y[n] for name, n in place.items()} | {
                 f"d_{name}": self.d[n] for name, n in place.items()
             }
-            found = self.formulas.finish({**self.start, **starts, **moved})
+            found = self.formulas.end_formulas({**self.start, **starts, **moved})
             rows |= {name: self._change(found, f"next_{name}") for name in QUATERNION}
         end = self.end()
         return {name: end[name] for name in layout.state}, np.array([rows[name] for name in layout.state])

@@ -31,7 +31,7 @@ def load_library(rov: Rov) -> ctypes.CDLL:
     layout = repr(rov.layout)
     with _LOADING:
         if layout not in _LOADED:
-            texts = {**sources(rov), ENGINE_FILE.name: ENGINE_FILE.read_text(encoding="utf-8")}
+            texts = {**sources(rov.layout), ENGINE_FILE.name: ENGINE_FILE.read_text(encoding="utf-8")}
             try:
                 _LOADED[layout] = _load(texts)
             except OSError as error:

@@ -9,16 +9,15 @@ from rov_fmu.model.attitude import QUATERNION, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.formula import names, tangent, to_c
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 
 
 class EquationSource:
-    """The parts of model.h and equation.h in C. `variables` are the names of the variables in the array `at`."""
+    """The parts of model.h and equation.h in C."""
 
-    def __init__(self, layout: Layout, variables: Iterable[str]) -> None:
+    def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self.equation: Equation = equation_of(layout)
-        self.variables = frozenset(variables)
+        self.variables = frozenset(layout.places)
 
     # ---- Names ----
 
@@ -41,7 +40,7 @@ class EquationSource:
         equation = self.equation
         later = [*equation.forces.values(), *equation.outputs.values()]
         later += [formula for both in equation.lagging.values() for formula in both]
-        used = {name for formula in later for name in names(formula)} | {*self.layout.thrust}
+        used = {name for formula in later for name in names(formula)} | {*self.layout.calculated}
         lasting = [name for name in equation.thrust if name in used]
         return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
 
@@ -103,7 +102,7 @@ class EquationSource:
     def turning(self) -> list[str]:
         """Return the entries of the rotation matrix that still change while all velocities are steady."""
         kinematic = self.equation.components[self.dynamic() :]
-        rotating = {name for group in kinematic for name in group} & {*self.equation.heading}
+        rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
         return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
 
     def first_rotation(self) -> str:
@@ -112,9 +111,9 @@ class EquationSource:
 
     def _turns(self, name: str) -> bool:
         """Return True when the rate of a state depends on the heading."""
-        return "cos_psi" in self.equation.inputs_of[name] or "sin_psi" in self.equation.inputs_of[name]
+        return "cos_psi" in self.equation.states_in_rate[name] or "sin_psi" in self.equation.states_in_rate[name]
 
-    def group(self, name: str) -> str:
+    def size_group(self, name: str) -> str:
         """Return the first state of the group of a state. The sizes of a group are added.
 
         Without an attitude, the groups of several states are the cosine and the sine of the heading, and the horizontal
@@ -135,7 +134,7 @@ class EquationSource:
         lines = []
         ends = self.equation.ends
         known = {name: f"state[REF_{name} - FIRST_STATE]" for name in self.layout.state} | {name: name for name in ends}
-        known |= {name: f"y[Y_{name}]" for name in self.equation.states if name in self.equation.heading}
+        known |= {name: f"y[Y_{name}]" for name in self.equation.states if name in self.equation.orientation}
         for name, formula in ends.items():
             lines.append(f"const double {name} = {to_c(formula, lambda n: known[n])};")
         for name in self.layout.state:
@@ -242,7 +241,7 @@ class EquationSource:
 
     def _inputs(self, group: Sequence[str]) -> set[str]:
         """Return the states outside a group that the rates of its states depend on."""
-        return {other for name in group for other in self.equation.inputs_of[name]} - set(group)
+        return {other for name in group for other in self.equation.states_in_rate[name]} - set(group)
 
     def input_bits(self, group: Sequence[str]) -> int:
         """Return one bit for each other component that a component depends on."""
@@ -254,7 +253,7 @@ class EquationSource:
         While all these states are 0, the component acts on nothing. All bits are set when it may always act.
         """
         always, partners = 2**32 - 1, 0
-        needed = {*self.equation.monitored, *(self.equation.heading if self.layout.has_attitude else ())}
+        needed = {*self.equation.monitored, *(self.equation.orientation if self.layout.has_attitude else ())}
         if self.equation.used.isdisjoint(group) or not needed.isdisjoint(group):
             return always
         for name in set(self.equation.states) - set(group):
@@ -285,17 +284,17 @@ class EquationSource:
 
     def _results(self, formulas: Mapping[str, str]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
-        heading = self.equation.heading
-        needed = _needed(heading, {name for formula in formulas.values() for name in names(formula)})
-        lines = [f"const double {name} = {self._c(heading[name], heading)};" for name in needed]
-        return lines + [f"{place} = {self._c(formula, heading)};" for place, formula in formulas.items()]
+        orientation = self.equation.orientation
+        needed = _needed(orientation, {name for formula in formulas.values() for name in names(formula)})
+        lines = [f"const double {name} = {self._c(orientation[name], orientation)};" for name in needed]
+        return lines + [f"{place} = {self._c(formula, orientation)};" for place, formula in formulas.items()]
 
     def beginning(self) -> list[str]:
         """Return statements for the start.
 
         They set the delayed commands to their start values, and compute the attitude from its parameters.
         """
-        lines = [f"at[REF_{name}] = {meta.start!r};" for name, meta in self.layout.delayed.items()]
+        lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
         local: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
             text = self._c(formula, local)
@@ -331,7 +330,7 @@ class EquationSource:
         Before, d has the changes of all other variables.
         """
         equation = self.equation
-        given = self.variables - {*self.layout.thrust}
+        given = self.variables - {*self.layout.calculated}
         text = {name: f"at[REF_{name}]" for name in given}
         text |= {f"d_{name}": f"d[REF_{name}]" for name in given}
         steps: dict[str, str] = {}
@@ -343,7 +342,7 @@ class EquationSource:
             steps[name] = formula
             if change := tangent(formula, change_of):
                 steps[f"d_{name}"] = change
-        results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.thrust if f"d_{name}" in steps}
+        results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.calculated if f"d_{name}" in steps}
         for name in self.layout.state:
             results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
         needed = _needed(steps, {name for formula in results.values() for name in names(formula)})
@@ -363,12 +362,12 @@ def _needed(formulas: Mapping[str, str], wanted: Iterable[str]) -> list[str]:
 
 def generated_sources(layout: Layout) -> dict[str, str]:
     """Return the generated files of a vehicle, model.h and equation.h, by their names."""
-    source = EquationSource(layout, layout.places)
+    source = EquationSource(layout)
     formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
     sizes = {
         "inputs": len(layout.inputs),
         "states": len(layout.state),
-        "thrust": len(layout.thrust) + len(layout.delayed),
+        "others": len(layout.calculated) + len(layout.delayed),
         "commands": len(layout.commands),
         "parameters": len(layout.coefficients) + len(layout.initial),
     }
@@ -381,9 +380,9 @@ def unused_sources(layout: Layout) -> list[str]:
     return [*([] if layout.has_attitude else ["heading.c"]), *([] if layout.has_dead_time else ["delay.c"])]
 
 
-def sources(rov: Rov) -> dict[str, str]:
+def sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    unused = unused_sources(rov.layout)
+    unused = unused_sources(layout)
     names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused]
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in names}
-    return generated_sources(rov.layout) | shared
+    return generated_sources(layout) | shared

@@ -33,13 +33,13 @@ class Stepper:
         places, states = rov.layout.places, [*rov.layout.state]
         rates = {f"der({name})": places[name] + len(states) for name in states}
         self._numbers = np.zeros(len(places) + len(states))
-        memory = [f"{name}_0" for name in rov.layout.memory]  # the heading of a vehicle with an attitude
+        memory = [f"{name}_0" for name in rov.layout.continued]  # the heading of a vehicle with an attitude
         tables = np.zeros(len(self._numbers), TABLE)
         tables["at"] = self._numbers.ctypes.data + self._numbers.itemsize * np.arange(len(self._numbers))
         for name, value in {**rov.coefficients, **rov.layout.usual_inputs, **start}.items():
             if name in places:
                 self._numbers[places[name]] = value
-        kept = [*states, *rov.layout.memory]
+        kept = [*states, *rov.layout.continued]
         recorded = np.array([(places | rates)[name] for name in (*kept, *record)], np.intc)
         self._kept = np.array([places[name] for name in (*states, *memory)])
         self._inputs = {name: places[name] for name in rov.layout.inputs}

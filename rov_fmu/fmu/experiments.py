@@ -41,7 +41,7 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _Member:
     """A file in the FMU."""
 
     fmu: Path
@@ -50,7 +50,7 @@ class _Place:
     def error(self, reason: str) -> FileError:
         return FileError(f"{self.fmu}: {self.member}: {reason}")
 
-    def resolve(self, source: str | None) -> "_Place":
+    def resolve(self, source: str | None) -> "_Member":
         """Return the file to which a relative URI in this file leads."""
         try:
             parts = urlsplit(source or "")
@@ -58,15 +58,17 @@ class _Place:
             parts = urlsplit("")
         if not parts.path or parts.scheme or parts.netloc or parts.path.startswith("/"):
             raise self.error(f"source = {shown(source)} does not lead to a file in the FMU")
-        return _Place(self.fmu, posixpath.normpath(posixpath.join(posixpath.dirname(self.member), unquote(parts.path))))
+        return _Member(
+            self.fmu, posixpath.normpath(posixpath.join(posixpath.dirname(self.member), unquote(parts.path)))
+        )
 
 
 class ReferenceResults:
     """The reference results in an FMU that can be unpacked. All methods raise FileError."""
 
     def __init__(self, fmu: Path) -> None:
-        self._manifest = _Place(fmu, MANIFEST)
-        self._description = _Place(fmu, "modelDescription.xml")
+        self._manifest = _Member(fmu, MANIFEST)
+        self._description = _Member(fmu, "modelDescription.xml")
         try:
             self._archive = zipfile.ZipFile(fmu)
         except FileNotFoundError as error:
@@ -92,7 +94,7 @@ class ReferenceResults:
             raise self._manifest.error("names no experiment with expected results")
         return found
 
-    def _read(self, place: _Place, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
+    def _read(self, place: _Member, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
         """Read a file of experiments."""
         for element in _children(self._xml(place, "Experiments"), "Experiment"):
             name = element.get("name", "")
@@ -129,7 +131,7 @@ class ReferenceResults:
             references = self._series(files["References"], variables) if "References" in files else None
             yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references)
 
-    def _parameters(self, place: _Place, variables: Mapping[str, Any]) -> dict[str, str]:
+    def _parameters(self, place: _Member, variables: Mapping[str, Any]) -> dict[str, str]:
         """Read a parameter set in the format of SSP, and return its values as text by name."""
         found = {}
         for element in self._xml(place, "ParameterSet").iter("{*}Parameter"):
@@ -144,7 +146,7 @@ class ReferenceResults:
                 number(found[name], f"parameter {shown(name)}", place.error)
         return found
 
-    def _series(self, place: _Place, variables: Mapping[str, Any]) -> Series:
+    def _series(self, place: _Member, variables: Mapping[str, Any]) -> Series:
         """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
 
         def check_column(name: str) -> None:
@@ -154,7 +156,7 @@ class ReferenceResults:
 
         return series(self._text(place), place.error, check_column)
 
-    def _text(self, place: _Place) -> str:
+    def _text(self, place: _Member) -> str:
         try:
             return self._archive.read(place.member).decode("utf-8-sig")
         except KeyError:
@@ -162,7 +164,7 @@ class ReferenceResults:
         except UnicodeDecodeError as error:
             raise place.error(f"not UTF-8 text, at byte {error.start}") from error
 
-    def _xml(self, place: _Place, root: str) -> Any:
+    def _xml(self, place: _Member, root: str) -> Any:
         """Return the root element of an XML file, which must have the name `root`."""
         try:
             found = etree.fromstring(
@@ -179,7 +181,7 @@ def _children(element: Any, name: str) -> list[Any]:
     return element.findall(f"{{*}}{name}")  # type: ignore[no-any-return]
 
 
-def _variable(place: _Place, name: str, variables: Mapping[str, Any]) -> Any:
+def _variable(place: _Member, name: str, variables: Mapping[str, Any]) -> Any:
     if name not in variables:
         raise place.error(f"the FMU has no variable {shown(name)}")
     return variables[name]

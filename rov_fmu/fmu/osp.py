@@ -62,7 +62,9 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
 
 def osp_model_description(layout: Layout) -> bytes:
     """Return the XML document. Every input and output must be in exactly one group of `_groups`."""
-    unit_of = {name: meta.unit for name, meta in (layout.inputs | layout.state | layout.thrust).items()}
+    unit_of = {
+        name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()
+    }
     groups = []
     for name, candidates in _groups(layout):
         if members := {variable: axis for variable, axis in candidates.items() if variable in unit_of}:

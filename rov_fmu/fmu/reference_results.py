@@ -105,7 +105,7 @@ def _related(source: str, kind: str, role: str, description: str) -> dict[str, s
 
 
 def _tunable(rov: Rov) -> list[str]:
-    return [name for name, meta in rov.layout.coefficients.items() if meta.tunable]
+    return [name for name, declaration in rov.layout.coefficients.items() if declaration.tunable]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
@@ -166,7 +166,7 @@ def _horizon(rov: Rov, inputs: Values) -> float:
     """
     rates = _swings(rov)
     rates += [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
-    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+    for form, motion in zip(rov.layout.axes, rov.motions(inputs), strict=True):
         A, B = motion.drag(motion.C)
         turning = sqrt(abs(motion.C)) if form.axis.is_rotation else 0.0
         rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
@@ -195,7 +195,7 @@ def _coupling_rate(rov: Rov, inputs: Values) -> float:
     Velocities are multiplied by the roots of their effective masses, as in the kinetic energy, to compare all axes.
     """
     root, size = {}, {}
-    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+    for form, motion in zip(rov.layout.axes, rov.motions(inputs), strict=True):
         v, V = form.axis.velocity, motion.steady_velocity()
         root[v] = sqrt(rov.effective_inertia(form))
         size[v] = root[v] * abs(V) if isfinite(root[v] * V) else 0.0
@@ -253,8 +253,11 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
             for name, sign in layout.signs(axis).items():
                 fractions[name] = round(fractions[name] + shares[axis] * sign * vehicle.command_range[1], 6)
         commands = {name: layout.command_of(max(-1.0, min(1.0, x))) for name, x in fractions.items()}
-        others = {name: meta for name, meta in layout.inputs.items() if name not in commands}
-        phases.append(commands | {name: meta.start + 0.05 * load * meta.nominal for name, meta in others.items()})
+        others = {name: declaration for name, declaration in layout.inputs.items() if name not in commands}
+        phases.append(
+            commands
+            | {name: declaration.start + 0.05 * load * declaration.nominal for name, declaration in others.items()}
+        )
     length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
@@ -286,14 +289,14 @@ def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFil
     if not layout.has_attitude:
         return
     still = layout.usual_inputs
-    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, rov.axes(still), strict=True) if f.axis.is_rotation)
+    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, rov.motions(still), strict=True) if f.axis.is_rotation)
     length = float(f"{0.5 / max(0.5 / _PHASE, *loads, *_swings(rov)):.1g}")
     start = compiled(start_formulas())(_ATTITUDE)
     state = layout.at_rest | {name: start[name] for name in QUATERNION} | {"psi": _ATTITUDE["psi_0"]}
     rows = []
     for t in (0.0, 0.5 * length, length):
         after = rov.step(still, state, t) if t else state
-        rows.append((t, after | {name: rov.thrust(still, after)[name] for name in layout.angles}))
+        rows.append((t, after | {name: rov.calculated(still, after)[name] for name in layout.angles}))
     files["attitude.ssv"] = render(
         "parameters.ssv.j2", name="attitude", values={name: repr(angle) for name, angle in _ATTITUDE.items()}
     )
@@ -329,15 +332,15 @@ def _pose_without_quaternion(layout: Layout) -> dict[str, Declaration]:
 
     The quaternion is left out. After more than half a turn, its sign depends on the division of the turn into steps.
     """
-    return {name: meta for name, meta in layout.pose.items() if name not in QUATERNION}
+    return {name: declaration for name, declaration in layout.pose.items() if name not in QUATERNION}
 
 
 def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[_Row]:
     """Keep the variables that move. The others are 0 except for rounding."""
     names = [
         name
-        for name, meta in variables.items()
-        if max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * meta.nominal
+        for name, declaration in variables.items()
+        if max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * declaration.nominal
     ]
     return [(t, {name: values[name] for name in names}) for t, values in rows]
 

@@ -61,7 +61,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.layout = layout_of(declaration["layout"])
         inputs, states = len(self.layout.inputs), len(self.layout.state)
-        self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.thrust))
+        self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.calculated))
         self.place = {v["name"]: place for place, v in enumerate(self.declared)}
         self.begin = formula.compiled(attitude.start_formulas())
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
@@ -115,7 +115,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         """Return values, and calculate those that depend on others."""
         if any(map(self._is_calculated, references)):
             model, inputs, state = self._model()
-            rates, thrust = model.derivatives(inputs, state), model.thrust(inputs, state)
+            rates, thrust = model.derivatives(inputs, state), model.calculated(inputs, state)
             self.values[self.calculated] = [*rates.values(), *thrust.values()]
         return [self.values[reference] for reference in references]
 
@@ -171,7 +171,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         return (
             rov.Rov(self.layout, self._named(self.layout.coefficients)),
             self._named((*self.layout.inputs, *self.layout.delayed)),
-            self._named((*self.layout.state, *self.layout.memory)),
+            self._named((*self.layout.state, *self.layout.continued)),
         )
 
     def _get_fmu_state(self) -> dict[str, Any]:

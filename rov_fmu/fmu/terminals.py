@@ -38,7 +38,7 @@ def terminals(layout: Layout) -> list[Terminal]:
     battery = ("voltage",) if layout.voltage is not None else ()
     loads = tuple(form.axis.external for form in layout.axes)
     current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
-    thrust = tuple(name for name in layout.lagging | layout.thrust if name not in layout.angles)
+    thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     driven = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"

@@ -155,22 +155,26 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
     layout = rov.layout
     result: list[Variable] = []
 
-    def add(name: str, meta: Declaration, causality: str, variability: str, **rest: Any) -> None:
-        bounds = {end: x for end, x in (("minimum", meta.minimum), ("maximum", meta.maximum)) if isfinite(x)}
-        given = {"display_unit": unit_of(meta.unit).display, **bounds, **rest}
-        result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
+    def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
+        bounds = {
+            end: x for end, x in (("minimum", declaration.minimum), ("maximum", declaration.maximum)) if isfinite(x)
+        }
+        given = {"display_unit": unit_of(declaration.unit).display, **bounds, **rest}
+        result.append(
+            Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **given)
+        )
 
-    for name, meta in layout.inputs.items():
+    for name, declaration in layout.inputs.items():
         variability = "discrete" if layout.has_dead_time and name in layout.commands else "continuous"
-        add(name, meta, "input", variability, start=meta.start, nominal=meta.nominal)
-    for name, meta in layout.state.items():
+        add(name, declaration, "input", variability, start=declaration.start, nominal=declaration.nominal)
+    for name, declaration in layout.state.items():
         add(
             name,
-            meta,
+            declaration,
             "output",
             "continuous",
             **({"initial": "calculated"} if name in QUATERNION else {"initial": "exact", "start": 0.0}),
-            nominal=meta.nominal,
+            nominal=declaration.nominal,
             dependencies={name: "constant"},
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
@@ -184,24 +188,30 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             derivative_of=name,
             dependencies=dependencies[f"der({name})"],
         )
-    for name, meta in layout.thrust.items():
-        add(
-            name, meta, "output", "continuous", initial="calculated", display_unit=None, dependencies=dependencies[name]
-        )
-    for name, meta in layout.delayed.items():
-        add(name, meta, "local", "discrete", initial="calculated")
-    for name, meta in layout.coefficients.items():
+    for name, declaration in layout.calculated.items():
         add(
             name,
-            meta,
+            declaration,
+            "output",
+            "continuous",
+            initial="calculated",
+            display_unit=None,
+            dependencies=dependencies[name],
+        )
+    for name, declaration in layout.delayed.items():
+        add(name, declaration, "local", "discrete", initial="calculated")
+    for name, declaration in layout.coefficients.items():
+        add(
+            name,
+            declaration,
             "parameter",
-            "tunable" if meta.tunable else "fixed",
+            "tunable" if declaration.tunable else "fixed",
             initial="exact",
             start=rov[name],
-            display_unit=None if meta.unit == "1" else unit_of(meta.unit).display,
+            display_unit=None if declaration.unit == "1" else unit_of(declaration.unit).display,
         )
-    for name, meta in layout.initial.items():
-        add(name, meta, "parameter", "fixed", initial="exact", start=0.0)
+    for name, declaration in layout.initial.items():
+        add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)
     places = {v.name: v.value_reference for v in result if v.derivative_of is None}
     assert places == layout.places, "the C code has another order of the variables"
     return tuple(result)

@@ -54,7 +54,7 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
 
 
 def _calculated(layout: Layout) -> tuple[str, ...]:
-    return (*(f"der({name})" for name in layout.state), *layout.thrust)
+    return (*(f"der({name})" for name in layout.state), *layout.calculated)
 
 
 def _formulas(layout: Layout) -> dict[str, str]:
@@ -67,8 +67,8 @@ def _kinds(layout: Layout, formulas: Mapping[str, str]) -> dict[str, int]:
     """Return for each name its kind as a factor, which is an index of KINDS."""
     found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
     found |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
-    for name, meta in layout.coefficients.items():
-        found[name] = KINDS.index("tunable" if meta.tunable else "fixed")
+    for name, declaration in layout.coefficients.items():
+        found[name] = KINDS.index("tunable" if declaration.tunable else "fixed")
     for name, formula in formulas.items():
         found[name] = max((found[other] for other in names(formula)), default=0)
     return found

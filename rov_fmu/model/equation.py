@@ -110,7 +110,7 @@ class Equation:
         }
 
     @cached_property
-    def inputs_of(self) -> dict[str, frozenset[str]]:
+    def states_in_rate(self) -> dict[str, frozenset[str]]:
         """For each state, the states in its rate."""
         return {
             name: frozenset(factor for term in terms for factor in term.factors) for name, terms in self.rows.items()
@@ -122,7 +122,7 @@ class Equation:
 
         In `rows`, the used states must come first, because the C code knows only their number.
         """
-        return frozenset(self.heading.keys() & self.rows.keys()).union(*self.inputs_of.values())
+        return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
 
     @cached_property
     def components(self) -> tuple[tuple[str, ...], ...]:
@@ -130,7 +130,7 @@ class Equation:
 
         The groups that may settle come before the kinematic ones.
         """
-        reach = {name: set(inputs) for name, inputs in self.inputs_of.items()}
+        reach = {name: set(inputs) for name, inputs in self.states_in_rate.items()}
         for middle in self.states:
             for name in self.states:
                 if middle in reach[name]:
@@ -146,19 +146,19 @@ class Equation:
             following = next(g for g in groups if all(reach[name] <= placed | set(g) for name in g))
             done.append(following)
             groups.remove(following)
-        settling = self.used - self.heading.keys()
+        settling = self.used - self.orientation.keys()
         settling = settling.union(*(reach[name] for name in settling))
         return tuple(sorted(done, key=settling.isdisjoint))
 
     @cached_property
     def dynamic(self) -> tuple[tuple[str, ...], ...]:
         """The components that may settle. The others are kinematic: only the heading and integrals."""
-        settling = self.used - self.heading.keys()
+        settling = self.used - self.orientation.keys()
         last = max(n for n, group in enumerate(self.components) if not settling.isdisjoint(group))
         return self.components[: last + 1]
 
     @cached_property
-    def heading(self) -> dict[str, str]:
+    def orientation(self) -> dict[str, str]:
         """Formulas for the orientation in the table.
 
         It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
@@ -171,7 +171,7 @@ class Equation:
         directed = {name: d.formula for name, d in self.directed.items()}
         by_lag = {term.coefficient for terms in self.rows.values() for term in terms if self._is_lag(term)}
         forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
-        return {**self.parameters, **directed, **self.heading, **self.thrust, **forces}
+        return {**self.parameters, **directed, **self.orientation, **self.thrust, **forces}
 
     @cached_property
     def rates(self) -> dict[str, str]:
@@ -266,8 +266,8 @@ def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, For
             sums.setdefault("_".join((force.effect, axis, *others)), []).append(force)
     found = {}
     for name, forces in sums.items():
-        forward = joined(_times(inverse[force.axis], force.coefficient) for force in forces)
-        reverse = joined(_times(inverse[force.axis], force.reverse or force.coefficient) for force in forces)
+        forward = joined(_acceleration(inverse[force.axis], force.coefficient) for force in forces)
+        reverse = joined(_acceleration(inverse[force.axis], force.reverse or force.coefficient) for force in forces)
         found[name] = replace(forces[0], axis=axis, coefficient=forward, reverse=reverse)
     return found
 
@@ -275,7 +275,7 @@ def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, For
 _DRAG = ("linear", "quadratic")
 
 
-def _times(inverse: str, coefficient: str) -> str:
+def _acceleration(inverse: str, coefficient: str) -> str:
     """Write an acceleration: an acceleration per load times a load, which may begin with a minus."""
     sign = "-" if coefficient.startswith("-") else ""
     return f"{sign}{inverse} * {coefficient.removeprefix('-')}"

@@ -207,17 +207,17 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
         case ast.BinOp(left=left, op=ast.Mult(), right=right):
             first, second = change(left), change(right)
             return _added(
-                None if first is None else _times(first, right),
+                None if first is None else _product(first, right),
                 ast.Add(),
-                None if second is None else _times(left, second),
+                None if second is None else _product(left, second),
             )
         case ast.BinOp(left=left, op=ast.Div(), right=right):
             above, below = change(left), change(right)
-            rest = None if below is None else _times(node, below)
+            rest = None if below is None else _product(node, below)
             total = _added(above, ast.Sub(), rest)
             return None if total is None else ast.BinOp(total, ast.Div(), right)
         case ast.IfExp():
-            return _chosen(node.test, change(node.body), change(node.orelse))
+            return _choice(node.test, change(node.body), change(node.orelse))
         case ast.Call(func=ast.Name(id=function), args=[argument]):
             inner = change(argument)
             if inner is None:
@@ -226,11 +226,11 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
                 is_negative = ast.Compare(argument, [ast.Lt()], [ast.Constant(0.0)])
                 return ast.IfExp(is_negative, _negative(inner), inner)
             if function == "sqrt":
-                return ast.BinOp(inner, ast.Div(), _times(ast.Constant(2.0), node))
+                return ast.BinOp(inner, ast.Div(), _product(ast.Constant(2.0), node))
             if function not in FUNCTIONS:
-                return _times(ast.Call(ast.Name(f"{SLOPE}{function}"), [argument], []), inner)
+                return _product(ast.Call(ast.Name(f"{SLOPE}{function}"), [argument], []), inner)
             slope = ast.Call(ast.Name("cos" if function == "sin" else "sin"), [argument], [])
-            return _times(slope if function == "sin" else _negative(slope), inner)
+            return _product(slope if function == "sin" else _negative(slope), inner)
         case ast.Call(func=ast.Name(id="pow"), args=[base, exponent]):  # the base is not negative
             first, second = change(base), change(exponent)
             less = ast.BinOp(exponent, ast.Sub(), ast.Constant(1.0))
@@ -241,18 +241,18 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
                 ast.Constant(0.0),
             )
             return _added(
-                None if first is None else _times(_times(exponent, power), first),
+                None if first is None else _product(_product(exponent, power), first),
                 ast.Add(),
-                None if second is None else _times(_times(node, logarithm), second),
+                None if second is None else _product(_product(node, logarithm), second),
             )
         case ast.Call(func=ast.Name(id="atan2"), args=[above, below]):
             first, second = change(above), change(below)
             total = _added(
-                None if first is None else _times(first, below),
+                None if first is None else _product(first, below),
                 ast.Sub(),
-                None if second is None else _times(second, above),
+                None if second is None else _product(second, above),
             )
-            square = ast.BinOp(_times(above, above), ast.Add(), _times(below, below))
+            square = ast.BinOp(_product(above, above), ast.Add(), _product(below, below))
             return None if total is None else ast.BinOp(total, ast.Div(), square)
     raise ValueError(f"{ast.unparse(node)}: a formula has no such part")
 
@@ -261,7 +261,7 @@ def _negative(node: ast.expr) -> ast.expr:
     return ast.UnaryOp(ast.USub(), node)
 
 
-def _times(left: ast.expr, right: ast.expr) -> ast.expr:
+def _product(left: ast.expr, right: ast.expr) -> ast.expr:
     return ast.BinOp(left, ast.Mult(), right)
 
 
@@ -271,7 +271,7 @@ def _added(left: ast.expr | None, operator: ast.operator, right: ast.expr | None
     return ast.BinOp(left, operator, right)
 
 
-def _chosen(test: ast.expr, body: ast.expr | None, otherwise: ast.expr | None) -> ast.expr | None:
+def _choice(test: ast.expr, body: ast.expr | None, otherwise: ast.expr | None) -> ast.expr | None:
     if body is None and otherwise is None:
         return None
     return ast.IfExp(test, body or ast.Constant(0.0), otherwise or ast.Constant(0.0))

@@ -143,7 +143,7 @@ def cross_declaration(key: str, *velocities: str) -> "Declaration":
     first, *others = (axes[velocity] for velocity in velocities)
     rotations = sum(axis.is_rotation for axis in (first, *others))
     lengths = ".".join(axis.position_unit for axis in others)
-    return CROSS[key].meta(
+    return CROSS[key].declaration(
         inertia=("kg", "kg.m", "kg.m2")[min(rotations, 2)],
         load=first.load,
         axis=first.name,
@@ -193,7 +193,7 @@ class CoefficientKind:
     needed: bool = True
     tunable: bool = False
 
-    def meta(self, **of: str) -> Declaration:
+    def declaration(self, **of: str) -> Declaration:
         """Return the declaration of this coefficient for one axis or curve. `of` has the texts for the fields."""
         words = self.words.format(**of)
         return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
@@ -519,8 +519,8 @@ class Layout:
         return self.coupled or self.has_attitude
 
     @cached_property
-    def memory(self) -> tuple[str, ...]:
-        """The variables that a step continues besides the states: the heading, which counts turns, of a quaternion."""
+    def continued(self) -> tuple[str, ...]:
+        """The variables that a step continues besides the states: with an attitude, the heading, which counts turns."""
         return ("psi",) if self.has_attitude else ()
 
     @cached_property
@@ -563,25 +563,27 @@ class Layout:
     def coefficients(self) -> dict[str, Declaration]:
         """The coefficients, in the order of the FMU's variables."""
         inertias = {form.axis.inertia for form in self.axes}
-        found = {name: kind.meta() for name, kind in BODY.items() if name in inertias}
-        found |= {key: RESTORING[key].meta() for key in self.restoring}
+        found = {name: kind.declaration() for name, kind in BODY.items() if name in inertias}
+        found |= {key: RESTORING[key].declaration() for key in self.restoring}
         if self.has_arm:
-            found |= {key: kind.meta() for key, kind in ARM.items()}
+            found |= {key: kind.declaration() for key, kind in ARM.items()}
         if self.has_dead_time:
-            found |= {key: kind.meta() for key, kind in COMMANDS.items()}
+            found |= {key: kind.declaration() for key, kind in COMMANDS.items()}
         for curve in self.curves:
             words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-            found |= {curve.coefficient(key): kind.meta(**words) for key, kind in CURVE.items() if key in curve.keys}
+            found |= {
+                curve.coefficient(key): kind.declaration(**words) for key, kind in CURVE.items() if key in curve.keys
+            }
         for fin in self.fins:
             fins = {"fin": fin.description or f"fin {fin.name}"}
             keys = (key for key in FIN if key != "drag" or fin.has_drag)
-            found |= {fin.coefficient(key): FIN[key].meta(**fins) for key in keys}
+            found |= {fin.coefficient(key): FIN[key].declaration(**fins) for key in keys}
         for form in self.axes:
-            metas = metas_of(form.axis)
-            found |= {form.coefficient(key): metas[key] for key in AXIS if key in form.keys}
+            declared = declarations_of(form.axis)
+            found |= {form.coefficient(key): declared[key] for key in AXIS if key in form.keys}
         for form in self.axes:
-            metas = metas_of(form.axis)
-            found |= {form.axis.coefficient(key): metas[key] for key in TUNING}
+            declared = declarations_of(form.axis)
+            found |= {form.axis.coefficient(key): declared[key] for key in TUNING}
         for key, *velocities in self.cross:
             found[cross_name(key, *velocities)] = cross_declaration(key, *velocities)
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
@@ -632,9 +634,9 @@ class Layout:
             return {}
         return {
             delayed_name(name): Declaration(
-                meta.unit, f"Command {name} that acts after the dead time", start=meta.start
+                declaration.unit, f"Command {name} that acts after the dead time", start=declaration.start
             )
-            for name, meta in self.commands.items()
+            for name, declaration in self.commands.items()
         }
 
     @cached_property
@@ -708,7 +710,7 @@ class Layout:
         return self.velocities | self.pose | self.lagging
 
     @cached_property
-    def thrust(self) -> dict[str, Declaration]:
+    def calculated(self) -> dict[str, Declaration]:
         """The calculated variables that are neither states nor rates.
 
         They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, and the Euler
@@ -756,7 +758,7 @@ class Layout:
         first = len(found) + len(self.state)
         return found | {
             name: first + place
-            for place, name in enumerate([*self.thrust, *self.delayed, *self.coefficients, *self.initial])
+            for place, name in enumerate([*self.calculated, *self.delayed, *self.coefficients, *self.initial])
         }
 
     @cached_property
@@ -766,7 +768,7 @@ class Layout:
         return tuple(curve for curve in self.curves if curve.name in driving)
 
 
-def metas_of(axis: Axis) -> dict[str, Declaration]:
+def declarations_of(axis: Axis) -> dict[str, Declaration]:
     """Return the declarations of all coefficients that an axis can have, by their keys."""
     drag, motion = map(cited, axis.equations)
     words = {
@@ -782,7 +784,7 @@ def metas_of(axis: Axis) -> dict[str, Declaration]:
         "positive": axis.positive,
         "negative": axis.negative,
     }
-    return {key: kind.meta(**words) for key, kind in (AXIS | TUNING).items()}
+    return {key: kind.declaration(**words) for key, kind in (AXIS | TUNING).items()}
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -109,10 +109,10 @@ class MassMatrix:
         found: dict[tuple[str, str], list[str]] = {}
         for other, inverse in self.inverse(axis).items():
             for pair, entries in self._products(other).items():
-                found.setdefault(pair, []).extend(sign + self._times(inverse, entry) for sign, entry in entries)
+                found.setdefault(pair, []).extend(sign + self._term(inverse, entry) for sign, entry in entries)
         return {pair: joined(parts) for pair, parts in sorted(found.items(), key=lambda item: _places(item[0]))}
 
-    def _times(self, inverse: str, entry: tuple[str, str]) -> str:
+    def _term(self, inverse: str, entry: tuple[str, str]) -> str:
         a, b = entry
         return f"{inverse} / gain_{a}" if a == b and self._is_alone(a) else f"{inverse} * mass_{a}{b}"
 

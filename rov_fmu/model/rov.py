@@ -104,15 +104,15 @@ class Rov:
             **{name: inputs[name] for name in self.layout.inputs},
             **self._acting(inputs),
             **{name: state[name] for name in self.layout.state},
-            **{name: state[name] for name in self.layout.memory if name in state},
+            **{name: state[name] for name in self.layout.continued if name in state},
         }
 
-    def thrust(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the values of `layout.thrust` by name: thrust, torque and Euler angles."""
+    def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
         found = self._formulas.calculate(self._values(inputs, state))
-        for name in self.layout.memory:
+        for name in self.layout.continued:
             found[name] = unwrapped(found[name], state.get(name, found[name]))
-        return {name: found[name] for name in self.layout.thrust}
+        return {name: found[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
@@ -134,7 +134,7 @@ class Rov:
         pieces (rov_fmu/model/step.py).
         """
         after = step(self._formulas.table, self._values(inputs, state), h)
-        return {name: after[name] for name in (*self.layout.state, *self.layout.memory)}
+        return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
 
     # ---- One axis alone ----
 
@@ -172,7 +172,7 @@ class Rov:
             reverse = a, b + lost
         return Riccati(A, B + lost, gain * (alpha * thrust + load + self.load(form)), reverse)
 
-    def axes(self, inputs: Values) -> tuple[Riccati, ...]:
+    def motions(self, inputs: Values) -> tuple[Riccati, ...]:
         """Return the equation of each axis alone under held inputs, once the thrust is steady."""
         F = self.commanded(inputs)
         return tuple(

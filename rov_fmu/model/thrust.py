@@ -63,12 +63,12 @@ def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
     if "V_0" in curve.keys:
         signed = f"{signed} * pow(battery / {curve.coefficient('V_0')}, {curve.coefficient('n_V')})"
     if "d" in curve.keys:
-        found[f"loss_{name}"] = f"{_chosen(name, curve, 'd')} * abs(command_{name}){share}"
+        found[f"loss_{name}"] = f"{_by_direction(name, curve, 'd')} * abs(command_{name}){share}"
     # + 0 makes 0.0 of -0.0
     return found | {f"steady_{name}" if curve.has_lag else f"F_{name}": f"{signed}{share if curve.tables else ''} + 0"}
 
 
-def _chosen(name: str, curve: Curve, key: str) -> str:
+def _by_direction(name: str, curve: Curve, key: str) -> str:
     """Return the coefficient of a curve for the direction of a thruster's command."""
     forward, reverse = curve.coefficient(key), curve.coefficient(key + REVERSE)
     return forward if forward == reverse else f"({reverse} if command_{name} < 0 else {forward})"
@@ -96,12 +96,12 @@ def _from_coefficients(name: str, curve: Curve) -> tuple[dict[str, str], str]:
     m is the part of the command beyond the dead band.
     """
     is_reverse = f"command_{name} < 0"
-    a_t, b_t = (_chosen(name, curve, key) for key in ("a_t", "b_t"))
+    a_t, b_t = (_by_direction(name, curve, key) for key in ("a_t", "b_t"))
     share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
     signed = f"(-magnitude_{name} if {is_reverse} else magnitude_{name})"
     beyond, dead = f"beyond_{name}", ""
     if "c_0" in curve.keys:
-        c_0 = _chosen(name, curve, "c_0")
+        c_0 = _by_direction(name, curve, "c_0")
         dead = f" - {c_0}"
         signed = f"(0 if {beyond} < 0 or {beyond} == 0 and {c_0} > 0 else {signed})"
     return {

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.io.messages import did_you_mean, only, shown
+from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
 from rov_fmu.model.layout import (
     ARM,
@@ -32,7 +32,7 @@ from rov_fmu.model.layout import (
     cross_name,
     cross_of,
 )
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names, in_words
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, Hardware, Parts, given_quantities
 
@@ -316,7 +316,7 @@ def _users(key: str) -> str:
     if key in ARM:
         return "yaw with thrusters that have the key arm needs it"
     first, *others = (axis.name for axis in AXES.values() if axis.inertia == key)
-    return f"{in_words([first, *others])} need it" if others else f"{first} needs it, and there is no [axes.{first}]"
+    return f"{listed([first, *others])} need it" if others else f"{first} needs it, and there is no [axes.{first}]"
 
 
 def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
@@ -325,7 +325,7 @@ def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
     for key in given:
         axes = [axis for axis in (_WITHOUT_TILTING.get(key), ROLL, PITCH) if axis]
         if not {*axes} & {*parts.axis_tables}:
-            yield key_line(f"body.{key}", f"acts only in {in_words([a.name for a in axes])}: remove it, or add an axis")
+            yield key_line(f"body.{key}", f"acts only in {listed([a.name for a in axes])}: remove it, or add an axis")
     for key in ("W", "B"):
         if given and key not in given:
             yield key_line(f"body.{key}", f"this key is missing, and {next(iter(given))} is there")

@@ -9,10 +9,11 @@ from itertools import combinations
 from math import hypot, sqrt
 from typing import Any
 
+from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import PITCH, ROLL, YAW, Axis, Layout, cross_name
 from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.schema import where
+from rov_fmu.vehicle.schema import keys_in_file
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
@@ -114,7 +115,7 @@ def _unit(row: Sequence[float]) -> list[float]:
 
 def check_variable_names(layout: Layout) -> Iterator[str]:
     """Check that no two variables of the FMU have the same name."""
-    names = [*layout.inputs, *layout.state, *layout.thrust, *(name for name, _ in where(layout))]
+    names = [*layout.inputs, *layout.state, *layout.calculated, *(name for name, _ in keys_in_file(layout))]
     for name, count in Counter(names).items():
         if count > 1:
             yield key_line(name, "two variables of the FMU would have this name; rename a curve or a thruster")
@@ -149,7 +150,7 @@ def check_mass(rov: Rov) -> Iterator[str]:
         most = sqrt(mass[a + a] * mass[b + b])
         if abs(mass.get(a + b, 0.0)) >= most:
             scale = sqrt(rov[f"beta_{a}"] * rov[f"beta_{b}"])
-            pair = in_words([names[axes.index(a)], names[axes.index(b)]])
+            pair = listed([names[axes.index(a)], names[axes.index(b)]])
             key = cross_name("m_a", a, b)
             place = f"cross.{key}" if (a, b) in entries else f"body.{(key := _centre(a, b))}"
             allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
@@ -159,7 +160,7 @@ def check_mass(rov: Rov) -> Iterator[str]:
     matrix = [[_entry(mass, a, b) / sqrt(mass[a + a] * mass[b + b]) for b in axes] for a in axes]
     if axes and _least_eigenvalue(matrix) < _LEAST:
         reduce = join_names([cross_name("m_a", a, b) for a, b in entries])
-        reason = f"the mass matrix of {in_words(names)} must be positive definite: reduce {reduce or 'x_G, y_G, z_G'}"
+        reason = f"the mass matrix of {listed(names)} must be positive definite: reduce {reduce or 'x_G, y_G, z_G'}"
         yield key_line("cross" if entries else "body", reason)
 
 
@@ -197,7 +198,7 @@ def _doubts_of_damping(rov: Rov) -> Iterator[str]:
     if _least_eigenvalue(matrix) < -_LEAST:
         coupled = {velocity for pair in cross for velocity in pair}
         yield key_line(
-            "cross", f"{adds} {in_words([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
+            "cross", f"{adds} {listed([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
         )
 
 
@@ -224,12 +225,6 @@ def _doubts_of_weight(rov: Rov) -> Iterator[str]:
     if k["W"] * z_G < k["B"] * z_B:
         below = f"buoyancy acts below the centre of mass, z_G = {z_G:g} m, and turns the vehicle upside down"
         yield key_line("body.z_B.value", f"{below}; z is positive down, so a centre of buoyancy above has less z", z_B)
-
-
-def in_words(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them: surge, sway and yaw."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _centre(a: str, b: str) -> str:

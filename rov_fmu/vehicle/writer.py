@@ -16,7 +16,7 @@ from rov_fmu.io.seal import sealed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
 from rov_fmu.vehicle.description import Head
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, keys_in_file
 from rov_fmu.vehicle.thrust_table import CurrentTable
 from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
 
@@ -88,7 +88,7 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) ->
         tables["cross"] = {}
     if layout.mix:
         tables["inputs"] = {name: _inline_table(gains) for name, gains in layout.mix.items()}
-    for name, (*above, key) in where(layout):
+    for name, (*above, key) in keys_in_file(layout):
         if name in quantities:
             table = fins[above[1]] if above[0] == "fin" else _table_at(tables, above)
             table[key] = quantities[name]
@@ -161,7 +161,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
     VehicleFileError or OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
-    places = dict(where(vehicle.layout))
+    places = dict(keys_in_file(vehicle.layout))
     for name, exact in values.items():
         if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
             continue

@@ -35,7 +35,7 @@ def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
     assert lines[0] == ["VideoRay", "Pro", "4", "after", "10", "s"]
     assert lines[3:] == [
         [name, f"{expected[name][-1]:.6g}", expected.units[name]]
-        for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.thrust)
+        for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.calculated)
     ]
 
 
