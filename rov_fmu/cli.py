@@ -104,15 +104,7 @@ def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float
 
 def _seconds(least: str) -> Callable[[str], float]:
     """Return the type of an option that takes a time, s."""
-    number = _number(f"a number of at least {least} s")
-
-    def seconds(text: str) -> float:
-        value = number(text)
-        if value < float(least):
-            raise click.BadParameter(f"{shown(text)} must be at least {least} s")
-        return value
-
-    return seconds
+    return _number(f"a number of at least {least} s", low=float(least))
 
 
 def _refuse_vehicle(path: Path, reason: str) -> None:

@@ -169,9 +169,9 @@ static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
     return DONE;
 }
 
-/* True when a variable of this kind may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and
- * 4.2.1). Two more calls are allowed because importers make them: inputs before initialization, and parameters between the
- * steps of an integrator. */
+/* Return true when a variable of this kind may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections
+ * 2.4.7.4 and 4.2.1). Two more calls are allowed because importers make them: inputs before initialization, and
+ * parameters between the steps of an integrator. */
 static bool may_set(const fmu *f, variable_kind kind)
 {
     switch (f->now.mode) {
@@ -187,14 +187,14 @@ static bool may_set(const fmu *f, variable_kind kind)
     return false;
 }
 
-/* True when a variable is a command that changes only in events, because it acts after a dead time. */
+/* Return true when a variable is a command that changes only in events, because it acts after a dead time. */
 static bool is_discrete(unsigned place)
 {
     return HAS_DEAD_TIME && place < N_COMMANDS;
 }
 
-/* True when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts itself: section
- * 2.4.7.4 asks for it, and section 4.2.1 does not. */
+/* Return true when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts
+ * itself: section 2.4.7.4 asks for it, and section 4.2.1 does not. */
 static bool is_for_event_mode(const fmu *f)
 {
     return f->now.mode == CONTINUOUS || (f->now.mode == STEP && has_event_mode(&f->host));
@@ -361,7 +361,7 @@ static const char *name_of(unsigned reference)
     return place < N_VARIABLES ? VARIABLES[place].name : "an unknown value reference";
 }
 
-/* True when derivatives may be taken with respect to this variable: inputs and states always, parameters only during
+/* Return true when derivatives may be taken with respect to this variable: inputs and states always, parameters only during
  * initialization (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
 static bool is_known(const fmu *f, unsigned reference)
 {

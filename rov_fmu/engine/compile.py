@@ -254,7 +254,7 @@ def _compile(name: str, sources: Mapping[str, str], identifier: str, fmi: int, c
                 *C_FLAGS,
                 *_LIBRARY_FLAGS,
                 *WARNINGS,
-                *(f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3)),
+                *(f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)),
                 *("-isystem", str(fmi_headers())),  # without warnings about the headers
                 UNITY_FILE,
                 *target_platform.flags,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.engine.library import load_library
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ _SHORT = 30
 Ctrl-C."""
 _BRIEF = 100_000
 """A simulation of at most this many steps takes about 0.1 s, so a single worker runs it without a thread of its own."""
-_SHARES = 8
+_PARTS = 8
 """The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
 
 TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
@@ -38,6 +39,19 @@ class Trajectories:
     """An array of recorded variables x vehicles x times. It is NaN from the first time on that cannot be computed."""
     failed: NDArray[np.intp]
     """For each vehicle, the index of the first time that cannot be computed, or the number of times."""
+
+
+def places_of(layout: Layout) -> dict[str, int]:
+    """Return the index of each variable in the arrays of the C code, with the rates der(x)."""
+    places = layout.places
+    return places | {f"der({name})": places[name] + len(layout.state) for name in layout.state}
+
+
+def tables_of(numbers: Array) -> NDArray[np.void]:
+    """Return a table for each number, which is the same for all vehicles and times. The array must stay alive."""
+    tables = np.zeros(len(numbers), TABLE)
+    tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
+    return tables
 
 
 def usable_cores() -> int:
@@ -70,13 +84,12 @@ def simulate(
     record = list(layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
     shape = vehicles, len(times)
-    places = layout.places
-    rates = {f"der({name})": places[name] + len(layout.state) for name in layout.state}
-    usual = {**layout.usual_inputs, **rov.coefficients}
-    numbers = np.zeros(len(places) + len(rates))
-    numbers[[*places.values()]] = [usual.get(name, 0.0) for name in places]
-    tables = np.zeros(len(numbers), TABLE)
-    tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
+    places = places_of(layout)
+    numbers = np.zeros(len(places))
+    for name, number in {**layout.usual_inputs, **rov.coefficients}.items():
+        if name in places:
+            numbers[places[name]] = number
+    tables = tables_of(numbers)
     arrays = []  # keeps the arrays alive while C uses their addresses
     for name, value in values.items():
         array = np.require(value, np.float64, ["C", "A"])
@@ -85,7 +98,7 @@ def simulate(
         else:
             arrays.append(table := np.broadcast_to(array, shape))
             tables[places[name]] = table.ctypes.data, *(stride // table.itemsize for stride in table.strides)
-    recorded = np.array([rates[name] if name in rates else places[name] for name in record], np.intc)
+    recorded = np.array([places[name] for name in record], np.intc)
     result = np.empty((len(record), *shape))
     failed = np.empty(vehicles, np.intp)
     run = load_library(rov).simulate
@@ -93,27 +106,27 @@ def simulate(
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (tables, times, recorded, result, failed)]
     stop = ctypes.c_int(0)
 
-    def part(first: int) -> None:
-        sizes = len(times), vehicles, first, min(first + share, vehicles), len(record)
+    def run_part(first: int) -> None:
+        sizes = len(times), vehicles, first, min(first + size, vehicles), len(record)
         run(*pointers, *map(ctypes.c_ssize_t, sizes), ctypes.byref(stop))
 
     workers = min(workers or usable_cores(), vehicles)
-    share = -(-vehicles // (_SHARES * workers))
-    firsts = range(0, vehicles, share)
+    size = -(-vehicles // (_PARTS * workers))
+    firsts = range(0, vehicles, size)
     if vehicles * len(times) <= (_BRIEF if workers == 1 else _SHORT):
         for first in firsts:
-            part(first)
+            run_part(first)
     else:
-        _run_parts(part, firsts, workers, stop)
+        _run_parts(run_part, firsts, workers, stop)
     for vehicle in np.flatnonzero(failed < len(times)):
         result[:, vehicle, failed[vehicle] :] = np.nan
     return Trajectories(result, failed)
 
 
-def _run_parts(part: Callable[[int], None], firsts: range, workers: int, stop: ctypes.c_int) -> None:
+def _run_parts(run_part: Callable[[int], None], firsts: range, workers: int, stop: ctypes.c_int) -> None:
     """Run the parts in threads. C runs without Python's lock, so they run at the same time. Ctrl-C ends them."""
     with ThreadPoolExecutor(workers) as pool:
-        parts = [pool.submit(part, first) for first in firsts]
+        parts = [pool.submit(run_part, first) for first in firsts]
         try:
             while wait(parts, _POLL).not_done:
                 pass

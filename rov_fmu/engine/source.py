@@ -1,11 +1,12 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from itertools import groupby
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
-from rov_fmu.model.attitude import QUATERNION, start_formulas
+from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.formula import names, tangent, to_c
 from rov_fmu.model.layout import Layout
@@ -120,7 +121,7 @@ class EquationSource:
         position. With an attitude, they are each row of the rotation matrix, and the position.
         """
         if self.layout.has_attitude:
-            return "x" if name in ("y", "z") else f"R_{name[2]}1" if name.startswith("R_") else name
+            return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def dynamic(self) -> int:
@@ -167,8 +168,9 @@ class EquationSource:
         known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, lambda name: known[name])
 
+    @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
-        """Return blocks: groups of neighbouring states whose Taylor coefficients are computed together.
+        """The blocks: groups of neighbouring states whose Taylor coefficients are computed together.
 
         No block depends on a later one.
         """
@@ -184,9 +186,10 @@ class EquationSource:
             found += [tuple(names) for is_level, names in neighbours if is_level]
         return found
 
-    def block_of(self, name: str) -> int:
-        """Return the place of a state's block."""
-        return next(i for i, block in enumerate(self.blocks()) if name in block)
+    @cached_property
+    def block_of(self) -> dict[str, int]:
+        """The index of the block of each state."""
+        return {name: i for i, block in enumerate(self.blocks) for name in block}
 
     def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
         """Return the products of a block in runs, and the C expression of each product.
@@ -207,7 +210,7 @@ class EquationSource:
                 while (
                     place + length < len(states)
                     and (first, states[place + length]) in candidates
-                    and self.block_of(states[place + length]) == self.block_of(second)
+                    and self.block_of[states[place + length]] == self.block_of[second]
                 ):
                     length += 1
                 if length > best[2]:
@@ -235,9 +238,10 @@ class EquationSource:
                 text += f" + {product}" if text else product
         return text or "0.0"
 
-    def component_of(self, name: str) -> int:
-        """Return the place of a state's component."""
-        return next(i for i, group in enumerate(self.equation.components) if name in group)
+    @cached_property
+    def component_of(self) -> dict[str, int]:
+        """The index of the component of each state."""
+        return {name: i for i, group in enumerate(self.equation.components) for name in group}
 
     def _inputs(self, group: Sequence[str]) -> set[str]:
         """Return the states outside a group that the rates of its states depend on."""
@@ -245,7 +249,7 @@ class EquationSource:
 
     def input_bits(self, group: Sequence[str]) -> int:
         """Return one bit for each other component that a component depends on."""
-        return sum(1 << other for other in {self.component_of(name) for name in self._inputs(group)})
+        return sum(1 << other for other in {self.component_of[name] for name in self._inputs(group)})
 
     def needed_with(self, group: Sequence[str]) -> int:
         """Return one bit for each state by which a component is multiplied in other rows.

@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 
 from rov_fmu.engine.library import load_library
-from rov_fmu.engine.simulation import TABLE
+from rov_fmu.engine.simulation import places_of, tables_of
 from rov_fmu.model.rov import Rov
 
 
@@ -30,18 +30,16 @@ class Stepper:
         self._dead_time = rov["T_d"] if layout.has_dead_time else 0.0
         # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
         rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)
-        places, states = rov.layout.places, [*rov.layout.state]
-        rates = {f"der({name})": places[name] + len(states) for name in states}
-        self._numbers = np.zeros(len(places) + len(states))
-        memory = [f"{name}_0" for name in rov.layout.continued]  # the heading of a vehicle with an attitude
-        tables = np.zeros(len(self._numbers), TABLE)
-        tables["at"] = self._numbers.ctypes.data + self._numbers.itemsize * np.arange(len(self._numbers))
+        places, states = places_of(rov.layout), [*rov.layout.state]
+        self._numbers = np.zeros(len(places))
+        continued = [f"{name}_0" for name in rov.layout.continued]  # the heading of a vehicle with an attitude
+        tables = tables_of(self._numbers)
         for name, value in {**rov.coefficients, **rov.layout.usual_inputs, **start}.items():
             if name in places:
                 self._numbers[places[name]] = value
         kept = [*states, *rov.layout.continued]
-        recorded = np.array([(places | rates)[name] for name in (*kept, *record)], np.intc)
-        self._kept = np.array([places[name] for name in (*states, *memory)])
+        recorded = np.array([places[name] for name in (*kept, *record)], np.intc)
+        self._kept = np.array([places[name] for name in (*states, *continued)])
         self._inputs = {name: places[name] for name in rov.layout.inputs}
         self._result = np.empty((len(recorded), 2))
         self._times = np.zeros(2)

@@ -35,8 +35,9 @@ _STEPS = 10
 _LONGEST_TAU = 10.0
 """The longest Tau that an experiment uses (s)."""
 _HORIZON = 40.0
-"""The longest experiment, in time constants. In this time a vehicle turns by at most as many radians. With an attitude,
-half of this number is used."""
+"""The longest experiment, in time constants. In this time a vehicle turns by at most this number of radians.
+
+With an attitude, half of this number is used."""
 _COUPLING_FACTOR = 4.0
 """The weight of the coupling in `_horizon`: small differences grow in coupled motion, so experiments are shorter."""
 _NEGLIGIBLE = 1e-8
@@ -82,7 +83,7 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
         "experiments.exp.j2",
         experiments=experiments,
         tolerance=f"{TOLERANCE:g}",
-        description=f"{vehicle.name}: velocities and pose that the FMU must come to, "
+        description=f"{vehicle.name}: velocities and pose that the FMU must reproduce, "
         f"within {TOLERANCE:g} of the largest value of each variable",
     )
     related.append(_related("experiments.exp", EXPERIMENTS, "experiment", "Expected results"))

@@ -115,8 +115,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         """Return values, and calculate those that depend on others."""
         if any(map(self._is_calculated, references)):
             model, inputs, state = self._model()
-            rates, thrust = model.derivatives(inputs, state), model.calculated(inputs, state)
-            self.values[self.calculated] = [*rates.values(), *thrust.values()]
+            rates, others = model.derivatives(inputs, state), model.calculated(inputs, state)
+            self.values[self.calculated] = [*rates.values(), *others.values()]
         return [self.values[reference] for reference in references]
 
     def do_step(self, current_time: float, step_size: float) -> bool:

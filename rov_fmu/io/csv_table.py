@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from math import isfinite, isnan, nan
 from pathlib import Path
+from types import MappingProxyType
 
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, shown, similar
 from rov_fmu.io.reading import read_lines
@@ -106,7 +107,7 @@ def read_columns(
     *,
     others: bool = False,
     loose: bool = False,
-    renamed: Mapping[str, str] = {},
+    renamed: Mapping[str, str] = MappingProxyType({}),
     hint: str = "",
     check_header: Callable[[Mapping[str, str], Iterable[str]], Iterable[str]] = lambda _, __: (),
 ) -> Columns:

@@ -130,11 +130,7 @@ class Equation:
 
         The groups that may settle come before the kinematic ones.
         """
-        reach = {name: set(inputs) for name, inputs in self.states_in_rate.items()}
-        for middle in self.states:
-            for name in self.states:
-                if middle in reach[name]:
-                    reach[name] |= reach[middle]
+        reach = self._reach
         groups: list[tuple[str, ...]] = []
         for name in self.states:
             group = tuple(n for n in self.states if n == name or (n in reach[name] and name in reach[n]))
@@ -146,15 +142,28 @@ class Equation:
             following = next(g for g in groups if all(reach[name] <= placed | set(g) for name in g))
             done.append(following)
             groups.remove(following)
-        settling = self.used - self.orientation.keys()
-        settling = settling.union(*(reach[name] for name in settling))
+        settling = self._settling.union(*(reach[name] for name in self._settling))
         return tuple(sorted(done, key=settling.isdisjoint))
+
+    @cached_property
+    def _reach(self) -> dict[str, set[str]]:
+        """For each state, the states on which it depends, directly or through others."""
+        found = {name: set(states) for name, states in self.states_in_rate.items()}
+        for middle in self.states:
+            for name in self.states:
+                if middle in found[name]:
+                    found[name] |= found[middle]
+        return found
+
+    @cached_property
+    def _settling(self) -> frozenset[str]:
+        """The used states that may settle."""
+        return self.used - self.orientation.keys()
 
     @cached_property
     def dynamic(self) -> tuple[tuple[str, ...], ...]:
         """The components that may settle. The others are kinematic: only the heading and integrals."""
-        settling = self.used - self.orientation.keys()
-        last = max(n for n, group in enumerate(self.components) if not settling.isdisjoint(group))
+        last = max(n for n, group in enumerate(self.components) if not self._settling.isdisjoint(group))
         return self.components[: last + 1]
 
     @cached_property
@@ -206,21 +215,20 @@ def equation_of(layout: Layout) -> Equation:
     directed: dict[str, Directed] = {}
     held = _held_forces(layout, mass)
     rows: dict[str, tuple[Term, ...]] = {}
-    for form in layout.axes:
-        v = form.axis.velocity
+    for v in layout.velocities:
         lagging = _lagging(layout, mass, v)
         terms = [Term(f"held_{v}"), *(Term(f"remaining_{v}_{curve}", (f"progress_{curve}",)) for curve in lagging)]
         for name, force in _accelerations(layout, mass, v).items():
+            coefficient = name
             if force.velocity and force.is_held:
                 held[name] = force.coefficient
                 directed[f"direction_{force.velocity}"] = Directed(force.velocity, "1", "-1")
-                terms.append(Term(f"direction_{force.velocity} * {name}", force.factors))
-                continue
-            if force.velocity:
+                coefficient = f"direction_{force.velocity} * {name}"
+            elif force.velocity:
                 directed[name] = Directed(force.velocity, force.coefficient, force.reverse)
             else:
                 (held if force.is_held else parameters)[name] = force.coefficient
-            terms.append(Term(name, force.factors))
+            terms.append(Term(coefficient, force.factors))
         coriolis = mass.coriolis(v) if layout.coupled else {}
         for factors, formula in coriolis.items():
             name = f"coupling_{v}" if len(coriolis) == 1 else f"coupling_{v}_{''.join(factors)}"
@@ -238,15 +246,23 @@ def equation_of(layout: Layout) -> Equation:
             lags[progress] = {f"F_{t.name}": f"steady_{t.name}" for t in layout.thrusters if t.curve == curve.name}
     rows |= attitude
     rows |= _kinematics(layout)
-    starts = {form.axis.velocity: form.axis.velocity for form in layout.axes}
+    starts = {v: v for v in layout.velocities}
     if "cos_psi" in rows:
         starts |= {"cos_psi": "cos(psi)", "sin_psi": "sin(psi)"}
-    tables = {table.name: table for curve in layout.curves for table in curve.tables}
-    equation = Equation(parameters, directed, thrust_formulas(layout), held, rows, starts, lags, tables=tables)
-    if not layout.has_attitude:
-        return equation
-    starts |= rotation_formulas()
-    return replace(equation, outputs=angle_formulas(), ends=quaternion_formulas())
+    if layout.has_attitude:
+        starts |= rotation_formulas()
+    return Equation(
+        parameters,
+        directed,
+        thrust_formulas(layout),
+        held,
+        rows,
+        starts,
+        lags,
+        outputs=angle_formulas() if layout.has_attitude else {},
+        ends=quaternion_formulas() if layout.has_attitude else {},
+        tables={table.name: table for curve in layout.curves for table in curve.tables},
+    )
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
@@ -294,10 +310,10 @@ def _mass(layout: Layout) -> MassMatrix:
             parts.setdefault((axes[0], axes[1]), []).append(cross_name(key, *axes))
     # with the coupling, momentum along an axis that the vehicle lacks still acts on its other axes
     moves = layout.coupled and layout.has(SURGE, SWAY, HEAVE)
-    for pair, signed in _OF_CENTRE.items():
+    for pair, (sign, coordinate) in _OF_CENTRE.items():
         present = [axis for axis in pair if axis in gains]
-        if signed[-3:] in layout.restoring and (len(present) == 2 or (present and moves)):
-            parts.setdefault(pair, []).append(("-" if signed[0] == "-" else "") + f"m_rov * {signed[-3:]}")
+        if coordinate in layout.restoring and (len(present) == 2 or (present and moves)):
+            parts.setdefault(pair, []).append(f"{sign}m_rov * {coordinate}")
     entries = {}
     for pair, sums in parts.items():
         betas = " * ".join(f"beta_{axis}" for axis in pair if axis in gains)
@@ -306,14 +322,15 @@ def _mass(layout: Layout) -> MassMatrix:
 
 
 _OF_CENTRE = {
-    ("u", "q"): "z_G",
-    ("u", "r"): "-y_G",
-    ("v", "p"): "-z_G",
-    ("v", "r"): "x_G",
-    ("w", "p"): "y_G",
-    ("w", "q"): "-x_G",
+    ("u", "q"): ("", "z_G"),
+    ("u", "r"): ("-", "y_G"),
+    ("v", "p"): ("-", "z_G"),
+    ("v", "r"): ("", "x_G"),
+    ("w", "p"): ("", "y_G"),
+    ("w", "q"): ("-", "x_G"),
 }
-"""The entries of the mass matrix that follow from a centre of mass outside the origin, divided by the mass."""
+"""The entries of the mass matrix that follow from a centre of mass outside the origin, divided by the mass. Each is a
+sign and a coordinate."""
 
 
 def _parameters(layout: Layout, mass: MassMatrix) -> dict[str, str]:

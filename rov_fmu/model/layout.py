@@ -237,15 +237,17 @@ ARM = {
 }
 FIN = {
     "lift": CoefficientKind("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
-    "drag": CoefficientKind("N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, False),
+    "drag": CoefficientKind(
+        "N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, needed=False
+    ),
     "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
 }
 """The coefficients of a control surface."""
 CURVE = {
-    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, False),
-    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, False),
+    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
+    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
     "n_V": CoefficientKind(
-        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, False
+        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False
     ),
     "a_t": CoefficientKind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
     "b_t": CoefficientKind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
@@ -258,7 +260,7 @@ CURVE = {
     "c_0": CoefficientKind(
         "1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False
     ),
-    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, False),
+    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
     "d": CoefficientKind(
         "N.s/m", "Loss of thrust d of the {curve} per speed of advance at full command", 0.0, 1e6, needed=False
     ),
@@ -269,6 +271,8 @@ CURVE = {
         "s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False
     ),
 }
+REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
+"""The keys of CURVE that a curve with measured forces does not have."""
 AXIS = {
     "m_a": CoefficientKind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
     "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
@@ -284,9 +288,16 @@ AXIS = {
 _AT_ZERO = "; at 0 the velocity never changes"
 """The end of the description of β for the axes whose β may be 0."""
 TUNING = {
-    "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
+    "alpha": CoefficientKind(
+        "1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, needed=False, tunable=True
+    ),
     "beta": CoefficientKind(
-        "1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}" + _AT_ZERO, 0.0, 1e3, False, True
+        "1",
+        "Tuning β_{velocity}: scales acceleration in {axis}, {motion}" + _AT_ZERO,
+        0.0,
+        1e3,
+        needed=False,
+        tunable=True,
     ),
 }
 """The tuning factors of every axis; each is 1 unless the file gives it."""
@@ -316,21 +327,24 @@ class ThrustTable:
 
         It is the cubic that has the forces and the slopes at the ends of the interval of the command.
         """
-        n, h, t = self._place(command)
-        f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
+        f, g, a, b, _, t = self._interval(command)
         return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
 
     def slope(self, command: float) -> float:
         """Return the derivative of `force` with respect to the command."""
-        n, h, t = self._place(command)
-        f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
+        f, g, a, b, h, t = self._interval(command)
         return (a + t * (2.0 * (3.0 * (g - f) - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * (g - f)))) / h
 
-    def _place(self, command: float) -> tuple[int, float, float]:
-        """Return the interval of a command, its length, and the command's place in it between 0 and 1."""
+    def _interval(self, command: float) -> tuple[float, float, float, float, float, float]:
+        """Return the interval of a command.
+
+        It has the forces at its ends, the slopes there times its length, its length, and the share of it that lies
+        below the command.
+        """
         n = min(max(bisect_right(self.commands, command) - 1, 0), len(self.commands) - 2)
         h = self.commands[n + 1] - self.commands[n]
-        return n, h, (command - self.commands[n]) / h
+        t = (command - self.commands[n]) / h
+        return self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1], h, t
 
 
 @dataclass(frozen=True)

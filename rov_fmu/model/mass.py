@@ -76,7 +76,7 @@ class MassMatrix:
         """Return formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
         found: dict[str, str] = {}
         has_factor: set[tuple[str, str]] = set()
-        for n, row in enumerate(block):
+        for n, row in enumerate(block):  # M = L D L^T, row by row; L has the factors, D the pivots
             for m, column in enumerate(block[:n]):
                 parts = [f"mass_{column}{row}"] if (column, row) in self.entries else []
                 for k in block[:m]:
@@ -87,7 +87,7 @@ class MassMatrix:
                     found[f"factor_{row}{column}"] = f"({joined(parts)}) / pivot_{column}"
             squares = [f"-factor_{row}{k} * factor_{row}{k} * pivot_{k}" for k in block[:n] if (row, k) in has_factor]
             found[f"pivot_{row}"] = joined([f"mass_{row}{row}", *squares])
-        for n, row in enumerate(block):  # K L = 1, from the diagonal outwards
+        for n, row in enumerate(block):  # K L = 1, from the diagonal outwards; K has the names undo_..
             for m in reversed(range(n)):
                 column = block[m]
                 parts = []
@@ -95,7 +95,7 @@ class MassMatrix:
                     if (k, column) in has_factor:
                         parts.append(f"-factor_{k}{column}" if k == row else f"-undo_{row}{k} * factor_{k}{column}")
                 found[f"undo_{row}{column}"] = joined(parts) or "0"
-        for n, row in enumerate(block):
+        for n, row in enumerate(block):  # K^T D^-1 K
             for column in block[n:]:
                 parts = []
                 for k in block[block.index(column) :]:

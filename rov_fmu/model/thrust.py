@@ -59,7 +59,7 @@ def _saturated(name: str) -> str:
 def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
     share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
-    found, signed = _from_tables(name, curve) if curve.tables else _from_coefficients(name, curve)
+    found, signed = _from_tables(name, curve) if curve.tables else _from_coefficients(name, curve, share)
     if "V_0" in curve.keys:
         signed = f"{signed} * pow(battery / {curve.coefficient('V_0')}, {curve.coefficient('n_V')})"
     if "d" in curve.keys:
@@ -90,14 +90,13 @@ def _from_tables(name: str, curve: Curve) -> tuple[dict[str, str], str]:
     return {f"table_{name}": formula}, f"{curve.coefficient('k_t')} * table_{name}"
 
 
-def _from_coefficients(name: str, curve: Curve) -> tuple[dict[str, str], str]:
+def _from_coefficients(name: str, curve: Curve, share: str) -> tuple[dict[str, str], str]:
     """Return the formulas of the force a_t m^2 + b_t m, and the formula of the force with its sign.
 
     m is the part of the command beyond the dead band.
     """
     is_reverse = f"command_{name} < 0"
     a_t, b_t = (_by_direction(name, curve, key) for key in ("a_t", "b_t"))
-    share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
     signed = f"(-magnitude_{name} if {is_reverse} else magnitude_{name})"
     beyond, dead = f"beyond_{name}", ""
     if "c_0" in curve.keys:

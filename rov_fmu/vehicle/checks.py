@@ -18,6 +18,7 @@ from rov_fmu.model.layout import (
     HEAVE,
     LEAST_BETA,
     PITCH,
+    REPLACED_BY_TABLE,
     RESTORING,
     REVERSE,
     ROLL,
@@ -187,15 +188,7 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
         if curve.table and curve.tables:
             yield key_line(f"{place}.tables", "must not be given together with table")
         if key:
-            replaced = (
-                "a_t",
-                "b_t",
-                "a_t_reverse",
-                "b_t_reverse",
-                "c_0",
-                "c_0_reverse",
-                *(("V_0", "n_V") if curve.tables else ()),
-            )
+            replaced = (*REPLACED_BY_TABLE, *(("V_0", "n_V") if curve.tables else ()))
             yield from (
                 key_line(f"{place}.{other}", f"must not be given together with {key}")
                 for other in replaced
@@ -207,7 +200,7 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
             )
             if "k_t" in given:
                 yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
-        for one, other in (("V_0", "n_V"), ("n_V", "V_0"), ("d_reverse", "d")):
+        for one, other in (("V_0", "n_V"), ("n_V", "V_0")):
             if one in given and other not in given:
                 yield key_line(f"{place}.{other}", f"this key is missing, and {one} is there")
         needs_voltage |= "V_0" in given or bool(curve.tables)

@@ -138,7 +138,7 @@ def check_mass(rov: Rov) -> Iterator[str]:
     if not entries and not any(rov.coefficients.get(f"{axis}_G") for axis in "xyz"):
         return
     try:
-        mass = {name[5:]: value for name, value in rov.parameters.items() if name.startswith("mass_")}
+        mass = {name.removeprefix("mass_"): value for name, value in rov.parameters.items() if name.startswith("mass_")}
     except ZeroDivisionError:  # a pivot of a singular matrix, or a β
         yield key_line(
             "cross", "the mass matrix must be positive definite, not singular: reduce m_a_.., or x_G, y_G, z_G"
@@ -233,7 +233,7 @@ def _centre(a: str, b: str) -> str:
 
 
 def _entry(entries: Mapping[str, float], a: str, b: str) -> float:
-    """Return an entry of a symmetric matrix, of which one half is given."""
+    """Return an entry of a symmetric matrix. `entries` are those of one half of it."""
     return entries.get(a + b, entries.get(b + a, 0.0))
 
 

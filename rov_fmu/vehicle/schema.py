@@ -251,7 +251,7 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
             rows = enumerate(self.tables, 1)
             measured = tuple(row.table.table(f"thrust_{name}_{n}", row.voltage) for n, row in rows)
         if measured:
-            keys = ("k_t", *(key for key in keys if key in ("V_0", "n_V", "d", "d_reverse", "T")))
+            keys = ("k_t", *(key for key in keys if key not in ("k_t", *layout.REPLACED_BY_TABLE)))
         words = self.description or ""
         return layout.Curve(name, keys, self.together, words, self.equation, measured)
 

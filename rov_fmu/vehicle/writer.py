@@ -301,7 +301,7 @@ def _quantity_table(
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
-    """Return an inline table with spaces inside the braces, as people write it."""
+    """Return an inline table with spaces inside the braces."""
     table = tomlkit.inline_table()
     table |= dict(entries)
     return cast(InlineTable, tomlkit.value(f"{{ {table.as_string()[1:-1]} }}"))
