@@ -247,7 +247,7 @@ def fly(rov: Rov) -> tuple[dict[str, float], float]:
 def run(rov: Rov, times: np.ndarray, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Return the states and the attitude over time."""
     layout = rov.layout
-    record = [*layout.state, *(name for name in ("phi", "theta", "psi") if name in layout.thrust)]
+    record = [*layout.state, *(name for name in ("phi", "theta", "psi") if name in layout.calculated)]
     return dict(zip(record, simulate(rov, times, values, record).values[:, 0], strict=True))
 
 

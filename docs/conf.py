@@ -16,7 +16,7 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
 from docs import compared, reference  # noqa: E402 (they stand beside this file)
-from rov_fmu.fmu.module import module  # noqa: E402
+from rov_fmu.fmu.module import web_module  # noqa: E402
 from rov_fmu.io.output import Output, write_whole  # noqa: E402
 from rov_fmu.report.page.live import Flown, fly_page  # noqa: E402
 from rov_fmu.report.page.pictures import diagram  # noqa: E402
@@ -108,7 +108,7 @@ def _fly(app: Sphinx, error: Exception | None) -> None:
     if error is None:
         (folder / "compact").mkdir(parents=True, exist_ok=True)
         for one in FLOWN:
-            flown, name = [Flown(one, module(one.rov))], f"{one.identifier}.html"
+            flown, name = [Flown(one, web_module(one.layout))], f"{one.identifier}.html"
             write_whole(Output(folder / name, fly_page(flown).encode()))
             write_whole(Output(folder / "compact" / name, fly_page(flown, compact=True).encode()))
 

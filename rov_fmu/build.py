@@ -9,7 +9,7 @@ from time import perf_counter
 from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError, compile_all, host_platform
 from rov_fmu.fmu.archive import archive, native_content, python_content
 from rov_fmu.fmu.model_description import NATIVE
-from rov_fmu.fmu.module import module
+from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.file_kinds import FMU, check_written
@@ -41,7 +41,7 @@ class Built:
     beside: Sequence[Path]
     """The other files that were written."""
     lost: Sequence[str] = ()
-    """The folders of binaries/ that the FMU had which this one replaced, and that this one does not have."""
+    """The folders of binaries/ that the replaced FMU had and this one does not have."""
 
 
 def build(
@@ -93,8 +93,7 @@ def build(
         raise FileError(f"{output}: the name must end with .fmu")
     chosen = chosen_platforms(platforms, fmi) if native else []
     results = reference_results(vehicle)
-    flown = module(vehicle.rov)
-    pages = {**documentation(vehicle, native=native, fmi=fmi, module=flown), **results}
+    pages = {**documentation(vehicle, native=native, fmi=fmi, module=web_module(vehicle.layout)), **results}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     on_content()
     start = perf_counter()

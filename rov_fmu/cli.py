@@ -105,15 +105,7 @@ def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float
 
 def _seconds(least: str) -> Callable[[str], float]:
     """Return the type of an option that takes a time, s."""
-    number = _number(f"a number of at least {least} s")
-
-    def seconds(text: str) -> float:
-        value = number(text)
-        if value < float(least):
-            raise click.BadParameter(f"{shown(text)} must be at least {least} s")
-        return value
-
-    return seconds
+    return _number(f"a number of at least {least} s", low=float(least))
 
 
 def _refuse_vehicle(path: Path, reason: str) -> None:
@@ -295,7 +287,8 @@ def _simulate(
 ) -> None:
     """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
 
-    Inputs and states that are not set are 0. Without -o and --plot the values at the end are printed.
+    Inputs that are not set have their usual values, and states that are not set are 0. Without -o and --plot the values
+    at the end are printed.
     """
     from rov_fmu.interface.model import load
     from rov_fmu.interface.simulate_command import check_outputs, moves, print_final, run, title, write_results
@@ -354,7 +347,7 @@ def _warn(message: str) -> None:
 )
 def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.fmu.module import module
+    from rov_fmu.fmu.module import web_module
     from rov_fmu.io.output import Output
     from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page
@@ -366,7 +359,7 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
         check_targets([output], [*paths, *(file for one in loaded for file in one.files)])
         check_written(output, PAGE)
     page = fly_page(
-        [Flown(one, module(one.rov), name) for one, name in zip(loaded, _short_names(paths), strict=True)]
+        [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, _short_names(paths), strict=True)]
     ).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))

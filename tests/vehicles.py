@@ -103,7 +103,10 @@ def numbered(layout: Layout, **values: float) -> Rov:
         column = 0 if key == "m_a" else 1
         numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))
     numbers |= _BODY_NUMBERS | values
-    return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
+    return Rov(
+        layout,
+        {name: 1.0 if declaration.tunable else numbers[name] for name, declaration in layout.coefficients.items()},
+    )
 
 
 def pulsed(rov: Rov, pulse: tuple[float, float, float]) -> Rov:
@@ -277,8 +280,8 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
     """Return a vehicle whose mass and drag both matter. One drag coefficient in six is zero."""
     layout = layout or random_layout(rng)
     numbers = {}
-    for name, meta in layout.coefficients.items():
-        if meta.tunable:
+    for name, declaration in layout.coefficients.items():
+        if declaration.tunable:
             numbers[name] = spread(rng, -0.5, 0.5)
         elif name.startswith(("a_d", "b_d")):
             numbers[name] = spread(rng, -1.0, 2.0, zero=1 / 6)
@@ -292,7 +295,7 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
             numbers[name] = spread(rng, -2.0, 0.5)
         else:
             numbers[name] = rng.uniform(0.1, 1.5)
-        assert meta.minimum <= numbers[name] <= meta.maximum, name
+        assert declaration.minimum <= numbers[name] <= declaration.maximum, name
     return Rov(layout, numbers)
 
 

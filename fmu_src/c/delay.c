@@ -1,5 +1,5 @@
-/* The dead time: a change of the commands reaches the thrusters and fins T_d seconds later. The commands that act stand among the
- * variables from FIRST_DELAYED on; the changes on their way wait here. */
+/* The dead time: a change of the commands reaches the thrusters and fins T_d seconds later. The commands that act are
+ * the variables from FIRST_DELAYED on. The changes that have not arrived yet are in a delay_line. */
 
 enum { MOST_WAITING = 1024 }; /* one in each millisecond of the longest dead time */
 
@@ -9,7 +9,7 @@ typedef struct {
     double commands[MOST_WAITING][N_COMMANDS];
 } delay_line;
 
-/* True when the present commands differ from those sent before. */
+/* Return true when the present commands differ from those sent before. */
 static bool delay_differs(const delay_line *line, const double at[])
 {
     const double *const sent = line->waiting > 0 ? line->commands[line->waiting - 1] : at + FIRST_DELAYED;
@@ -20,14 +20,16 @@ static bool delay_differs(const delay_line *line, const double at[])
     return differ;
 }
 
-/* Return the number of changes that wait, without one that a change which arrives at this time replaces. */
+/* Return how many of the waiting changes a new one leaves in place. The new one, which arrives at `arrival`, replaces
+ * the last one if that would not arrive before it. */
 static int delay_kept(const delay_line *line, double arrival)
 {
     const int n = line->waiting;
     return n > 0 && line->time[n - 1] >= arrival ? n - 1 : n;
 }
 
-/* Send the present commands at time t, if they differ from those sent before. Return false when too many changes are waiting. */
+/* Send the present commands at time t, if they differ from those sent before. Return false when too many changes are
+ * waiting. */
 static bool delay_send(delay_line *line, const double at[], double t)
 {
     const double arrival = t + at[REF_T_d];
@@ -44,13 +46,13 @@ static bool delay_send(delay_line *line, const double at[], double t)
     return true;
 }
 
-/* True when a change that arrives at a time acts at time t, to within its rounding. */
+/* Return true when a change that arrives at `arrival` acts at time t. Rounding errors of t do not count. */
 static inline bool delay_acts(double arrival, double t)
 {
     return arrival <= t + 16.0 * DBL_EPSILON * fabs(t);
 }
 
-/* Let those changes act that have arrived at time t. */
+/* Let the changes act that have arrived by time t. */
 static void delay_receive(delay_line *line, double at[], double t)
 {
     int n = 0;
@@ -67,7 +69,7 @@ static void delay_receive(delay_line *line, double at[], double t)
     }
 }
 
-/* Move the times of all changes, for an importer that moves the time. */
+/* Shift the times of all waiting changes, for an importer that sets the time to another value. */
 static void delay_move(delay_line *line, double shift)
 {
     for (int n = 0; n < line->waiting; n++) {
@@ -75,8 +77,8 @@ static void delay_move(delay_line *line, double shift)
     }
 }
 
-/* Compute the states after h > 0 seconds from time t. Return the number of pieces, 0 when more than MOST_PIECES would be needed,
- * or -1 when too many changes are waiting. If the states are usable, delay_commit must follow. */
+/* Compute the states after h > 0 seconds from time t. Return the number of pieces, 0 when more than MOST_PIECES would
+ * be needed, or -1 when too many changes are waiting. If the states are usable, delay_commit must follow. */
 static int delayed_step(const double at[], const model_numbers *n, const delay_line *line, double t, double h,
                         double next[N_STATES], double *heading)
 {
@@ -99,7 +101,7 @@ static int delayed_step(const double at[], const model_numbers *n, const delay_l
             }
             memcpy(now + FIRST_DELAYED, arrived < kept ? line->commands[arrived] : at, sizeof line->commands[0]);
         }
-        const int more = model_step(now, n, until - passed, next, heading);
+        const int more = motion_step(now, n, until - passed, next, heading);
         if (more == 0) {
             return 0;
         }

@@ -15,12 +15,13 @@ FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi
     return (fmi3Status)(counted == DONE ? get_output_rates(f, valueReferences, nValueReferences, orders, values) : counted);
 }
 
-/* The time between two intermediate updates, in s. Inputs are held for so long. It is longer where a step would otherwise have
- * more than MOST_PIECES pieces. */
-static const double PIECE = 1e-4;
+/* The time between two intermediate updates, s. Inputs are held for this time. It is longer when a step would otherwise have
+ * more than MOST_UPDATES updates. */
+static const double UPDATE_INTERVAL = 1e-4;
+enum { MOST_UPDATES = 10000 };
 
-/* Call the callback of intermediate update at the current state, `gone` seconds after t. The callback may read variables and set
- * inputs. If it ends the step early, *length becomes shorter. */
+/* Call the callback of intermediate update at the current state, `gone` seconds after t. The callback may read
+ * variables and set inputs. If it ends the step early, *length becomes shorter. */
 static void update(fmu *f, double t, double gone, double *length, bool is_inside)
 {
     const char *const function = f->function;
@@ -37,21 +38,22 @@ static void update(fmu *f, double t, double gone, double *length, bool is_inside
     }
 }
 
-/* Step in pieces, each with the inputs of the update at its beginning. *last becomes the time at which the step ends. */
-static outcome step_in_pieces(fmu *f, double t, double h, double *last)
+/* Step with intermediate updates. The inputs of an update are held until the next one. *last becomes the time at which the step
+ * ends. */
+static outcome step_with_updates(fmu *f, double t, double h, double *last)
 {
-    const double pieces = fmin(fmax(1.0, ceil(h / PIECE * (1.0 - 1e-9))), MOST_PIECES);
+    const double updates = fmin(fmax(1.0, ceil(h / UPDATE_INTERVAL * (1.0 - 1e-9))), MOST_UPDATES);
     int cuts = 0;
-    double length = h, gone = 0.0; /* measured from t: a piece may be shorter than the last digit of a large t */
+    double length = h, gone = 0.0; /* measured from t, because an interval may be smaller than the rounding of a large t */
     TRY(check_step(f, t, h));
     follow_jump(f, f->now.time, t, h);
     f->now.time = t;
     update(f, t, gone, &length, false);
     for (double n = 1.0; gone < length; n++) {
         const double from = gone;
-        gone = n < pieces ? fmin(length, h * (n / pieces)) : length;
+        gone = n < updates ? fmin(length, h * (n / updates)) : length;
         TRY(advance(f, t + from, gone - from, &cuts));
-        f->now.time = *last = t + gone; /* without the rounding of a sum over pieces */
+        f->now.time = *last = t + gone; /* without the rounding of a sum over intervals */
         update(f, t, gone, &length, gone < length);
     }
     return DONE;
@@ -73,7 +75,7 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentComm
         return done;
     }
     *lastSuccessfulTime = currentCommunicationPoint;
-    const outcome done = step_in_pieces(f, currentCommunicationPoint, communicationStepSize, lastSuccessfulTime);
+    const outcome done = step_with_updates(f, currentCommunicationPoint, communicationStepSize, lastSuccessfulTime);
     *earlyReturn = done == DONE && *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
     return (fmi3Status)done;
 }

@@ -104,6 +104,11 @@ static outcome refuse_missing(fmu *f, const char *what)
     FAIL(f, "this FMU has no %s.", what);
 }
 
+static outcome refuse_events(fmu *f)
+{
+    FAIL(f, "this instance has no Event Mode, because it was instantiated with eventModeUsed = false.");
+}
+
 NO_CONFIGURATION(fmi3EnterConfigurationMode)
 NO_CONFIGURATION(fmi3ExitConfigurationMode)
 
@@ -125,7 +130,7 @@ FMI3_Export fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     OPEN(fmi3EnterEventMode, MAY_MEET_EVENTS);
     if (f->now.mode == STEP && !f->host.uses_events) {
-        return (fmi3Status)refuse_missing(f, "Event Mode, for it was made with eventModeUsed = false");
+        return (fmi3Status)refuse_events(f);
     }
     return (fmi3Status)enter(f, EVENT);
 }
@@ -136,7 +141,7 @@ FMI3_Export fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
     return fmi3OK; /* there are none */
 }
 
-/* The model has no events of its own. */
+/* The only events of the model are changes of commands that arrive after the dead time. */
 FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                                 fmi3Boolean *terminateSimulation,
                                                 fmi3Boolean *nominalsOfContinuousStatesChanged,
@@ -146,7 +151,7 @@ FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boole
     OPEN(fmi3UpdateDiscreteStates, MAY_UPDATE);
     GIVEN(discreteStatesNeedUpdate != NULL && terminateSimulation != NULL && nominalsOfContinuousStatesChanged != NULL
               && valuesOfContinuousStatesChanged != NULL && nextEventTimeDefined != NULL && nextEventTime != NULL,
-          "one of what is asked for");
+          "one of the results");
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = false;
     *valuesOfContinuousStatesChanged = false;
     return (fmi3Status)update_discrete(f, nextEventTimeDefined, nextEventTime);
@@ -256,7 +261,7 @@ static outcome differentiate_adjoint(fmu *f, const unsigned unknowns[], size_t n
             for (size_t i = 0; i < n_unknowns; i++) {
                 sum += seed[i] * d[place_of(unknowns[i])];
             }
-            REQUIRE(isfinite(sum), "that of %s is not a finite number.", name_of(knowns[k]));
+            REQUIRE(isfinite(sum), "the derivative of %s is not a finite number.", name_of(knowns[k]));
             if (pass == 1) {
                 sensitivity[k] = sum;
             }
@@ -275,7 +280,8 @@ FMI3_Export fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi
                                              nSensitivity);
 }
 
-/* All variables are scalars, so modelDescription.xml lists all dependencies (providesPerElementDependencies is not declared). */
+/* All variables are scalars, so modelDescription.xml lists all dependencies (providesPerElementDependencies is not
+ * declared). */
 FMI3_Export fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
                                                            size_t *nDependencies)
 {

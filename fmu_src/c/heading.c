@@ -44,7 +44,7 @@ static double heading_in_piece(const void *motion, double t)
 /* Follow the heading through a piece of a step. */
 static double heading_after_piece(const series *s, double length, double heading)
 {
-    double turn = 0.0; /* the integrals of the angular velocities have at most this sum */
+    double turn = 0.0; /* an upper bound of the sum of the integrals of the angular velocities */
     for (int i = FIRST_ROTATION; i < N_MONITORED; i++) {
         double power = length * s->unit;
         for (int n = 0; n <= s->order; n++, power *= length) {
@@ -70,7 +70,8 @@ static double heading_on_circle(const void *motion, double angle)
     return atan2(R[1], R[0]);
 }
 
-/* Follow the heading through a rotation with constant velocities. Every whole turn changes it alike. */
+/* Follow the heading through a rotation with constant velocities. Every whole turn changes it by the same
+ * angle. */
 static double heading_after_circle(const circle *c, double angle, double heading)
 {
     const double turns = floor(angle / TWO_PI);

@@ -113,7 +113,7 @@ static outcome run(fmu *f)
 static outcome terminate(fmu *f)
 {
     if (f->now.mode == INITIALIZATION) {
-        WARN_ONCE(f, ENDED_EARLY, "done, though the standard has no such call in Initialization Mode.");
+        WARN_ONCE(f, ENDED_EARLY, "done, although the standard does not allow this call in Initialization Mode.");
     }
     return enter(f, TERMINATED);
 }
@@ -127,13 +127,14 @@ static outcome reset(fmu *f)
 
 /* ---- Values ---- */
 
-/* Compute the thrust and the derivatives, which is done only when they are read. */
+/* Compute the calculated variables. This is done only when they are read. */
 static void calculate(fmu *f)
 {
     model_calculate(f->now.values, &f->numbers, f->now.heading);
 }
 
-/* Return the value at a place, or the time where FMI declares it as a variable. Return NULL when there is no such variable. */
+/* Return the address of the value at a place, or of the time if FMI 3.0 reads it as a variable. Return NULL when there
+ * is no such variable. */
 static const double *variable(const fmu *f, unsigned place)
 {
     return place < N_VARIABLES ? &f->now.values[place] : HAS_TIME && place == TIME ? &f->now.time : NULL;
@@ -163,14 +164,14 @@ static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
         value[i] = *variable(f, place_of(vr[i]));
     }
     if (f->now.mode == INSTANTIATED) {
-        WARN_ONCE(f, READ_EARLY, "done, though the standard has no such call before initialization; said once.");
+        WARN_ONCE(f, READ_EARLY, "done, although the standard does not allow this call before initialization; logged once.");
     }
     return DONE;
 }
 
-/* True when a variable of this kind may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and
- * 4.2.1). Two more calls are allowed because importers make them: inputs before initialization, and parameters between the
- * steps of an integrator. */
+/* Return true when a variable of this kind may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections
+ * 2.4.7.4 and 4.2.1). Two more calls are allowed because importers make them: inputs before initialization, and
+ * parameters between the steps of an integrator. */
 static bool may_set(const fmu *f, variable_kind kind)
 {
     switch (f->now.mode) {
@@ -186,14 +187,14 @@ static bool may_set(const fmu *f, variable_kind kind)
     return false;
 }
 
-/* True when a variable is a command that changes only in events, because it acts after a dead time. */
+/* Return true when a variable is a command that changes only in events, because it acts after a dead time. */
 static bool is_discrete(unsigned place)
 {
     return HAS_DEAD_TIME && place < N_COMMANDS;
 }
 
-/* True when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts itself: section
- * 2.4.7.4 asks for it, and section 4.2.1 does not. */
+/* Return true when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts
+ * itself: section 2.4.7.4 asks for it, and section 4.2.1 does not. */
 static bool is_for_event_mode(const fmu *f)
 {
     return f->now.mode == CONTINUOUS || (f->now.mode == STEP && has_event_mode(&f->host));
@@ -227,10 +228,10 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
         const variable_info *const info = &VARIABLES[place];
         f->now.values[place] = value[i];
         if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
-            WARN_ONCE(f, place, "%s = %.15g saturates at %g; said once.", info->name, value[i],
+            WARN_ONCE(f, place, "%s = %.15g saturates at %g; logged once.", info->name, value[i],
                       value[i] < info->minimum ? info->minimum : info->maximum);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
-            WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, though the standard wants Event Mode for it; said once.",
+            WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, although the standard requires Event Mode for this; logged once.",
                       info->name);
         }
     }
@@ -254,15 +255,15 @@ static outcome check_none(fmu *f, size_t n, const char *type)
 
 static outcome set_states(fmu *f, const double x[], size_t n)
 {
-    REQUIRE(n == N_STATES && x != NULL, "%zu states given, or NULL; it takes %d.", n, N_STATES);
+    REQUIRE(n == N_STATES && x != NULL, "%zu states are given, or the array is NULL; the FMU has %d states.", n, N_STATES);
     for (size_t i = 0; i < N_STATES; i++) {
         if (!isfinite(x[i])) {
             DISCARD(f, "%s = %g is not a finite number; it stays %.15g.", VARIABLES[FIRST_STATE + i].name, x[i],
                     f->now.values[FIRST_STATE + i]);
         }
     }
-    if (!model_has_attitude(x)) {
-        DISCARD(f, "the quaternion is 0, which is no attitude; the states stay as they are.");
+    if (!model_has_direction(x)) {
+        DISCARD(f, "the quaternion is 0, which has no direction; the states are not changed.");
     }
     memcpy(&f->now.values[FIRST_STATE], x, N_STATES * sizeof x[0]);
     return DONE;
@@ -284,7 +285,7 @@ static outcome complete_step(fmu *f)
 
 static outcome check_state_array(fmu *f, const double to[], size_t n)
 {
-    REQUIRE(n == N_STATES && to != NULL, "%zu states asked for, or NULL; it has %d.", n, N_STATES);
+    REQUIRE(n == N_STATES && to != NULL, "%zu states are requested, or the array is NULL; the FMU has %d states.", n, N_STATES);
     return DONE;
 }
 
@@ -319,11 +320,12 @@ static outcome get_nominals(fmu *f, double nominals[], size_t n)
 
 static outcome get_indicators(fmu *f, size_t n)
 {
-    REQUIRE(n == 0, "%zu event indicators asked for; it has none.", n);
+    REQUIRE(n == 0, "%zu event indicators are requested; the FMU has none.", n);
     return DONE;
 }
 
-/* Update the commands that act after a dead time. Return in *next when the next change arrives, and whether there is one. */
+/* In Model Exchange, let the commands act that have arrived after the dead time. *has_next becomes true when another change
+ * waits, and *next then becomes the time at which it arrives. In Co-Simulation nothing changes. */
 static outcome update_discrete(fmu *f, bool *has_next, double *next)
 {
     *has_next = false;
@@ -342,8 +344,8 @@ static outcome update_discrete(fmu *f, bool *has_next, double *next)
     return DONE;
 }
 
-/* A time beyond stopTime is allowed. Solvers pass the end before they interpolate back to it, and CasADi sets stopTime to 1
- * whatever it integrates over. The model does not depend on time, so it is valid there too. */
+/* A time beyond stopTime is allowed. Solvers step beyond the end and interpolate back, and CasADi always sets stopTime
+ * to 1. The model does not depend on time, so it is valid there too. */
 static outcome set_time(fmu *f, double time)
 {
     REQUIRE(isfinite(time), "time = %g is not a finite number.", time);
@@ -359,7 +361,7 @@ static const char *name_of(unsigned reference)
     return place < N_VARIABLES ? VARIABLES[place].name : "an unknown value reference";
 }
 
-/* True when derivatives may be taken with respect to this variable: inputs and states always, parameters only during
+/* Return true when derivatives may be taken with respect to this variable: inputs and states always, parameters only during
  * initialization (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
 static bool is_known(const fmu *f, unsigned reference)
 {
@@ -383,10 +385,10 @@ static outcome check_partial(fmu *f, const unsigned unknowns[], size_t n_unknown
     REQUIRE((n_unknowns == 0 || unknowns != NULL) && (n_knowns == 0 || knowns != NULL) && (from == 0 || seed != NULL)
                 && (to == 0 || sensitivity != NULL),
             "an argument is NULL.");
-    REQUIRE(n_seed >= from && n_sensitivity >= to, "%zu seeds and %zu sensitivities, it takes %zu and %zu.", n_seed,
+    REQUIRE(n_seed >= from && n_sensitivity >= to, "%zu seeds and %zu sensitivities are given; it takes %zu and %zu.", n_seed,
             n_sensitivity, from, to);
     for (size_t i = 0; i < n_knowns; i++) {
-        REQUIRE(is_known(f, knowns[i]), "%s is no known variable in %s.", name_of(knowns[i]), mode_name(f->now.mode));
+        REQUIRE(is_known(f, knowns[i]), "%s is not a known variable in %s.", name_of(knowns[i]), mode_name(f->now.mode));
     }
     for (size_t i = 0; i < n_unknowns; i++) {
         REQUIRE(is_unknown(unknowns[i]), "%s is neither an output nor a derivative.", name_of(unknowns[i]));
@@ -415,7 +417,7 @@ static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknown
     }
     add_changes(f, d);
     for (size_t i = 0; i < n_unknowns; i++) {
-        REQUIRE(isfinite(d[place_of(unknowns[i])]), "that of %s is not a finite number.", name_of(unknowns[i]));
+        REQUIRE(isfinite(d[place_of(unknowns[i])]), "the derivative of %s is not a finite number.", name_of(unknowns[i]));
     }
     for (size_t i = 0; i < n_unknowns; i++) {
         sensitivity[i] = d[place_of(unknowns[i])];
@@ -435,13 +437,13 @@ static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int
 {
     REQUIRE(n == 0 || (vr != NULL && order != NULL && value != NULL), "vr, order or value is NULL.");
     for (size_t i = 0; i < n; i++) {
-        REQUIRE(is_output(vr[i]), "value reference %u is no output.", vr[i]);
+        REQUIRE(is_output(vr[i]), "value reference %u is not an output.", vr[i]);
         REQUIRE(order[i] == 1, "order %d of %s is not available, only 1.", order[i], name_of(vr[i]));
     }
     double rates[N_VARIABLES] = {0.0};
     calculate(f);
     memcpy(rates + FIRST_STATE, f->now.values + FIRST_CALCULATED, N_STATES * sizeof rates[0]);
-    model_tangent(f->now.values, rates); /* the derivatives of the thrust, which changes with the forces that lag */
+    model_tangent(f->now.values, rates); /* the rates of the other outputs, which follow from those of the states */
     for (size_t i = 0; i < n; i++) {
         REQUIRE(isfinite(rates[place_of(vr[i])]), "the derivative of %s overflows.", name_of(vr[i]));
     }
@@ -468,22 +470,23 @@ static outcome check_step(fmu *f, double t, double h)
     return DONE;
 }
 
-/* Warn when a step from t does not begin at `time`, where the FMU is. The changes that wait for the dead time move along. */
+/* Warn when a step from t does not begin at `time`, the time of the FMU. The changes that wait for the dead time are shifted by
+ * the difference. */
 static void follow_jump(fmu *f, double time, double t, double h)
 {
     if (fabs(t - time) > time_tolerance(time, h)) {
 #if HAS_DEAD_TIME
         delay_move(&f->now.line, t - time);
 #endif
-        WARN_ONCE(f, TIME_JUMPED, "the step from t = %.15g does not begin at t = %.15g, where the FMU is; done from its "
-                  "state, and said once.", t, time);
+        WARN_ONCE(f, TIME_JUMPED, "the step from t = %.15g does not begin at t = %.15g, the time of the FMU; "
+                  "it begins at the state of the FMU. Logged once.", t, time);
     }
 }
 
 /* Advance the states by h seconds from t with the inputs held. Add to *cuts the number of pieces beyond the first one. */
 static outcome advance(fmu *f, double t, double h, int *cuts)
 {
-    double next[N_STATES], heading = f->now.heading, sum = 0.0; /* it stays 0 while every state is finite: 0 times infinity or NaN is NaN */
+    double next[N_STATES], heading = f->now.heading;
     const int pieces = delayed_step(f->now.values, &f->numbers, &f->now.line, f->now.time, h, next, &heading);
     REQUIRE(pieces >= 0, "too many changes of commands wait for the dead time at t = %g; change them less often.", t);
     *cuts += pieces - 1;
@@ -492,10 +495,7 @@ static outcome advance(fmu *f, double t, double h, int *cuts)
         FAIL(f, "the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; the state from before is kept.",
              h, t, (int)MOST_PIECES);
     }
-    for (size_t i = 0; i < N_STATES; i++) {
-        sum += 0.0 * next[i];
-    }
-    if (sum != 0.0) {
+    if (!all_finite(next, N_STATES)) {
         f->now.mode = FAILED;
         FAIL(f, "the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
     }

@@ -1,8 +1,8 @@
 /* An instance of the FMU, its log, and the checks at the beginning of every FMI function, for all versions of FMI.
  *
- * A call that is refused (illegal in the mode, bad argument, value out of bounds) changes nothing. Only a step whose
- * result overflows puts the instance into error mode. The instance then keeps the state from before the step, or from
- * the end of the last piece when intermediate updates divide the step into pieces. */
+ * A call that is refused changes nothing. It is refused when it is illegal in the mode, or when an argument or a value is
+ * wrong. A step that cannot be computed puts the instance into error mode: its result overflows, or it takes more than
+ * MOST_PIECES pieces. The instance then keeps the state from before the step, or from the last intermediate update. */
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -19,9 +19,9 @@ typedef enum {
     INTERMEDIATE = 128 /* Co-Simulation, inside a step: intermediate update of FMI 3.0 */
 } lifecycle;
 
-/* Variables are numbered by their place in VARIABLES, from 0. FMI 2.0 numbers value references likewise. FMI 3.0 numbers
- * them from 1 (FIRST_REFERENCE), because OMSimulator takes them for positions in ModelVariables, which begin at 1. This
- * function is the only one that knows the difference. The reference 0 of FMI 3.0 gives a place that no variable has. */
+/* The place of a variable is its index in VARIABLES, from 0. In an FMU of FMI 2.0, value references are these places. In an
+ * FMU of FMI 3.0, they begin at 1 (FIRST_REFERENCE), because OMSimulator confuses them with positions in ModelVariables. Only
+ * this function converts them. In FMI 3.0, the value reference 0 becomes a place that no variable has. */
 static unsigned place_of(unsigned reference)
 {
     return reference - FIRST_REFERENCE;
@@ -36,22 +36,22 @@ enum {
     BETWEEN = INSTANTIATED | INITIALIZATION | RUNNING | TERMINATED | FAILED, /* all modes, except inside a step */
     MAY_LOG = BETWEEN | INTERMEDIATE,
     MAY_RESET = BETWEEN,
-    MAY_SAVE = BETWEEN,
-    MAY_SET_UP = INSTANTIATED,
-    MAY_BEGIN = INITIALIZATION,
-    MAY_END = INITIALIZATION | RUNNING,
-    MAY_COUNT = INSTANTIATED | EVENT | CONTINUOUS,
+    MAY_SAVE = BETWEEN,           /* get, set, free and serialize states */
+    MAY_SET_UP = INSTANTIATED,    /* set up the experiment, and enter Initialization Mode */
+    MAY_BEGIN = INITIALIZATION,   /* exit Initialization Mode */
+    MAY_END = INITIALIZATION | RUNNING, /* terminate */
+    MAY_COUNT = INSTANTIATED | EVENT | CONTINUOUS, /* get the numbers of states and of event indicators */
     MAY_READ = BETWEEN | INTERMEDIATE,
-    MAY_READ_LATER = MAY_READ & ~INSTANTIATED,
+    MAY_READ_LATER = MAY_READ & ~INSTANTIATED, /* get values of types that no variable has, states and rates */
     MAY_WRITE = INSTANTIATED | INITIALIZATION | RUNNING | INTERMEDIATE,
     MAY_WRITE_DISCRETE = MAY_WRITE & ~(CONTINUOUS | INTERMEDIATE),
     MAY_DIFFERENTIATE = BETWEEN & ~INSTANTIATED,
-    MAY_MEET_EVENTS = EVENT | CONTINUOUS | STEP,
+    MAY_MEET_EVENTS = RUNNING,
     MAY_UPDATE = EVENT,
     MAY_MOVE_TIME = EVENT | CONTINUOUS,
     MAY_INTEGRATE = CONTINUOUS,
     MAY_STEP = STEP,
-    MAY_ASK_OUTPUTS = STEP | INTERMEDIATE | TERMINATED | FAILED,
+    MAY_ASK_OUTPUTS = STEP | INTERMEDIATE | TERMINATED | FAILED, /* get the derivatives of outputs */
     MAY_ASK_STATUS = STEP | TERMINATED
 };
 
@@ -72,8 +72,8 @@ typedef struct {
     delay_line line;            /* the changes of commands that wait for the dead time */
 } fmu_state;
 
-/* The warnings that an instance gives once. Inputs that saturate come first, each at its place; the others are calls of
- * importers that the standard does not allow. */
+/* The warnings that an instance gives once. The first ones are about inputs that saturate, each at the place of the input. The
+ * others are about calls that the standard does not allow but importers make. */
 enum { READ_EARLY = FIRST_STATE, TUNED_BETWEEN_EVENTS, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
 
 typedef struct {
@@ -141,6 +141,7 @@ static void emit(const host *callbacks, const char *name, const char *function, 
     } while (0)
 #define FAIL(f, ...) REFUSE(f, REFUSED, logStatusError, __VA_ARGS__)
 #define DISCARD(f, ...) REFUSE(f, DISCARDED, logStatusDiscard, __VA_ARGS__)
+/* Fail unless the condition is true. The function that uses REQUIRE has the instance f. */
 #define REQUIRE(condition, ...)                                                          \
     do {                                                                                 \
         if (!(condition)) {                                                              \

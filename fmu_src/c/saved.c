@@ -73,7 +73,8 @@ static void put_line(unsigned char **to, const delay_line *line)
 #endif
 }
 
-/* Deserialize them. Return false when no call of FMI functions could have led to them. */
+/* Deserialize the changes of commands that wait for the dead time. Return false unless their number is allowed, all numbers are
+ * finite, and the times rise. */
 static bool get_line(const unsigned char **from, delay_line *line)
 {
     bool valid = true;
@@ -105,7 +106,7 @@ static outcome check_mode_of(fmu *f, const fmu_state *s)
     return DONE;
 }
 
-/* True when calls of FMI functions could have led to this state. */
+/* Return true when all numbers of a state are finite, its time is set, and its parameters are within their bounds. */
 static bool is_valid(const fmu_state *s)
 {
     bool valid = isfinite(s->time) && !isnan(s->stop) && isfinite(s->heading)
@@ -149,7 +150,7 @@ static outcome save(fmu *f, void **state)
 {
     REQUIRE(state != NULL, "the state is NULL.");
     saved_state *const saved = state_memory(state);
-    REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");
+    REQUIRE(saved != NULL, "out of memory, or *state is not a state of this FMU.");
     saved->state = f->now;
     return DONE;
 }
@@ -157,7 +158,7 @@ static outcome save(fmu *f, void **state)
 static outcome restore(fmu *f, void *state)
 {
     const saved_state *const saved = as_saved(state);
-    REQUIRE(saved != NULL, "the state is NULL or no state of this FMU.");
+    REQUIRE(saved != NULL, "the state is NULL or not a state of this FMU.");
     REQUIRE(saved->state.type == f->now.type, "the state is of the other interface type.");
     TRY(check_mode_of(f, &saved->state));
     f->now = saved->state;
@@ -172,7 +173,7 @@ static outcome free_saved(fmu *f, void **state)
         return DONE;
     }
     saved_state *const saved = as_saved(*state);
-    REQUIRE(saved != NULL, "*state is no state of this FMU.");
+    REQUIRE(saved != NULL, "*state is not a state of this FMU.");
     saved->owner = NULL;
     free(saved);
     *state = NULL;
@@ -181,7 +182,7 @@ static outcome free_saved(fmu *f, void **state)
 
 static outcome serialized_size(fmu *f, void *state, size_t *size)
 {
-    REQUIRE(as_saved(state) != NULL && size != NULL, "the state is NULL or no state of this FMU, or size is NULL.");
+    REQUIRE(as_saved(state) != NULL && size != NULL, "the state is NULL or not a state of this FMU, or size is NULL.");
     *size = SERIALIZED_SIZE;
     return DONE;
 }
@@ -189,8 +190,8 @@ static outcome serialized_size(fmu *f, void *state, size_t *size)
 static outcome serialize(fmu *f, void *state, unsigned char bytes[], size_t size)
 {
     const saved_state *const saved = as_saved(state);
-    REQUIRE(saved != NULL && bytes != NULL, "the state is NULL or no state of this FMU, or bytes is NULL.");
-    REQUIRE(size >= SERIALIZED_SIZE, "%zu bytes are too few, it takes %d.", size, (int)SERIALIZED_SIZE);
+    REQUIRE(saved != NULL && bytes != NULL, "the state is NULL or not a state of this FMU, or bytes is NULL.");
+    REQUIRE(size >= SERIALIZED_SIZE, "%zu bytes are too few; a state has %d.", size, (int)SERIALIZED_SIZE);
     const fmu_state *const s = &saved->state;
     unsigned char *to = bytes + MAGIC_SIZE + TOKEN_SIZE;
     memcpy(bytes, MAGIC, MAGIC_SIZE);
@@ -214,7 +215,7 @@ static outcome serialize(fmu *f, void *state, unsigned char bytes[], size_t size
 static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, void **state)
 {
     REQUIRE(bytes != NULL && state != NULL, "bytes or the state is NULL.");
-    REQUIRE(size == SERIALIZED_SIZE, "%zu bytes are no state of this FMU, it has %d.", size, (int)SERIALIZED_SIZE);
+    REQUIRE(size == SERIALIZED_SIZE, "%zu bytes are not a state of this FMU, which has %d.", size, (int)SERIALIZED_SIZE);
     const unsigned char *from = bytes + SERIALIZED_SIZE - 8;
     REQUIRE(memcmp(bytes, MAGIC, MAGIC_SIZE) == 0 && memcmp(bytes + MAGIC_SIZE, MODEL_TOKEN, TOKEN_SIZE) == 0,
             "the bytes are not a state of this FMU.");
@@ -236,9 +237,9 @@ static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, voi
     }
     const bool valid_line = get_line(&from, &s.line);
     TRY(check_mode_of(f, &s));
-    REQUIRE(is_valid(&s) && valid_line, "the bytes hold values that no run can reach.");
+    REQUIRE(is_valid(&s) && valid_line, "the bytes contain values that no run can reach.");
     saved_state *const saved = state_memory(state);
-    REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");
+    REQUIRE(saved != NULL, "out of memory, or *state is not a state of this FMU.");
     saved->state = s;
     return DONE;
 }

@@ -1,7 +1,7 @@
-/* The Taylor series of the states of equation.h: y(t unit) = sum of c[n] t^n, with a unit of time. Every product of two
- * states is a Cauchy product, so each coefficient follows from those before it. The last coefficients show how far the series
- * may be used (Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
- * 2005). */
+/* The Taylor series of the states of equation.h. At the time t * unit, the states are the sum of c[n] t^n. Every
+ * product of two states is a Cauchy product, so each coefficient follows from those before it. The last coefficients
+ * show how far the series may be used (Jorba and Zou, A software package for the numerical integration of ODEs by means
+ * of high-order Taylor methods, 2005). */
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
@@ -21,13 +21,13 @@
 #define SERIES_UNROLLED INLINE
 #endif
 
-enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
+enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save; step.py has its own order */
 
 typedef struct {
     int order;                     /* the order of the highest coefficient that is known */
     uint64_t moving;               /* one bit for each component; it is set where the states are not constant */
     unsigned blocks;               /* one bit for each block of equation.h; it is set where the states are not constant */
-    double size[N_SERIES];         /* for each state, the size of its group */
+    double size[N_SERIES];         /* for each state, the scale of its group plus the size of its first coefficients */
     double unit;                   /* the unit of time, s */
     double pace[N_SERIES];         /* the unit of time, or 0 for the states that are constant */
     double c[ORDER + 1][N_SERIES]; /* the coefficients */
@@ -98,15 +98,15 @@ INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int 
 
 #include "equation.h"
 
-/* A series of order n may be used when its last two coefficients, relative to the size of their state, are below the powers
- * n - 1 and n of a ratio whose power n + 1 is a quarter of a rounding error. The terms that are left out are then negligible,
- * provided that the coefficients decrease at this ratio or are rounding errors themselves. The first entry is for n = 4. */
+/* The largest last two coefficients of a series of order n that may be used, relative to the size of the state. They are the
+ * powers n - 1 and n of the ratio whose power n + 1 is DBL_EPSILON / 4. If the coefficients decrease at this ratio, or are
+ * rounding errors themselves, the terms that are left out are negligible. The first entry is for n = 4. */
 static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-13, 9.9e-14, 5.0e-14, 2.8e-14,
                                       1.8e-14, 1.2e-14, 8.2e-15, 6.0e-15, 4.5e-15, 3.6e-15, 2.9e-15, 2.3e-15};
 static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
                                       9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
 
-/* Return the order of the first coefficient that is not 0, or order + 1 when all are 0. */
+/* Return the order of the first coefficient of state i that is not 0, or s->order + 1 when all are 0. */
 static int series_first(const series *s, int i)
 {
     int first = 0;
@@ -116,7 +116,8 @@ static int series_first(const series *s, int i)
     return first;
 }
 
-/* True when the series may be used up to t = 1. The states from N_USED on are integrals of the others and converge with them. */
+/* Return true when the series may be used up to t = 1. The states from N_USED on are integrals of the others and converge with
+ * them. */
 INLINE bool series_converges(const series *s)
 {
     const double before = SMALL_BEFORE[s->order - 4];
@@ -124,6 +125,7 @@ INLINE bool series_converges(const series *s)
     for (int i = 0; i < N_USED; i++) {
         const double size = s->size[i], a = fabs(s->c[s->order - 1][i]), b = fabs(s->c[s->order][i]);
         done &= a + 0.01 * b <= before * size + DBL_MIN; /* b may be infinite */
+        /* b * b / a estimates the next coefficient; 8 b keeps a small `a` from making it large */
         done &= b * b <= 0.25 * DBL_EPSILON * size * (a + 8.0 * b);
         if (s->order == ORDER) { /* in a motion that begins as a power of time, two coefficients out of three may be 0 */
             done &= fabs(s->c[ORDER - 2][i]) <= 6.0 * before * size + DBL_MIN;
@@ -206,7 +208,8 @@ static double series_root(const series *s, int i)
     return next;
 }
 
-/* Return how long a velocity certainly keeps its sign, at most `length`. *reverses becomes true when it is 0 at that time. */
+/* Return a time, at most `length`, up to which a velocity certainly keeps its sign. *reverses becomes true when the
+ * velocity is 0 at that time. */
 static double series_sign_kept(const series *s, int i, double length, bool *reverses)
 {
     const double shortest = 0x1p-20 * length; /* within this time, the drag of a velocity that just touches 0 is negligible */
@@ -230,7 +233,7 @@ static double series_sign_kept(const series *s, int i, double length, bool *reve
     return length;
 }
 
-/* True when the sizes of the coefficients prove that no velocity reverses before t = 1. */
+/* Return true when the sizes of the coefficients prove that no velocity reverses before t = 1. */
 INLINE bool series_keeps_directions(const series *s)
 {
     double others[N_MONITORED] = {0.0};
@@ -258,7 +261,11 @@ static int series_cut(const series *s, double *length)
             continue;
         }
         const double end = series_sign_kept(s, k, *length, &reverses);
-        reversed = reverses ? k : end < *length ? NONE : reversed;
+        if (reverses) {
+            reversed = k;
+        } else if (end < *length) {
+            reversed = NONE;
+        }
         *length = end;
     }
     return reversed;

@@ -1,4 +1,7 @@
-/* The step. It consists of pieces; each piece is a Taylor series (series.c) that ends at the first reversal of a velocity. */
+/* The step. It consists of pieces. Each piece is a Taylor series (series.c) that ends at the first reversal of a velocity.
+ *
+ * Names in all files of the motion: at are the variables of the vehicle, n the numbers that follow from the parameters, q the
+ * numbers that are held during a piece, y the states of the table, m the motion, s the series. */
 
 enum { MOST_PIECES = 10000 }; /* of a step */
 
@@ -8,12 +11,22 @@ typedef struct {
     double y[N_SERIES];            /* the states at the start of a piece */
     double lost[N_SERIES];         /* the rounding error of each state, to be added to its next change */
     double displacement[N_SERIES]; /* the changes so far of the integrals, which are the states from N_USED on */
-    double scale[N_SERIES];        /* the size of each group of states, or an earlier size / 4 per piece since, if larger */
+    double scale[N_SERIES];        /* for each group, the largest of its size and its earlier sizes, / 4 for each piece since */
     double largest[N_SERIES];      /* the largest size of each group so far */
-    double covered[N_USED];        /* the integral of each state's size over time, to within a factor of two */
+    double covered[N_USED];        /* roughly, the integral of the size of each state over time */
     uint64_t settled;              /* one bit for each component; it is set once the component has settled */
     int reverse[N_MONITORED];      /* 1 for each velocity whose coefficients are those of the negative direction */
 } motion;
+
+/* Return true when all n numbers are finite. */
+static inline bool all_finite(const double x[], int n)
+{
+    bool finite = true;
+    for (int i = 0; i < n; i++) {
+        finite &= isfinite(x[i]) != 0;
+    }
+    return finite;
+}
 
 /* Return the sum of the sizes of the states in a group. */
 static inline double group_size(const double x[N_SERIES], int group)
@@ -25,8 +38,8 @@ static inline double group_size(const double x[N_SERIES], int group)
     return size;
 }
 
-/* True when a velocity that is 0, and whose acceleration is 0, may still begin to move. This happens through a term that is no
- * longer 0 once all states in it move. */
+/* Return true when a velocity that is 0, and whose acceleration is 0, may still begin to move. This happens when all states in
+ * one of its terms begin to move. */
 static bool motion_may_begin(const motion *m, const series *s)
 {
     double moves[N_SERIES], size[N_SERIES];
@@ -186,8 +199,8 @@ INLINE void motion_move(motion *m, const series *s, double length, double change
     }
 }
 
-/* Put a component to rest when its states have faded to nothing and nothing drives them. Return true when that was done. In the
- * remaining `rest` seconds these states would change neither themselves nor their integrals. */
+/* Put a component to rest when nothing drives it and its states are so small that, in the remaining `rest` seconds, they would
+ * change neither each other nor their integrals. Return true when that was done. */
 static bool motion_fades(motion *m, int component, double rest)
 {
     double y[N_SERIES], lost[N_SERIES], rate[N_SERIES];
@@ -234,17 +247,19 @@ static void motion_settle(motion *m, double rest)
     }
 }
 
-/* True when a dynamic component changed so little in a piece that it may have settled. */
+/* Return true when a dynamic component that moves has changed so little in a piece that it may have settled. */
 static bool motion_is_slow(const motion *m, const series *s, const double change[N_SERIES])
 {
-    bool moves[N_COMPONENTS] = {false}, all = true;
+    bool moves[N_COMPONENTS] = {false};
     for (int i = 0; i < N_SERIES; i++) {
         moves[COMPONENT_OF[i]] |= fabs(change[i]) > 0.001 * m->largest[GROUP[i]];
     }
     for (int k = 0; k < N_DYNAMIC; k++) {
-        all &= moves[k] || !(s->moving >> k & 1U);
+        if (s->moving >> k & 1U && !moves[k]) {
+            return true;
+        }
     }
-    return !all;
+    return false;
 }
 
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
@@ -259,7 +274,7 @@ static bool motion_coasts(motion *m, double rest, double *heading)
 
 /* Compute the states after h > 0 seconds with the inputs held. They are finite unless a result overflows. Return the
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
-static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
+static int motion_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
 {
     const double *const state = at + FIRST_STATE;
     double done = 0.0, lost = 0.0; /* the length of all pieces so far, and its rounding error */
@@ -290,7 +305,7 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
                 }
                 if (m.settled != 0U) {
                     motion_begin(&m, s.unit, &s);
-                    motion_grow_short(&m, &s);
+                    (void)motion_grow_short(&m, &s); /* in either case, motion_grow_long continues the series */
                 }
             }
             reach = motion_grow_long(&m, &s);
@@ -356,7 +371,7 @@ static inline int delayed_step(const double at[], const model_numbers *n, const 
                                double next[N_STATES], double *heading)
 {
     (void)line, (void)t;
-    return model_step(at, n, h, next, heading);
+    return motion_step(at, n, h, next, heading);
 }
 
 static inline void delay_commit(const double at[], const delay_line *line, double t, double h)

@@ -28,12 +28,12 @@ static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
     return t->at[vehicle * t->per_vehicle + time * t->per_time];
 }
 
-/* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that differ by whole
- * turns, the one nearest to psi_0 is taken. */
+/* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
+ * differ by whole turns, the one nearest to psi_0 is taken. */
 static void begin(double at[], const model_numbers *numbers, double *heading)
 {
     double state[N_STATES];
-    const bool is_given = HAS_ATTITUDE && model_has_attitude(at + FIRST_STATE);
+    const bool is_given = HAS_ATTITUDE && model_has_direction(at + FIRST_STATE);
     memcpy(state, at + FIRST_STATE, sizeof state);
     model_begin(at, heading);
     if (is_given) {
@@ -45,10 +45,10 @@ static void begin(double at[], const model_numbers *numbers, double *heading)
 
 /* Simulate the vehicles from `first` to `last` - 1. The simulation ends early when *stop becomes nonzero.
  *
- * `given` contains at the place of each variable the values of the inputs, which are held from each time to the next, of the
- * states at the first time, and of the parameters. `recorded` contains the places of the variables that are recorded at every
- * time in result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be computed, or `times`.
- * From that time on, nothing is recorded. */
+ * `given` has one table for each variable, at its place. Inputs are held from each time to the next. Of states and
+ * parameters, only the number at the first time counts. `recorded` has the places of the variables to record. They are
+ * written to result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be
+ * computed, or `times`. From that time on, nothing is recorded. */
 void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
               ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,
               const volatile int *stop)
@@ -85,11 +85,8 @@ void simulate(const table given[N_VARIABLES], const double *time, const int *rec
             if (n + 1 == times) {
                 break;
             }
-            bool finite = delayed_step(at, &numbers, &line, time[n], time[n + 1] - time[n], next, &heading) > 0;
-            for (int i = 0; i < N_STATES; i++) {
-                finite &= isfinite(next[i]) != 0;
-            }
-            if (!finite) {
+            const int pieces = delayed_step(at, &numbers, &line, time[n], time[n + 1] - time[n], next, &heading);
+            if (pieces <= 0 || !all_finite(next, N_STATES)) {
                 failed[vehicle] = n + 1;
                 break;
             }

@@ -52,10 +52,7 @@ void begin(void)
 int step(double h)
 {
     double next[N_STATES];
-    bool done = delayed_step(at, &numbers, &line, elapsed, h, next, &heading) > 0;
-    for (int i = 0; i < N_STATES; i++) {
-        done &= isfinite(next[i]) != 0;
-    }
+    const bool done = delayed_step(at, &numbers, &line, elapsed, h, next, &heading) > 0 && all_finite(next, N_STATES);
     if (done) {
         memcpy(at + FIRST_STATE, next, sizeof next);
         delay_commit(at, &line, elapsed, h);

@@ -19,12 +19,12 @@ from typing import IO, Any
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 
 _POLL = 0.1
-"""The wait for an answer is cut into pieces of so many seconds, because Windows delivers Ctrl-C only between waits."""
+"""The longest single wait for an answer, s. It is short, because Windows delivers Ctrl-C only between waits."""
 _PROGRAM = "import sys; sys.path[:] = {}; from rov_fmu.engine.child_process import _serve; _serve()"
 
 
 class ChildError(Exception):
-    """The FMU has ended the child process, or did not return within the time limit; the text says which."""
+    """The child process has ended, or did not answer within the time limit. The text says which."""
 
 
 class ChildProcess:

@@ -29,7 +29,7 @@ C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-slp-
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 _LIBRARY_FLAGS = ("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
 # -Os makes the module a third smaller. A step then takes a microsecond, and a page draws an image every 16 ms.
-# The module contains functions that no page calls.
+# -Wno-unused-function: the C files contain functions that no page calls.
 _MODULE_FLAGS = (
     *("-Os", "-target", "wasm32-freestanding", "-msimd128", "-nostdlib", "-I.", "-Wl,--no-entry"),
     *("-Wno-unused-function", MODULE_FILE),
@@ -41,7 +41,7 @@ class BuildError(Exception):
 
 
 class OptionError(BuildError):
-    """An error for options that do not go together."""
+    """An option with a wrong value, or options that cannot be combined."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,10 @@ class Platform:
 _LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
 _APPLE_SILICON = "aarch64-macos.11.0"
 
-# In FMI 2.0, FMPy and FMILibrary load darwin64 on Apple Silicon too, so that file has both processors. The standard
-# also has a separate folder (2.3). No known importer looks for x86_64-linux, -windows or -darwin in FMI 2.0. On Apple
-# Silicon, FMPy, FMILibrary since 3.0.2, CasADi and the Rust crates load aarch64-darwin in FMI 3.0.
+# In FMI 2.0, FMPy and FMILibrary load darwin64 on Apple Silicon too. Therefore the file for darwin64 has code for both
+# processors. The standard also has a separate folder (2.3). No known importer looks for x86_64-linux, -windows or
+# -darwin in FMI 2.0. On Apple Silicon, FMPy, FMILibrary since 3.0.2, CasADi and the Rust crates load aarch64-darwin in
+# FMI 3.0.
 PLATFORMS: dict[str, Platform] = {
     "linux64": Platform("x86_64-linux", ".so", "x86_64-linux-gnu.2.17", _LINUX),
     "linux32": Platform("x86-linux", ".so", "x86-linux-gnu.2.17", _LINUX),
@@ -192,7 +193,10 @@ class _Compilers:
                 _kill(process)
 
     def run(self, command: Sequence[str], folder: str) -> tuple[int, str]:
-        """Run a compiler, and return its exit code and output. Afterwards no process may write into the folder."""
+        """Run a compiler, and return its exit code and output.
+
+        When this returns, no process writes into the folder any more.
+        """
         with UNINTERRUPTED:
             if self._ended:
                 raise BuildError("interrupted")
@@ -250,7 +254,7 @@ def _compile(name: str, sources: Mapping[str, str], identifier: str, fmi: int, c
                 *C_FLAGS,
                 *_LIBRARY_FLAGS,
                 *WARNINGS,
-                *(f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3)),
+                *(f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)),
                 *("-isystem", str(fmi_headers())),  # without warnings about the headers
                 UNITY_FILE,
                 *target_platform.flags,

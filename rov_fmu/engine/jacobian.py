@@ -1,4 +1,7 @@
-"""The Jacobians of a step: the derivatives of its end by the states at its start, the inputs and the coefficients.
+"""The Jacobians of a step.
+
+They are the derivatives of the states at its end with respect to the states at its start, the inputs and the
+coefficients.
 
 In a Taylor series, the derivatives of the coefficients follow from the same table of terms as the coefficients
 themselves (rov_fmu/model/step.py), because each term is a product of at most two states. A reversal does not
@@ -31,11 +34,12 @@ class StepJacobian:
     after: dict[str, float]
     """The states after the step, by name."""
     states: Array
-    """The derivatives of the states after the step by the states before it (states x states)."""
+    """The derivatives of the states after the step with respect to the states before it (states x states)."""
     inputs: Array
-    """The derivatives of the states after the step by the inputs (states x inputs)."""
+    """The derivatives of the states after the step with respect to the inputs (states x inputs)."""
     coefficients: Array
-    """The derivatives of the states after the step by the coefficients that were asked for (states x coefficients)."""
+    """The derivatives of the states after the step with respect to the coefficients that were asked for (states x
+    coefficients)."""
 
 
 def step_jacobian(
@@ -45,11 +49,11 @@ def step_jacobian(
     h: float,
     coefficients: Sequence[str] = (),
 ) -> StepJacobian:
-    """Return the states after h > 0 seconds with the inputs held, and their derivatives by the series of the step.
+    """Return the states after h > 0 seconds with the inputs held, and their derivatives from the series of the step.
 
     The states and inputs are in the order of `rov.layout.state` and `rov.layout.inputs`. `coefficients` are the names
-    of those by which to differentiate, too. Commands act at once, also in a vehicle with a dead time. At a kink of the
-    thrust curve (saturation, dead band), the derivative is that of one side.
+    of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with a
+    dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
 
     Raises ValueError when the motion overflows or takes too many pieces, and InputError when a coefficient is unknown.
     """
@@ -66,7 +70,7 @@ def step_jacobian(
 
 
 class _Formulas:
-    """The compiled derivatives of a layout's formulas. A change of the name n has the name d_n."""
+    """The compiled derivatives of the formulas of a layout. The change of a variable n has the name d_n."""
 
     def __init__(self, layout: Layout, coefficients: tuple[str, ...]) -> None:
         equation = equation_of(layout)
@@ -74,12 +78,12 @@ class _Formulas:
         changing = [*layout.inputs, *layout.state, *layout.delayed, *coefficients]
         given = {name: f"d_{name}" for name in changing}
         formulas = {**equation.program, **equation.forces, **self.table.coefficient_formulas}
-        self.hold, self.held = _with_tangents(formulas, given, equation)
+        self.held_formulas, self.held = _with_tangents(formulas, given, equation)
         lagging = {force: after for force, (_, after) in equation.lagging.items()}
         progress = {name: f"d_{name}" for name in equation.lags}
-        self.arrive, _ = _with_tangents(lagging, {**self.held, **given, **progress}, equation)
+        self.lag_formulas, _ = _with_tangents(lagging, {**self.held, **given, **progress}, equation)
         moved = {name: f"d_{name}" for name in equation.states}
-        self.finish, self.finished = _with_tangents(equation.ends, {**given, **moved}, equation)
+        self.end_formulas, self.finished = _with_tangents(equation.ends, {**given, **moved}, equation)
         pairs = self.table.products
         self.first = np.array([pair[0] for pair in pairs], int)
         self.second = np.array([pair[1] for pair in pairs], int)
@@ -104,7 +108,7 @@ def _with_tangents(
     both: dict[str, str] = {}
     for name, formula in formulas.items():
         if change := tangent(formula, changes.get):
-            both[f"d_{name}"] = change  # before the formula, which may give its name a new value
+            both[f"d_{name}"] = change  # before the formula, which may overwrite a value that the change needs
             changes[name] = f"d_{name}"
         both[name] = formula
     slopes = {f"slope_of_{name}": table.slope for name, table in equation.tables.items()}
@@ -112,7 +116,10 @@ def _with_tangents(
 
 
 class _Tangents(Motion):
-    """A motion, and its derivatives by the states at its start, inputs and coefficients. No state settles."""
+    """A motion, and its derivatives with respect to the states at its start, the inputs and the coefficients.
+
+    No state settles.
+    """
 
     def __init__(self, formulas: _Formulas, rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float]) -> None:
         layout = formulas.layout
@@ -132,7 +139,7 @@ class _Tangents(Motion):
         """The derivatives of the states of the table (states of the table x directions)."""
 
     def _at(self, more: Mapping[str, float]) -> dict[str, object]:
-        return self.formulas.hold({**self.values, **more, **self.changes})
+        return self.formulas.held_formulas({**self.values, **more, **self.changes})
 
     def _change(self, found: Mapping[str, object], name: str) -> Array:
         return np.asarray(found.get(f"d_{name}", self.changes.get(f"d_{name}", self.zero)), float)
@@ -203,7 +210,7 @@ class _Tangents(Motion):
         values = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
         changes = {f"d_{name}": self.d[self.table.place[name]] for name in values}
         steady = self._at({})
-        found = self.formulas.arrive({**steady, **values, **changes})
+        found = self.formulas.lag_formulas({**steady, **values, **changes})
         self.changes |= {f"d_{force}": self._change(found, force) for force in self.table.equation.lagging}
         for name in values:
             self.d[states.index(name)] = 0.0
@@ -222,7 +229,7 @@ class _Tangents(Motion):
             moved = {name: self.y[n] for name, n in place.items()} | {
                 f"d_{name}": self.d[n] for name, n in place.items()
             }
-            found = self.formulas.finish({**self.start, **starts, **moved})
+            found = self.formulas.end_formulas({**self.start, **starts, **moved})
             rows |= {name: self._change(found, f"next_{name}") for name in QUATERNION}
         end = self.end()
         return {name: end[name] for name in layout.state}, np.array([rows[name] for name in layout.state])

@@ -31,7 +31,7 @@ def load_library(rov: Rov) -> ctypes.CDLL:
     layout = repr(rov.layout)
     with _LOADING:
         if layout not in _LOADED:
-            texts = {**sources(rov), ENGINE_FILE.name: ENGINE_FILE.read_text(encoding="utf-8")}
+            texts = {**sources(rov.layout), ENGINE_FILE.name: ENGINE_FILE.read_text(encoding="utf-8")}
             try:
                 _LOADED[layout] = _load(texts)
             except OSError as error:
@@ -66,7 +66,10 @@ def _key(texts: dict[str, str]) -> str:
 
 
 def _find(folder: Path, key: str) -> Path | None:
-    """Return the library with this key in a folder, or None. A damaged file lacks its digest in its name."""
+    """Return the library with this key in a folder, or None.
+
+    The name of a library contains the digest of its content, so a damaged library is not returned.
+    """
     for path in folder.glob(f"{key}-*"):
         if path.name == _name(key, path.read_bytes()):
             return path

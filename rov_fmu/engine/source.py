@@ -1,24 +1,24 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from itertools import groupby
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
-from rov_fmu.model.attitude import QUATERNION, start_formulas
+from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.formula import names, tangent, to_c
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 
 
 class EquationSource:
-    """The parts of model.h and equation.h in C. `variables` are the names of the variables in the array `at`."""
+    """The parts of model.h and equation.h in C."""
 
-    def __init__(self, layout: Layout, variables: Iterable[str]) -> None:
+    def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self.equation: Equation = equation_of(layout)
-        self.variables = frozenset(variables)
+        self.variables = frozenset(layout.places)
 
     # ---- Names ----
 
@@ -39,8 +39,9 @@ class EquationSource:
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
         equation = self.equation
-        later = [*equation.forces.values(), *(formula for both in equation.lagging.values() for formula in both)]
-        used = {name for formula in later for name in names(formula)} | {*self.layout.thrust}
+        later = [*equation.forces.values(), *equation.outputs.values()]
+        later += [formula for both in equation.lagging.values() for formula in both]
+        used = {name for formula in later for name in names(formula)} | {*self.layout.calculated}
         lasting = [name for name in equation.thrust if name in used]
         return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
 
@@ -68,11 +69,11 @@ class EquationSource:
         return lines
 
     def forces(self) -> list[str]:
-        """Return statements that compute the accelerations by the forces of the thrusters and the loads."""
+        """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
         return [f"q->{name} = {self._c(formula)};" for name, formula in self.equation.forces.items()]
 
     def directions(self) -> list[tuple[str, int]]:
-        """Return each coefficient that depends on a direction, with the place of its velocity among the monitored."""
+        """Return each coefficient that depends on a direction, with the index of its velocity in `monitored`."""
         return [(name, self.equation.monitored.index(d.velocity)) for name, d in self.equation.directed.items()]
 
     def starts(self) -> list[str]:
@@ -91,7 +92,10 @@ class EquationSource:
         return [(curve, [t.name for t in layout.thrusters if t.curve == curve]) for curve in lagging]
 
     def coasting(self) -> list[str]:
-        """Return the integrals with constant rates while all velocities are steady: all, but x and y not in a turn."""
+        """Return the integrals whose rates are constant while all velocities are steady.
+
+        These are all integrals except the x and y of a vehicle that has a heading. With an attitude there are none.
+        """
         if self.layout.has_attitude:
             return []
         return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
@@ -99,7 +103,7 @@ class EquationSource:
     def turning(self) -> list[str]:
         """Return the entries of the rotation matrix that still change while all velocities are steady."""
         kinematic = self.equation.components[self.dynamic() :]
-        rotating = {name for group in kinematic for name in group} & {*self.equation.heading}
+        rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
         return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
 
     def first_rotation(self) -> str:
@@ -108,16 +112,20 @@ class EquationSource:
 
     def _turns(self, name: str) -> bool:
         """Return True when the rate of a state depends on the heading."""
-        return "cos_psi" in self.equation.inputs_of[name] or "sin_psi" in self.equation.inputs_of[name]
+        return "cos_psi" in self.equation.states_in_rate[name] or "sin_psi" in self.equation.states_in_rate[name]
 
-    def group(self, name: str) -> str:
-        """Return the first state of a state's group. The heading and the horizontal position are groups of two."""
+    def size_group(self, name: str) -> str:
+        """Return the first state of the group of a state. The sizes of a group are added.
+
+        Without an attitude, the groups of several states are the cosine and the sine of the heading, and the horizontal
+        position. With an attitude, they are each row of the rotation matrix, and the position.
+        """
         if self.layout.has_attitude:
-            return "x" if name in ("y", "z") else f"R_{name[2]}1" if name.startswith("R_") else name
+            return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def dynamic(self) -> int:
-        """Return the number of components that may settle. They come first, so the C code needs only their number."""
+        """Return the number of components that may settle. These come first, so the C code needs only their number."""
         equation = self.equation
         assert equation.components[: len(equation.dynamic)] == equation.dynamic
         return len(equation.dynamic)
@@ -127,7 +135,7 @@ class EquationSource:
         lines = []
         ends = self.equation.ends
         known = {name: f"state[REF_{name} - FIRST_STATE]" for name in self.layout.state} | {name: name for name in ends}
-        known |= {name: f"y[Y_{name}]" for name in self.equation.states if name in self.equation.heading}
+        known |= {name: f"y[Y_{name}]" for name in self.equation.states if name in self.equation.orientation}
         for name, formula in ends.items():
             lines.append(f"const double {name} = {to_c(formula, lambda n: known[n])};")
         for name in self.layout.state:
@@ -160,8 +168,12 @@ class EquationSource:
         known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, lambda name: known[name])
 
+    @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
-        """Return groups of states whose coefficients are computed together. No group depends on a later one."""
+        """The blocks: groups of neighbouring states whose Taylor coefficients are computed together.
+
+        No block depends on a later one.
+        """
         depth: dict[str, int] = {}
         used = self.equation.used
         for group in self.equation.components:
@@ -174,15 +186,16 @@ class EquationSource:
             found += [tuple(names) for is_level, names in neighbours if is_level]
         return found
 
-    def block_of(self, name: str) -> int:
-        """Return the place of a state's block."""
-        return next(i for i, block in enumerate(self.blocks()) if name in block)
+    @cached_property
+    def block_of(self) -> dict[str, int]:
+        """The index of the block of each state."""
+        return {name: i for i, block in enumerate(self.blocks) for name in block}
 
     def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
-        """Return the products of a block as runs over neighbouring states, and the C expression of each product.
+        """Return the products of a block in runs, and the C expression of each product.
 
-        A run multiplies one state by several neighbouring ones: (that state, the first neighbour, how many). For
-        squares, that state is "".
+        A run multiplies one state by several neighbouring states. It consists of that state, the first neighbour and
+        the number of neighbours. For squares, the first item is empty.
         """
         states = self.equation.states
         pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
@@ -197,7 +210,7 @@ class EquationSource:
                 while (
                     place + length < len(states)
                     and (first, states[place + length]) in candidates
-                    and self.block_of(states[place + length]) == self.block_of(second)
+                    and self.block_of[states[place + length]] == self.block_of[second]
                 ):
                     length += 1
                 if length > best[2]:
@@ -225,22 +238,26 @@ class EquationSource:
                 text += f" + {product}" if text else product
         return text or "0.0"
 
-    def component_of(self, name: str) -> int:
-        """Return the place of a state's component."""
-        return next(i for i, group in enumerate(self.equation.components) if name in group)
+    @cached_property
+    def component_of(self) -> dict[str, int]:
+        """The index of the component of each state."""
+        return {name: i for i, group in enumerate(self.equation.components) for name in group}
 
     def _inputs(self, group: Sequence[str]) -> set[str]:
         """Return the states outside a group that the rates of its states depend on."""
-        return {other for name in group for other in self.equation.inputs_of[name]} - set(group)
+        return {other for name in group for other in self.equation.states_in_rate[name]} - set(group)
 
     def input_bits(self, group: Sequence[str]) -> int:
         """Return one bit for each other component that a component depends on."""
-        return sum(1 << other for other in {self.component_of(name) for name in self._inputs(group)})
+        return sum(1 << other for other in {self.component_of[name] for name in self._inputs(group)})
 
     def needed_with(self, group: Sequence[str]) -> int:
-        """Return bits for the states that let a component act on others unless they are 0, or all bits for always."""
+        """Return one bit for each state by which a component is multiplied in other rows.
+
+        While all these states are 0, the component acts on nothing. All bits are set when it may always act.
+        """
         always, partners = 2**64 - 1, 0
-        needed = {*self.equation.monitored, *(self.equation.heading if self.layout.has_attitude else ())}
+        needed = {*self.equation.monitored, *(self.equation.orientation if self.layout.has_attitude else ())}
         if self.equation.used.isdisjoint(group) or not needed.isdisjoint(group):
             return always
         for name in set(self.equation.states) - set(group):
@@ -270,15 +287,18 @@ class EquationSource:
         return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
 
     def _results(self, formulas: Mapping[str, str]) -> list[str]:
-        """Return statements that assign results, after the entries of the rotation matrix in them."""
-        heading = self.equation.heading
-        needed = _needed(heading, {name for formula in formulas.values() for name in names(formula)})
-        lines = [f"const double {name} = {self._c(heading[name], heading)};" for name in needed]
-        return lines + [f"{place} = {self._c(formula, heading)};" for place, formula in formulas.items()]
+        """Return statements that assign results. Before them come the parts of the orientation that they contain."""
+        orientation = self.equation.orientation
+        needed = _needed(orientation, {name for formula in formulas.values() for name in names(formula)})
+        lines = [f"const double {name} = {self._c(orientation[name], orientation)};" for name in needed]
+        return lines + [f"{place} = {self._c(formula, orientation)};" for place, formula in formulas.items()]
 
     def beginning(self) -> list[str]:
-        """Return statements that set the commands that act, and compute the attitude from its parameters."""
-        lines = [f"at[REF_{name}] = {meta.start!r};" for name, meta in self.layout.delayed.items()]
+        """Return statements for the start.
+
+        They set the delayed commands to their start values, and compute the attitude from its parameters.
+        """
+        lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
         local: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
             text = self._c(formula, local)
@@ -309,9 +329,12 @@ class EquationSource:
         return lines
 
     def tangent_lines(self) -> list[str]:
-        """Return statements that add the changes of the calculated variables to d, which holds all other changes."""
+        """Return statements that write the changes of the calculated variables to d.
+
+        Before, d has the changes of all other variables.
+        """
         equation = self.equation
-        given = self.variables - {*self.layout.thrust}
+        given = self.variables - {*self.layout.calculated}
         text = {name: f"at[REF_{name}]" for name in given}
         text |= {f"d_{name}": f"d[REF_{name}]" for name in given}
         steps: dict[str, str] = {}
@@ -323,7 +346,7 @@ class EquationSource:
             steps[name] = formula
             if change := tangent(formula, change_of):
                 steps[f"d_{name}"] = change
-        results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.thrust if f"d_{name}" in steps}
+        results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.calculated if f"d_{name}" in steps}
         for name in self.layout.state:
             results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
         needed = _needed(steps, {name for formula in results.values() for name in names(formula)})
@@ -343,12 +366,12 @@ def _needed(formulas: Mapping[str, str], wanted: Iterable[str]) -> list[str]:
 
 def generated_sources(layout: Layout) -> dict[str, str]:
     """Return the generated files of a vehicle, model.h and equation.h, by their names."""
-    source = EquationSource(layout, layout.places)
+    source = EquationSource(layout)
     formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
     sizes = {
         "inputs": len(layout.inputs),
         "states": len(layout.state),
-        "thrust": len(layout.thrust) + len(layout.delayed),
+        "others": len(layout.calculated) + len(layout.delayed),
         "commands": len(layout.commands),
         "parameters": len(layout.coefficients) + len(layout.initial),
     }
@@ -361,9 +384,9 @@ def unused_sources(layout: Layout) -> list[str]:
     return [*([] if layout.has_attitude else ["heading.c"]), *([] if layout.has_dead_time else ["delay.c"])]
 
 
-def sources(rov: Rov) -> dict[str, str]:
+def sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    unused = unused_sources(rov.layout)
+    unused = unused_sources(layout)
     names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused]
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in names}
-    return generated_sources(rov.layout) | shared
+    return generated_sources(layout) | shared

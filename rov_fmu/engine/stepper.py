@@ -9,12 +9,12 @@ from math import isfinite
 import numpy as np
 
 from rov_fmu.engine.library import load_library
-from rov_fmu.engine.simulation import TABLE
+from rov_fmu.engine.simulation import places_of, tables_of
 from rov_fmu.model.rov import Rov
 
 
 class Stepper:
-    """One vehicle that moves on step by step. The inputs are held over each step, and each step is exact.
+    """One vehicle that is stepped from time 0 on. The inputs are held over each step, and each step is exact.
 
     All arrays and pointers are made once, so a step costs little more than its computation.
     """
@@ -28,19 +28,18 @@ class Stepper:
         layout = rov.layout
         self._commands = tuple(layout.commands)
         self._dead_time = rov["T_d"] if layout.has_dead_time else 0.0
-        rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)  # commands wait here, and not in the engine
-        places, states = rov.layout.places, [*rov.layout.state]
-        rates = {f"der({name})": places[name] + len(states) for name in states}
-        self._numbers = np.zeros(len(places) + len(states))
-        memory = [f"{name}_0" for name in rov.layout.memory]  # the heading of a vehicle with an attitude
-        tables = np.zeros(len(self._numbers), TABLE)
-        tables["at"] = self._numbers.ctypes.data + self._numbers.itemsize * np.arange(len(self._numbers))
+        # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
+        rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)
+        places, states = places_of(rov.layout), [*rov.layout.state]
+        self._numbers = np.zeros(len(places))
+        continued = [f"{name}_0" for name in rov.layout.continued]  # the heading of a vehicle with an attitude
+        tables = tables_of(self._numbers)
         for name, value in {**rov.coefficients, **rov.layout.usual_inputs, **start}.items():
             if name in places:
                 self._numbers[places[name]] = value
-        kept = [*states, *rov.layout.memory]
-        recorded = np.array([(places | rates)[name] for name in (*kept, *record)], np.intc)
-        self._kept = np.array([places[name] for name in (*states, *memory)])
+        kept = [*states, *rov.layout.continued]
+        recorded = np.array([places[name] for name in (*kept, *record)], np.intc)
+        self._kept = np.array([places[name] for name in (*states, *continued)])
         self._inputs = {name: places[name] for name in rov.layout.inputs}
         self._result = np.empty((len(recorded), 2))
         self._times = np.zeros(2)
@@ -57,7 +56,7 @@ class Stepper:
         """The time, s."""
 
     def step(self, commands: Sequence[float], h: float) -> list[float]:
-        """Hold the commands (in the order of the vehicle's inputs) for h > 0 seconds. Return the recorded variables.
+        """Hold the commands, in the order of `layout.commands`, for h > 0 seconds. Return the recorded variables.
 
         They are those at the end of the step. Raises OverflowError if the motion cannot be computed.
         """

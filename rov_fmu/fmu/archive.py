@@ -46,7 +46,7 @@ class Content:
 def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2) -> Content:
     """Return the FMU in C, for Co-Simulation and Model Exchange. `pages` are further files, by their paths."""
     declared = variables(vehicle.rov)
-    other_version = f"fmi{5 - fmi}_"
+    other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
     left_out = (other_version, *unused_sources(vehicle.layout))
     paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
     sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
@@ -74,7 +74,10 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
 
 
 def _guid(description: bytes, sources: Mapping[str, str]) -> str:
-    """Return a GUID computed from the interface and the code, so that a binary refuses the description of another."""
+    """Return a GUID that is computed from the interface and the code.
+
+    A binary can then refuse the description of another FMU.
+    """
     digest = hashlib.sha256(description)
     for name, text in sorted(sources.items()):
         digest.update(name.encode() + b"\0" + text.encode() + b"\0")
@@ -95,7 +98,7 @@ def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, byte
 
 
 def _fmi_license(fmi: int) -> bytes:
-    """Return the licence of the FMI headers, which stands in a comment in them."""
+    """Return the licence of the FMI headers, which is a comment in them."""
     text = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     start = text.index("Copyright (C)")
     lines = text[start : text.index("*/", start)].splitlines()
@@ -106,7 +109,7 @@ def archive(files: Mapping[str, bytes]) -> bytes:
     """Return the FMU that contains these files, given by their path. The same files give the same bytes."""
     packed = BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as zipped:
-        # the description comes first, so that importers which stream find it at once
+        # the description comes first, so that an importer that reads a stream finds it at once
         for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
             entry = zipfile.ZipInfo(member, _EPOCH)
             entry.create_system = 3  # Unix, also when built on Windows

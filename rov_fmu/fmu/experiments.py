@@ -1,4 +1,4 @@
-"""Read the experiments that any FMU may contain by the layered standard FMI-LS-REF."""
+"""Read the experiments that any FMU may contain. Their format is the layered standard FMI-LS-REF."""
 
 import posixpath
 import zipfile
@@ -21,7 +21,7 @@ _DEFAULT_TOLERANCE = 1e-3
 _DEFAULT_STEPS = 500
 """The number of communication steps if neither the experiment nor the FMU has a step size."""
 _MOST_STEPS = 1_000_000
-"""The largest number of communication steps of an experiment; FMPy takes minutes for so many."""
+"""The largest number of communication steps of an experiment. FMPy needs minutes for this number."""
 _NON_NUMERIC = ("String", "Binary", "Clock")
 """The types whose variables cannot be columns of numbers."""
 
@@ -41,16 +41,16 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _Member:
     """A file in the FMU."""
 
     fmu: Path
-    member: str
+    path: str
 
     def error(self, reason: str) -> FileError:
-        return FileError(f"{self.fmu}: {self.member}: {reason}")
+        return FileError(f"{self.fmu}: {self.path}: {reason}")
 
-    def resolve(self, source: str | None) -> "_Place":
+    def resolve(self, source: str | None) -> "_Member":
         """Return the file to which a relative URI in this file leads."""
         try:
             parts = urlsplit(source or "")
@@ -58,51 +58,54 @@ class _Place:
             parts = urlsplit("")
         if not parts.path or parts.scheme or parts.netloc or parts.path.startswith("/"):
             raise self.error(f"source = {shown(source)} does not lead to a file in the FMU")
-        return _Place(self.fmu, posixpath.normpath(posixpath.join(posixpath.dirname(self.member), unquote(parts.path))))
+        return _Member(self.fmu, posixpath.normpath(posixpath.join(posixpath.dirname(self.path), unquote(parts.path))))
 
 
 class ReferenceResults:
     """The reference results in an FMU that can be unpacked. All methods raise FileError."""
 
     def __init__(self, fmu: Path) -> None:
-        self._manifest = _Place(fmu, MANIFEST)
-        self._description = _Place(fmu, "modelDescription.xml")
+        self._manifest = _Member(fmu, MANIFEST)
+        self._description = _Member(fmu, "modelDescription.xml")
         try:
             self._archive = zipfile.ZipFile(fmu)
         except FileNotFoundError as error:
             raise FileError(f"{fmu}: {NO_FILE}") from error
         except zipfile.BadZipFile as error:
-            raise FileError(f"{fmu}: is no FMU, or a damaged one: {error}") from error
+            raise FileError(f"{fmu}: is not an FMU, or is damaged: {error}") from error
         if MANIFEST not in self._archive.namelist():
             raise self._manifest.error("there is no such file: the FMU carries no reference results")
 
     def experiments(self, description: Any) -> list[Experiment]:
-        """Return all experiments but those of uncertainty analyses. `description` is FMPy's description of the FMU."""
+        """Return all experiments except those of uncertainty analyses.
+
+        `description` is FMPy's description of the FMU.
+        """
         variables = {v.name: v for v in description.modelVariables}
         found: list[Experiment] = []
         for related in _children(self._xml(self._manifest, "fmiReferences"), "Related"):
             role, _, purpose = related.get("role", "").partition("/")
             if role == "experiment" and purpose != "uncertainty-analysis":
-                place = self._manifest.resolve(related.get("source"))
-                found += self._read(place, description.defaultExperiment, variables)
+                member = self._manifest.resolve(related.get("source"))
+                found += self._read(member, description.defaultExperiment, variables)
         if not any(experiment.references for experiment in found):
             raise self._manifest.error("names no experiment with expected results")
         return found
 
-    def _read(self, place: _Place, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
+    def _read(self, member: _Member, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
         """Read a file of experiments."""
-        for element in _children(self._xml(place, "Experiments"), "Experiment"):
+        for element in _children(self._xml(member, "Experiments"), "Experiment"):
             name = element.get("name", "")
             parts = {etree.QName(child).localname: child for child in element if isinstance(child.tag, str)}
             unknown = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References", "Annotations"}
             if unknown:
-                raise place.error(f"experiment {shown(name)}: {', '.join(sorted(unknown))} cannot be run")
+                raise member.error(f"experiment {shown(name)}: {', '.join(sorted(unknown))} cannot be run")
             # drafts after 1.0.0-beta.1 have the times in a child element
             given = dict(element.attrib) | dict(getattr(parts.get("TransientSimulation"), "attrib", {}))
 
             def setting(key: str, fallback: float, given: Mapping[str, str] = given, name: str = name) -> float:
                 if key in given:
-                    return number(given[key], f"experiment {shown(name)}: {key}", place.error)
+                    return number(given[key], f"experiment {shown(name)}: {key}", member.error)
                 value: str | None = getattr(default, key, None)
                 return number(value, f"DefaultExperiment: {key}", self._description.error) if value else fallback
 
@@ -111,13 +114,13 @@ class ReferenceResults:
             step = setting("stepSize", (stop - start) / _DEFAULT_STEPS)
             tolerance = setting("tolerance", _DEFAULT_TOLERANCE)
             if not (stop > start and step > 0.0 and tolerance > 0.0):
-                raise place.error(f"experiment {shown(name)}: must go on from its start, in steps, with a tolerance")
+                raise member.error(f"experiment {shown(name)}: must go on from its start, in steps, with a tolerance")
             steps = (stop - start) / step
             if not steps <= _MOST_STEPS:
                 reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
-                raise place.error(f"experiment {shown(name)}: {reason}; at most {_MOST_STEPS} are run")
+                raise member.error(f"experiment {shown(name)}: {reason}; at most {_MOST_STEPS} are run")
             files = {
-                part: place.resolve(parts[part].get("source"))
+                part: member.resolve(parts[part].get("source"))
                 for part in ("Parameters", "Stimuli", "References")
                 if part in parts
             }
@@ -126,49 +129,49 @@ class ReferenceResults:
             references = self._series(files["References"], variables) if "References" in files else None
             yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references)
 
-    def _parameters(self, place: _Place, variables: Mapping[str, Any]) -> dict[str, str]:
+    def _parameters(self, member: _Member, variables: Mapping[str, Any]) -> dict[str, str]:
         """Read a parameter set in the format of SSP, and return its values as text by name."""
         found = {}
-        for element in self._xml(place, "ParameterSet").iter("{*}Parameter"):
+        for element in self._xml(member, "ParameterSet").iter("{*}Parameter"):
             name, value = element.get("name", ""), next(iter(element), None)
-            variable = _variable(place, name, variables)
+            variable = _variable(member, name, variables)
             if value is None or value.get("value") is None:
-                raise place.error(f"parameter {shown(name)}: has no value")
+                raise member.error(f"parameter {shown(name)}: has no value")
             if value.get("unit") not in (None, variable.unit):
-                raise place.error(f"parameter {shown(name)}: is in {value.get('unit')}, and not in {variable.unit}")
+                raise member.error(f"parameter {shown(name)}: is in {value.get('unit')}, and not in {variable.unit}")
             found[name] = value.get("value")
             if variable.type not in ("String", "Boolean"):
-                number(found[name], f"parameter {shown(name)}", place.error)
+                number(found[name], f"parameter {shown(name)}", member.error)
         return found
 
-    def _series(self, place: _Place, variables: Mapping[str, Any]) -> Series:
+    def _series(self, member: _Member, variables: Mapping[str, Any]) -> Series:
         """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
 
         def check_column(name: str) -> None:
-            variable = _variable(place, name, variables)
+            variable = _variable(member, name, variables)
             if variable.type in _NON_NUMERIC or getattr(variable, "dimensions", None):
-                raise place.error(f"column {shown(name)}: the variable is no single number")
+                raise member.error(f"column {shown(name)}: the variable is not a single number")
 
-        return series(self._text(place), place.error, check_column)
+        return series(self._text(member), member.error, check_column)
 
-    def _text(self, place: _Place) -> str:
+    def _text(self, member: _Member) -> str:
         try:
-            return self._archive.read(place.member).decode("utf-8-sig")
+            return self._archive.read(member.path).decode("utf-8-sig")
         except KeyError:
-            raise place.error("there is no such file in the FMU") from None
+            raise member.error("there is no such file in the FMU") from None
         except UnicodeDecodeError as error:
-            raise place.error(f"not UTF-8 text, at byte {error.start}") from error
+            raise member.error(f"not UTF-8 text, at byte {error.start}") from error
 
-    def _xml(self, place: _Place, root: str) -> Any:
+    def _xml(self, member: _Member, root: str) -> Any:
         """Return the root element of an XML file, which must have the name `root`."""
         try:
             found = etree.fromstring(
-                self._text(place).encode(), etree.XMLParser(resolve_entities=False, no_network=True)
+                self._text(member).encode(), etree.XMLParser(resolve_entities=False, no_network=True)
             )
         except etree.XMLSyntaxError as error:
-            raise place.error(f"not XML: {error}") from error
+            raise member.error(f"not XML: {error}") from error
         if (name := etree.QName(found).localname) != root:
-            raise place.error(f"must begin with <{root}>, and not with <{name}>")
+            raise member.error(f"must begin with <{root}>, and not with <{name}>")
         return found
 
 
@@ -176,7 +179,7 @@ def _children(element: Any, name: str) -> list[Any]:
     return element.findall(f"{{*}}{name}")  # type: ignore[no-any-return]
 
 
-def _variable(place: _Place, name: str, variables: Mapping[str, Any]) -> Any:
+def _variable(member: _Member, name: str, variables: Mapping[str, Any]) -> Any:
     if name not in variables:
-        raise place.error(f"the FMU has no variable {shown(name)}")
+        raise member.error(f"the FMU has no variable {shown(name)}")
     return variables[name]

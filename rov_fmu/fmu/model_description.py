@@ -120,8 +120,8 @@ def build_description(identifier: str) -> bytes:
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-# In FMI 3.0 the unit, the nominal value and the bounds of a variable stand in its declared type only. FMI Library loses
-# the unit of a variable that has a type and also bounds of its own; fmi-sim refuses a unit on a variable.
+# In FMI 3.0, only the declared type of a variable has its unit, its nominal value and its bounds. FMI Library loses the
+# unit of a variable that has a type and also bounds of its own, and fmi-sim refuses a unit on a variable.
 
 
 def _type(variable: Variable) -> dict[str, str | float | None]:

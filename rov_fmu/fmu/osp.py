@@ -61,13 +61,17 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
 
 
 def osp_model_description(layout: Layout) -> bytes:
-    """Return the XML document, with every input and output in one group. The same vehicle gives the same bytes."""
-    unit_of = {name: meta.unit for name, meta in (layout.inputs | layout.state | layout.thrust).items()}
+    """Return the XML document. Every input and output must be in exactly one group of `_groups`."""
+    unit_of = {
+        name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()
+    }
     groups = []
     for name, candidates in _groups(layout):
         if members := {variable: axis for variable, axis in candidates.items() if variable in unit_of}:
             (unit,) = {unit_of[variable] for variable in members}
             groups.append((_ELEMENTS[unit], name, unit, members))
+    grouped = [variable for *_, members in groups for variable in members]
+    assert sorted(grouped) == sorted(unit_of), "every variable must be in one group"
     order = list(_ELEMENTS.values())
     groups.sort(key=lambda group: order.index(group[0]))
     return render("osp.xml.j2", groups=groups).encode()

@@ -23,12 +23,14 @@ INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"
 """FMPy's name of each interface, by the name on the command line."""
 _SAME = 1e-9
 """The relative difference below which two times are the same."""
-_OF_NOMINAL = 0.01
-"""A deviation is divided by the largest expected value, but at least by this share of the nominal value, which FMI
-recommends for absolute tolerances (2.0, section 2.2.7)."""
-_OF_A_SOLVER = 1e-3
+_SHARE_OF_NOMINAL = 0.01
+"""The least divisor of a deviation, as a share of the nominal value.
+
+Otherwise the divisor is the largest expected value. FMI recommends the nominal value for absolute tolerances (2.0,
+section 2.2.7)."""
+_TOLERANCE_OF_SOLVER = 1e-3
 """The share of the tolerance that the solver of Model Exchange may use at each step."""
-_BY_A_SOLVER = 1e-7
+_LEAST_OF_SOLVER = 1e-7
 """The smallest deviation that counts in Model Exchange, where the errors of the solver's steps add up."""
 _WARNING = 1
 """The status `warning` in every version of FMI; more serious ones are greater."""
@@ -59,9 +61,9 @@ def prove(
 ) -> list[Finding]:
     """Run the experiments of an FMU in a child process and compare the results with the expected ones.
 
-    `interface` is one of INTERFACES; the default is the first one that the FMU has. `tolerance` replaces the tolerances
-    of the experiments; in Model Exchange, where a solver integrates, it is at least 1e-7. `on_experiment` is called
-    before each experiment with its name and the share that is done.
+    `interface` is one of INTERFACES. The default is the first of these that the FMU has. `tolerance` replaces the
+    tolerances of the experiments. In Model Exchange, where a solver integrates, it is at least 1e-7. `on_experiment` is
+    called before each experiment with its name and the share that is done.
 
     Raises FileError, and ProofError if the FMU ends its process.
     """
@@ -130,7 +132,8 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
                 validate=False,
                 start_time=experiment.start,
                 stop_time=experiment.stop,
-                relative_tolerance=experiment.tolerance * (_OF_A_SOLVER if interface == "model-exchange" else 1.0),
+                relative_tolerance=experiment.tolerance
+                * (_TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0),
                 output_interval=experiment.step,
                 fmi_type=kind[0].upper() + kind[1:],
                 start_values=dict(experiment.parameters),
@@ -152,9 +155,9 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
     times, *expected = experiment.references.values()
     nominal = {v.name: float(v.nominal or 1.0) for v in description.modelVariables}
     for name, values in zip(names, expected, strict=True):
-        scale = max(*map(abs, values), _OF_NOMINAL * abs(nominal[name]))
+        scale = max(*map(abs, values), _SHARE_OF_NOMINAL * abs(nominal[name]))
         off = _deviation(result["time"], result[name], times, values)
-        solved = _BY_A_SOLVER if interface == "model-exchange" else 0.0
+        solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         yield Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved))
 
 

@@ -19,7 +19,7 @@ _MODEL = _HERE.parent / "model"
 
 
 def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
-    """Return our files in resources/ by name: the slave, the declaration of the variables, the model.
+    """Return the files of this project in resources/ by name: the slave, the variables in JSON, the model.
 
     The modules are named after the vehicle, because all FMUs and the user's own code share one interpreter.
     """

@@ -1,4 +1,4 @@
-"""Write the experiments and expected results that the FMU contains by the layered standard FMI-LS-REF.
+"""Write the experiments and the expected results in an FMU. Their format is the layered standard FMI-LS-REF.
 
 The experiments are steps of each axis from rest, with and without the vehicle's tuning, at the commands of the
 published tables if the vehicle has them; and a manoeuvre of all axes. The expected results are computed in plain
@@ -35,7 +35,9 @@ _STEPS = 10
 _LONGEST_TAU = 10.0
 """The longest Tau that an experiment uses (s)."""
 _HORIZON = 40.0
-"""The longest experiment in time constants; a vehicle turns by as many radians at most. Half of it with an attitude."""
+"""The longest experiment, in time constants. In this time a vehicle turns by at most this number of radians.
+
+With an attitude, half of this number is used."""
 _COUPLING_FACTOR = 4.0
 """The weight of the coupling in `_horizon`: small differences grow in coupled motion, so experiments are shorter."""
 _NEGLIGIBLE = 1e-8
@@ -81,7 +83,7 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
         "experiments.exp.j2",
         experiments=experiments,
         tolerance=f"{TOLERANCE:g}",
-        description=f"{vehicle.name}: velocities and pose that the FMU must come to, "
+        description=f"{vehicle.name}: velocities and pose that the FMU must reproduce, "
         f"within {TOLERANCE:g} of the largest value of each variable",
     )
     related.append(_related("experiments.exp", EXPERIMENTS, "experiment", "Expected results"))
@@ -104,7 +106,7 @@ def _related(source: str, kind: str, role: str, description: str) -> dict[str, s
 
 
 def _tunable(rov: Rov) -> list[str]:
-    return [name for name, meta in rov.layout.coefficients.items() if meta.tunable]
+    return [name for name, declaration in rov.layout.coefficients.items() if declaration.tunable]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
@@ -129,7 +131,8 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
                 times = [time_units[name] * n for n in _MULTIPLES]
                 trajectory = _trajectory(rov, [(inputs, times)])
                 files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
-                files[references] = _csv(_moving(trajectory, rov.layout.velocities | _place(rov.layout)))
+                pose = _pose_without_quaternion(rov.layout)
+                files[references] = _csv(_moving(trajectory, rov.layout.velocities | pose))
                 yield ExperimentFiles(
                     experiment,
                     _description(rov, axis, percent, name if len(sets) > 1 else "", table, row),
@@ -155,13 +158,16 @@ def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
 
 
 def _horizon(rov: Rov, inputs: Values) -> float:
-    """Return up to _HORIZON times the shortest time constant, but at most the time of a turn by as many radians (s).
+    """Return the longest time of an experiment, s.
+
+    It is _HORIZON times the shortest time constant, or the time in which the vehicle turns by _HORIZON radians if that
+    is less.
 
     The time constant of a restoring force is that of the oscillation that follows from it.
     """
     rates = _swings(rov)
     rates += [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
-    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+    for form, motion in zip(rov.layout.axes, rov.motions(inputs), strict=True):
         A, B = motion.drag(motion.C)
         turning = sqrt(abs(motion.C)) if form.axis.is_rotation else 0.0
         rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
@@ -187,10 +193,10 @@ def _swings(rov: Rov) -> list[float]:
 def _coupling_rate(rov: Rov, inputs: Values) -> float:
     """Return how fast axes of a vehicle with an attitude change each other's velocities near the steady ones (1/s).
 
-    Velocities are divided by the roots of their effective masses, as in the kinetic energy, to compare all axes.
+    Velocities are multiplied by the roots of their effective masses, as in the kinetic energy, to compare all axes.
     """
     root, size = {}, {}
-    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+    for form, motion in zip(rov.layout.axes, rov.motions(inputs), strict=True):
         v, V = form.axis.velocity, motion.steady_velocity()
         root[v] = sqrt(rov.effective_inertia(form))
         size[v] = root[v] * abs(V) if isfinite(root[v] * V) else 0.0
@@ -248,15 +254,19 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
             for name, sign in layout.signs(axis).items():
                 fractions[name] = round(fractions[name] + shares[axis] * sign * vehicle.command_range[1], 6)
         commands = {name: layout.command_of(max(-1.0, min(1.0, x))) for name, x in fractions.items()}
-        others = {name: meta for name, meta in layout.inputs.items() if name not in commands}
-        phases.append(commands | {name: meta.start + 0.05 * load * meta.nominal for name, meta in others.items()})
+        others = {name: declaration for name, declaration in layout.inputs.items() if name not in commands}
+        phases.append(
+            commands
+            | {name: declaration.start + 0.05 * load * declaration.nominal for name, declaration in others.items()}
+        )
     length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
     held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
     trajectory = _trajectory(rov, held)
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
-    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.velocities | _place(layout) | layout.lagging))
+    compared = layout.velocities | _pose_without_quaternion(layout) | layout.lagging
+    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, compared))
     yield ExperimentFiles(
         "manoeuvre",
         "All axes at once, with loads, a current and reversals, then all off",
@@ -280,14 +290,14 @@ def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFil
     if not layout.has_attitude:
         return
     still = layout.usual_inputs
-    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, rov.axes(still), strict=True) if f.axis.is_rotation)
+    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, rov.motions(still), strict=True) if f.axis.is_rotation)
     length = float(f"{0.5 / max(0.5 / _PHASE, *loads, *_swings(rov)):.1g}")
     start = compiled(start_formulas())(_ATTITUDE)
     state = layout.at_rest | {name: start[name] for name in QUATERNION} | {"psi": _ATTITUDE["psi_0"]}
     rows = []
     for t in (0.0, 0.5 * length, length):
         after = rov.step(still, state, t) if t else state
-        rows.append((t, after | {name: rov.thrust(still, after)[name] for name in layout.angles}))
+        rows.append((t, after | {name: rov.calculated(still, after)[name] for name in layout.angles}))
     files["attitude.ssv"] = render(
         "parameters.ssv.j2", name="attitude", values={name: repr(angle) for name, angle in _ATTITUDE.items()}
     )
@@ -318,20 +328,20 @@ def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> l
     return found
 
 
-def _place(layout: Layout) -> dict[str, Declaration]:
+def _pose_without_quaternion(layout: Layout) -> dict[str, Declaration]:
     """Return the position, and the heading where it is a state.
 
-    A quaternion is left out: after more than half a turn, its sign depends on how the turn is divided into steps.
+    The quaternion is left out. After more than half a turn, its sign depends on the division of the turn into steps.
     """
-    return {name: meta for name, meta in layout.pose.items() if name not in QUATERNION}
+    return {name: declaration for name, declaration in layout.pose.items() if name not in QUATERNION}
 
 
 def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[_Row]:
-    """Keep the variables that do not stay at zero except for rounding."""
+    """Keep the variables that move. The others are 0 except for rounding."""
     names = [
         name
-        for name, meta in variables.items()
-        if max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * meta.nominal
+        for name, declaration in variables.items()
+        if max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * declaration.nominal
     ]
     return [(t, {name: values[name] for name in names}) for t, values in rows]
 

@@ -1,9 +1,9 @@
 """The FMU in pure Python: connect rov_fmu/model/rov.py to PythonFMU's Fmi2Slave.
 
 In the FMU this file is the slave module; variables.json (the declaration) and a copy of the model lie in its folder.
-PythonFMU 0.7 cannot return fmi2Discard, and an exception must not reach it: it then releases its objects twice, which
-ends the importer at a later call. When a value is refused, a message with the status is logged, the old value is kept,
-and the call returns fmi2OK.
+PythonFMU 0.7 cannot return fmi2Discard. An exception must not reach it, because PythonFMU then releases its objects
+twice, and a later call ends the importer. When a value is refused, a message with the status is logged, the old value
+is kept, and the call returns fmi2OK.
 """
 
 import json
@@ -61,7 +61,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.layout = layout_of(declaration["layout"])
         inputs, states = len(self.layout.inputs), len(self.layout.state)
-        self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.thrust))
+        self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.calculated))
         self.place = {v["name"]: place for place, v in enumerate(self.declared)}
         self.begin = formula.compiled(attitude.start_formulas())
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
@@ -115,8 +115,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         """Return values, and calculate those that depend on others."""
         if any(map(self._is_calculated, references)):
             model, inputs, state = self._model()
-            rates, thrust = model.derivatives(inputs, state), model.thrust(inputs, state)
-            self.values[self.calculated] = [*rates.values(), *thrust.values()]
+            rates, others = model.derivatives(inputs, state), model.calculated(inputs, state)
+            self.values[self.calculated] = [*rates.values(), *others.values()]
         return [self.values[reference] for reference in references]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -161,7 +161,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def _warn_once(self, what: int | str, text: str) -> None:
         if what not in self.warned:
             self.warned.add(what)
-            self.log(f"{text}; said once.", Fmi2Status.warning)
+            self.log(f"{text}; logged once.", Fmi2Status.warning)
 
     def _is_calculated(self, reference: int) -> bool:
         return bool(self.declared[reference]["initial"] == "calculated")
@@ -171,7 +171,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         return (
             rov.Rov(self.layout, self._named(self.layout.coefficients)),
             self._named((*self.layout.inputs, *self.layout.delayed)),
-            self._named((*self.layout.state, *self.layout.memory)),
+            self._named((*self.layout.state, *self.layout.continued)),
         )
 
     def _get_fmu_state(self) -> dict[str, Any]:

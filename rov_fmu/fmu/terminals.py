@@ -18,7 +18,10 @@ SIGNAL = "signal"
 
 @dataclass(frozen=True)
 class Terminal:
-    """Variables of one causality. A plug is connected as a whole, a bus by the variables that both sides have."""
+    """A group of variables of one causality.
+
+    A plug is connected as a whole. Of a bus, the variables that both sides have are connected.
+    """
 
     name: str
     causality: str
@@ -28,11 +31,14 @@ class Terminal:
 
 
 def terminals(layout: Layout) -> list[Terminal]:
-    """Return the terminals of a vehicle. Every input and output is in exactly one."""
+    """Return the terminals of a vehicle. Every input and output is in exactly one.
+
+    All calculated variables except the Euler angles are in the terminal `thrust`.
+    """
     battery = ("voltage",) if layout.voltage is not None else ()
     loads = tuple(form.axis.external for form in layout.axes)
     current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
-    thrust = tuple(name for name in layout.lagging | layout.thrust if name not in layout.angles)
+    thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     driven = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"

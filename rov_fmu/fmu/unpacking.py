@@ -37,16 +37,16 @@ def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
         where = f": {os.path.relpath(error.filename, folder)}" if error.filename else ""
         raise FileError(f"{fmu}: cannot be unpacked: {error.strerror or error}{where}") from error
     except Exception as error:  # zipfile raises many kinds on damaged or encrypted archives
-        raise FileError(f"{fmu}: is no FMU, or a damaged one: {brief(str(error))}") from error
+        raise FileError(f"{fmu}: is not an FMU, or is damaged: {brief(str(error))}") from error
     try:
         return fmpy.read_model_description(str(folder), validate=False)
     except Exception as error:  # what FMPy raises
         reason = str(error).replace(f"{folder}{os.sep}", "")
-        raise FileError(f"{fmu}: is no FMU that FMPy reads: {brief(reason)}") from error
+        raise FileError(f"{fmu}: is not an FMU that FMPy can read: {brief(reason)}") from error
 
 
 def _refusal(zipped: zipfile.ZipFile) -> str:
-    """Why an archive is not unpacked; an empty text if it is."""
+    """Return the reason why an archive is refused, or an empty text if it is not."""
     members = zipped.infolist()
     for member in members:
         name = member.orig_filename

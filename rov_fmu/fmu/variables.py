@@ -1,9 +1,9 @@
 """Declare every variable of the FMU once.
 
-modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
-derived from `variables`. Their order is: inputs, state, derivatives, thrust, commands that act after the dead time,
-coefficients, attitude at the start. The value reference of a variable is its place in this order: from 0 in FMI 2.0,
-from 1 in FMI 3.0.
+modelDescription.xml, the table VARIABLES in interface.h, the documentation and the registration with PythonFMU are
+derived from `variables`. The numbers REF_<name> in model.h come from `Layout.places`, which has the same order: inputs,
+states, derivatives, calculated variables, commands that act after the dead time, coefficients, attitude at the start.
+The value reference of a variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
 from collections import Counter
@@ -44,7 +44,7 @@ _BASE = {
 }
 """The exponents of the FMI base units in each symbol of a unit."""
 _SIZES = {"us": 1e-6}
-"""The sizes of the units that are no SI units."""
+"""The sizes of the units that are not SI units."""
 _DISPLAYS = {
     "1": ("%", 100.0),
     "rad": ("deg", degrees(1.0)),
@@ -96,7 +96,7 @@ class Variable:
         return self.value_reference + 1
 
     def reference(self, fmi: int) -> int:
-        """Return the value reference in a version of FMI. In 3.0 it is the index, as OMSimulator confuses the two."""
+        """Return the value reference in a version of FMI. In 3.0 it is the index, because OMSimulator needs it."""
         return self.value_reference if fmi == 2 else self.index
 
     @property
@@ -140,7 +140,7 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
 
 
 def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[str, str]) -> Declaration:
-    """Describe a horizontal velocity over ground by its terms. ψ is 0 without yaw."""
+    """Describe a horizontal velocity over ground by its terms. Without yaw, ψ is 0."""
     turns = layout.has(YAW)
     words = [
         term if turns else f"+ {v}" for v, term in terms.items() if v in layout.velocities and (turns or "cos" in term)
@@ -155,22 +155,26 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
     layout = rov.layout
     result: list[Variable] = []
 
-    def add(name: str, meta: Declaration, causality: str, variability: str, **rest: Any) -> None:
-        bounds = {end: x for end, x in (("minimum", meta.minimum), ("maximum", meta.maximum)) if isfinite(x)}
-        given = {"display_unit": unit_of(meta.unit).display, **bounds, **rest}
-        result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
+    def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
+        bounds = {
+            end: x for end, x in (("minimum", declaration.minimum), ("maximum", declaration.maximum)) if isfinite(x)
+        }
+        given = {"display_unit": unit_of(declaration.unit).display, **bounds, **rest}
+        result.append(
+            Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **given)
+        )
 
-    for name, meta in layout.inputs.items():
+    for name, declaration in layout.inputs.items():
         variability = "discrete" if layout.has_dead_time and name in layout.commands else "continuous"
-        add(name, meta, "input", variability, start=meta.start, nominal=meta.nominal)
-    for name, meta in layout.state.items():
+        add(name, declaration, "input", variability, start=declaration.start, nominal=declaration.nominal)
+    for name, declaration in layout.state.items():
         add(
             name,
-            meta,
+            declaration,
             "output",
             "continuous",
             **({"initial": "calculated"} if name in QUATERNION else {"initial": "exact", "start": 0.0}),
-            nominal=meta.nominal,
+            nominal=declaration.nominal,
             dependencies={name: "constant"},
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
@@ -184,30 +188,38 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             derivative_of=name,
             dependencies=dependencies[f"der({name})"],
         )
-    for name, meta in layout.thrust.items():
-        add(
-            name, meta, "output", "continuous", initial="calculated", display_unit=None, dependencies=dependencies[name]
-        )
-    for name, meta in layout.delayed.items():
-        add(name, meta, "local", "discrete", initial="calculated")
-    for name, meta in layout.coefficients.items():
+    for name, declaration in layout.calculated.items():
         add(
             name,
-            meta,
+            declaration,
+            "output",
+            "continuous",
+            initial="calculated",
+            display_unit=None,
+            dependencies=dependencies[name],
+        )
+    for name, declaration in layout.delayed.items():
+        add(name, declaration, "local", "discrete", initial="calculated")
+    for name, declaration in layout.coefficients.items():
+        add(
+            name,
+            declaration,
             "parameter",
-            "tunable" if meta.tunable else "fixed",
+            "tunable" if declaration.tunable else "fixed",
             initial="exact",
             start=rov[name],
-            display_unit=None if meta.unit == "1" else unit_of(meta.unit).display,
+            display_unit=None if declaration.unit == "1" else unit_of(declaration.unit).display,
         )
-    for name, meta in layout.initial.items():
-        add(name, meta, "parameter", "fixed", initial="exact", start=0.0)
+    for name, declaration in layout.initial.items():
+        add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)
+    places = {v.name: v.value_reference for v in result if v.derivative_of is None}
+    assert places == layout.places, "the C code has another order of the variables"
     return tuple(result)
 
 
 LOG_CATEGORIES = {
     "logEvents": "Changes of mode: initialization, event mode, reset, termination",
-    "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
+    "logStatusWarning": "A command that saturates, or a call that the standard does not allow; each is logged once",
     "logStatusDiscard": "A refused value, of a variable or of a solver's state: not finite, or outside min ... max",
     "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
     "logAll": "All of these categories at once",
@@ -216,11 +228,12 @@ LOG_CATEGORIES = {
 
 
 def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str:
-    """Return interface.h: the variables as the FMI layer needs them, and the functions' names in a static library."""
+    """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
+    declared = variables(rov)
     return render(
         "interface.h.j2",
-        variables=variables(rov),
-        first_reference=variables(rov)[0].reference(fmi),
+        variables=declared,
+        first_reference=declared[0].reference(fmi),
         identifier=identifier,
         token=token,
         fmi=fmi,

@@ -64,7 +64,7 @@ def on_turning(results: Iterable[AxisResult], rov: Rov) -> Iterator[Finding]:
         commands = {p.command for p in result.points if p.weight > 0.0}
         if yaw is None or result.axis not in (SURGE, SWAY) or result.chosen != "points" or not commands:
             continue
-        turning = {c: rov.axes(rov.held_inputs(result.axis, c))[yaw].steady_velocity() for c in commands}
+        turning = {c: rov.motions(rov.held_inputs(result.axis, c))[yaw].steady_velocity() for c in commands}
         command, rate = max(turning.items(), key=lambda turn: abs(turn[1]))
         if abs(rate) > _TURNS:
             numbers = {"command": command, "rate": abs(float(np.degrees(rate)))}

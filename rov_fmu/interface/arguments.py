@@ -44,7 +44,7 @@ def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_repeat: boo
 
 
 def checked_values(
-    what: str, given: Mapping[str, Any], metas: Mapping[str, Declaration], *, many: bool
+    what: str, given: Mapping[str, Any], declarations: Mapping[str, Declaration], *, many: bool
 ) -> dict[str, Array]:
     """Return values by name as arrays. Raises InputError if a name is unknown or a value is out of bounds.
 
@@ -52,19 +52,19 @@ def checked_values(
     """
     found = {}
     for name in _names(what, given):
-        _check_name(what, name, metas)
+        _check_name(what, name, declarations)
         key = f"{what}[{name!r}]"
         values = _numbers(key, given[name])
         if values.ndim > many:
             allowed = "a number, or a sequence of one number for each vehicle" if many else "one number"
             raise InputError(f"{key}: must be {allowed}, and has the shape {values.shape}")
         found[name] = values[:, np.newaxis] if values.ndim else values
-        meta = metas[name]
-        outside = np.flatnonzero((values < meta.minimum) | (values > meta.maximum))
+        declaration = declarations[name]
+        outside = np.flatnonzero((values < declaration.minimum) | (values > declaration.maximum))
         if len(outside):
             wrong = values.flat[outside[0]]
             try:
-                within(float(wrong), meta)
+                within(float(wrong), declaration)
             except ValueError as error:
                 raise InputError(f"{key} = {wrong:.12g}: {error}") from error
     return found
@@ -140,11 +140,11 @@ def _names(what: str, given: Any) -> list[str]:
     return list(given.keys())
 
 
-def _check_name(what: str, name: str, metas: Mapping[str, Declaration]) -> None:
+def _check_name(what: str, name: str, declarations: Mapping[str, Declaration]) -> None:
     """Raise InputError if no variable of this kind has the name."""
-    if name not in metas:
+    if name not in declarations:
         kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
-        known = only(str(name), metas) if len(metas) < 20 else did_you_mean(str(name), metas)
+        known = only(str(name), declarations) if len(declarations) < 20 else did_you_mean(str(name), declarations)
         raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{known}")
 
 
@@ -199,7 +199,7 @@ def checked_record(record: Sequence[str] | None, layout: Layout, names: Collecti
     Raises InputError if a name is unknown.
     """
     if record is None:
-        return [*layout.state, *layout.thrust]
+        return [*layout.state, *layout.calculated]
     for name in [record] if isinstance(record, str) else record:
         if name not in names:
             raise InputError(f"record: the vehicle has no variable {shown(name)}{did_you_mean(str(name), names)}")

@@ -108,7 +108,7 @@ def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in settings:
         name, _, value = (part.strip() for part in text.partition("="))
-        if name not in names and name in layout.thrust:
+        if name not in names and name in layout.calculated:
             raise InputError(f"--set {text}: {name} is an output, which cannot be set")
         if name not in names:
             hint = did_you_mean(name, names)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from math import isfinite, isnan, nan
 from pathlib import Path
+from types import MappingProxyType
 
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, shown, similar
 from rov_fmu.io.reading import read_lines
@@ -48,8 +49,9 @@ class Column:
     also: tuple[str, ...] = ()
     """Other names of the column. They are recognised only together with one of its units."""
     conversions: Mapping[str, Callable[[tuple[float, ...]], Conversion]] = field(default_factory=dict)
-    """Units that need more than a factor. Numbers may follow such a unit, as in `[us 1500 400]`. From them the function
-    makes the conversion to the first unit, or raises ValueError with the reason. The bounds do not apply here."""
+    """Units that need more than a factor. Numbers may follow such a unit, as in `[us 1500 400]`. The function takes
+    these numbers and returns the conversion to the first unit, or raises ValueError with the reason. The bounds do not
+    apply here."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Columns:
     unread: Mapping[str, int]
     """The number of cells by column that are neither numbers nor blank. A loose reading makes them NaN."""
     torn: int
-    """The number of rows that a loose reading left out because they have more cells than the header."""
+    """The number of rows with more cells than the header. A loose reading leaves them out."""
     rows: Callable[[], Iterator[Mapping[str, str]]]
     """Return the cells of each row by column. The file is parsed again, because keeping the texts takes much memory."""
 
@@ -105,7 +107,7 @@ def read_columns(
     *,
     others: bool = False,
     loose: bool = False,
-    renamed: Mapping[str, str] = {},
+    renamed: Mapping[str, str] = MappingProxyType({}),
     hint: str = "",
     check_header: Callable[[Mapping[str, str], Iterable[str]], Iterable[str]] = lambda _, __: (),
 ) -> Columns:
@@ -256,7 +258,7 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
             return nan
         hint = ""
         if "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1)):
-            hint = " with a decimal point, unless ; parts the columns"
+            hint = " with a decimal point, unless ; separates the columns"
         elif ";" in text or "\t" in text:
             hint = "; what separates the cells must be the same as in the header"
         elif not any(map(str.isdigit, text)):
@@ -293,7 +295,7 @@ def _find_columns(
         try:
             if column := find_column(title, columns, others):
                 if any(column.name == before.name for before in found.values()):
-                    raise ValueError("there is such a column before")
+                    raise ValueError("this column occurs twice")
                 found[place] = column
         except ValueError as error:
             is_unknown = isinstance(error, UnknownColumnError) and not str(error).endswith("?")

@@ -29,7 +29,7 @@ _BY_KEY = {
     **dict.fromkeys(("known", "windows", "against", "base"), TESTS_FILE),
     **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
 }
-"""Keys at the top of a TOML file, with the only or the most likely kind of file that has each."""
+"""Keys at the top of a TOML file, each with the only or the most likely kind of file that has it."""
 _HINTS = {
     VEHICLE_FILE: "`rov-fmu build` makes an FMU of it, and a plan names it as `vehicle`",
     PLAN: "`rov-fmu study` carries it out",

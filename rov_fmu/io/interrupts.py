@@ -1,4 +1,4 @@
-"""Protection of actions that Ctrl-C must not interrupt half-way, and the cleaning up when it ends the process."""
+"""Protects actions that Ctrl-C must not interrupt half-way, and cleans up when Ctrl-C ends the process."""
 
 import os
 import shutil
@@ -13,7 +13,9 @@ from pathlib import Path
 from threading import RLock
 
 UNINTERRUPTED = RLock()
-"""A thread holds this lock during an action that must not be interrupted half-way. See `clean_up_everything`."""
+"""A thread holds this lock during an action that must not be interrupted half-way.
+
+The main thread takes it and keeps it when it ends the process; see `clean_up_everything`."""
 _PENDING: list[tuple[Callable[[], object], str]] = []
 """Functions that still have to clean up, the oldest first, each with a note for the user."""
 _ATTEMPTS = 50

@@ -10,8 +10,7 @@ from pathlib import Path
 from textwrap import wrap
 
 MOST = 10
-"""The number of mistakes in a file that are printed; the others are counted."""
-
+"""The largest number of mistakes in a file that are printed. The others are only counted."""
 
 NO_FILE = "there is no such file"
 """The reason if a file is missing."""
@@ -112,13 +111,13 @@ def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
     return [known for folded in close for known in by_folded[folded]][:most]
 
 
-def only(name: str, names: Collection[str], listed: str = "") -> str:
-    """Return the end of a message about a name that is not one of a few: the names that exist, and what was meant.
+def only(name: str, names: Collection[str], in_words: str = "") -> str:
+    """Return the end of a message about an unknown name: the names that exist, and the most similar one.
 
-    `listed` is the list of the names, by default with commas. A single name is not suggested as well.
+    `in_words` replaces the list of the names with commas. If there is only one name, it is not suggested again.
     """
     hint = did_you_mean(name, names) if len(names) > 1 else ""
-    return f", only {listed or ', '.join(names)}{hint}"
+    return f", only {in_words or ', '.join(names)}{hint}"
 
 
 def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[str, str] | None = None) -> str:

@@ -35,7 +35,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
         if not path.parent.is_dir():
             raise WriteError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
         if path.exists() and not path.is_file():
-            raise WriteError(errno.EINVAL, "is a device or a pipe, which no file can take the place of", str(path))
+            raise WriteError(errno.EINVAL, "is a device or a pipe, and cannot be replaced by a file", str(path))
         if path.exists() and not os.access(path, os.W_OK):
             raise WriteError(errno.EACCES, "is read-only", str(path))
         _check_folder(path)
@@ -54,9 +54,9 @@ def _check_folder(path: Path) -> None:
         reasons = {
             errno.EACCES: "its folder is read-only",
             errno.EROFS: "its folder is read-only",
-            errno.ENOENT: f"the folder {path.parent} takes no new files",
+            errno.ENOENT: f"no new file can be made in the folder {path.parent}",
         }
-        reason = reasons.get(error.errno or 0, f"the folder {path.parent} takes no new files: {error.strerror}")
+        reason = reasons.get(error.errno or 0, f"no new file can be made in the folder {path.parent}: {error.strerror}")
         raise WriteError(error.errno, reason, str(path)) from error
 
 

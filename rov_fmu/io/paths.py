@@ -35,7 +35,10 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def inside_or_shipped(folder: Path, name: str) -> Path:
-    """Return the path for a name as `inside` does, or, if nothing is there, the shipped vehicles' path of this name."""
+    """Return the path that `inside` gives for a name.
+
+    If nothing is there, return the path of this name among the shipped vehicles.
+    """
     place, shipped = inside(folder, name), inside(MODELS, name)
     return shipped if os.path.lexists(shipped) and not os.path.lexists(place) else place
 

@@ -43,7 +43,7 @@ def _not_as_written(path: Path) -> str:
         first = rest = ""
     seal = _SEAL.fullmatch(first)
     if not seal:
-        return "does not begin with a digest by identify, so it may be made by hand"
+        return "does not begin with a digest by identify, so it may have been made by hand"
     return "" if seal[1] == _digest(rest) else "has changed since identify wrote it"
 
 

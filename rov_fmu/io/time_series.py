@@ -38,9 +38,9 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
     if all(_NUMBER.fullmatch(name) for name in header):
         raise error("the first line must be a header that names the columns: the time, and then variables")
     if len(header) == 1 and (mark := next((mark for mark in ";\t" if mark in header[0]), None)):
-        raise error(f"columns are parted by commas, and not by {shown(mark)}; numbers have a point")
+        raise error(f"columns must be separated by commas, not by {shown(mark)}, and numbers must have a decimal point")
     if twice := next((name for name in header if header.count(name) > 1), None):
-        raise error(f"column {shown(twice)}: there is such a column before")
+        raise error(f"column {shown(twice)}: this column occurs twice")
     for name in header[1:]:
         if _UNIT.search(name):
             plain = shown(_UNIT.sub("", name))

@@ -27,7 +27,7 @@ class Strict(BaseModel):
 
     @staticmethod
     def hint(_key: str, /) -> str:
-        """Return the end of the message about an unknown key that has another name or place here, or an empty text."""
+        """Return the end of the message about an unknown key: its other name or place. It is empty if there is none."""
         return ""
 
 
@@ -211,7 +211,7 @@ def _constant(schema: dict[str, Any]) -> Any:
 
 
 def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
-    """Return what two problems have in common if they are the same mistake in two entries of a list of tables."""
+    """Return a key for a problem. It is the same for the same mistake in two entries of a list of tables."""
     key = tuple(step for step in problem["loc"][:-1] if isinstance(step, str))
     value = "" if problem["type"] in ("missing", "extra_forbidden") else shown(problem["input"])
     last = [step for step in problem["loc"][-1:] if isinstance(step, str)]

@@ -36,7 +36,7 @@ def unwrapped(angle: float, near: float) -> float:
 
 
 def followed(angle_at: Callable[[float], float], start: float, end: float, angle: float, depth: int = 40) -> float:
-    """Follow an angle from one time to another and return its unwrapped end.
+    """Follow an angle from one time to another, and return the unwrapped angle at the end.
 
     In between, the vehicle must turn by at most 1 rad about any axis. The angle itself turns faster where the nose
     points nearly upward or downward, so the time is halved until the angle changes by at most 1 rad.
@@ -73,6 +73,7 @@ INITIAL = {"phi_0": "Roll angle φ", "theta_0": "Pitch angle θ", "psi_0": "Head
 def start_formulas() -> dict[str, str]:
     """Return formulas from the Euler angles at the start to the quaternion."""
     half: dict[str, str] = {}
+    # cp and sp are the cosine and the sine of half of phi_0; t is for theta_0 and s for psi_0
     for letter, angle in zip("pts", INITIAL, strict=True):
         half |= {f"c{letter}": f"cos(0.5 * {angle})", f"s{letter}": f"sin(0.5 * {angle})"}
     return half | {
@@ -120,7 +121,7 @@ def quaternion_rates(velocities: frozenset[str]) -> dict[str, str]:
 
 
 def quaternion_formulas() -> dict[str, str]:
-    """Return formulas from the rotation matrix to the quaternion, with the sign that is nearer to the old quaternion.
+    """Return formulas from the rotation matrix to the quaternion. Of its two signs, the one nearer to the old is taken.
 
     The matrix 4 q q^T has the rows below. The quaternion is the row with the largest entry on the diagonal, divided by
     its length (Shepperd, Quaternion from rotation matrix, Journal of Guidance and Control, 1978).

@@ -7,7 +7,7 @@ from .layout import Layout, delayed_name
 from .rov import Rov, Values
 
 MOST_WAITING = 1024
-"""The most changes that may wait, as in fmu_src/c/delay.c."""
+"""The largest number of changes that may wait, as in fmu_src/c/delay.c."""
 _ROUNDING = 16.0 * 2.0**-52
 
 
@@ -22,13 +22,13 @@ class DelayLine:
         self.acting = {name: layout.inputs[name].start for name in layout.commands}
         """The commands that act."""
         self.waiting: list[tuple[float, dict[str, float]]] = []
-        """The changes on their way: the time at which each arrives, and the commands."""
+        """The changes that have not arrived yet: the time at which each arrives, and its commands."""
 
     def step(self, rov: Rov, inputs: Values, state: Values, t: float, h: float) -> dict[str, float]:
         """Return the states of a vehicle after h > 0 seconds from time t with the inputs held, exact up to rounding.
 
-        Raises ValueError when more than MOST_WAITING changes wait. After that, and after a motion that overflows, the
-        changes on their way are those from before the step.
+        Raises ValueError when more than MOST_WAITING changes wait. After that, and after a motion that overflows,
+        `waiting` is the same as before the step.
         """
         if not self.layout.has_dead_time:
             return rov.step(inputs, state, h)
@@ -54,7 +54,7 @@ class DelayLine:
         return {delayed_name(name): value for name, value in self.acting.items()}
 
     def move(self, shift: float) -> None:
-        """Move the times of all changes, for an importer that moves the time."""
+        """Shift the times of all waiting changes, for an importer that sets the time to another value."""
         self.waiting = [(arrival + shift, commands) for arrival, commands in self.waiting]
 
     def _send(self, commands: dict[str, float], arrival: float) -> None:

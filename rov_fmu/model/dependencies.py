@@ -13,11 +13,13 @@ from .formula import names, tangent
 from .layout import Layout
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
-"""The kinds of factors (FMI 2.0, section 2.2.8). An importer knows most about a constant factor, then less and less."""
+"""The kinds of factors (FMI 2.0, section 2.2.8).
+
+They are in this order: an importer knows most about a constant factor, and least about a dependent one."""
 
 
 def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
-    """Return for each rate and calculated variable the inputs and states that it depends on, each with its kind.
+    """Return, for each rate and each calculated variable, the inputs and states that it depends on, each with its kind.
 
     The rate of a state is called `der(<state>)`. Inputs and states without influence are left out.
     """
@@ -52,7 +54,7 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
 
 
 def _calculated(layout: Layout) -> tuple[str, ...]:
-    return (*(f"der({name})" for name in layout.state), *layout.thrust)
+    return (*(f"der({name})" for name in layout.state), *layout.calculated)
 
 
 def _formulas(layout: Layout) -> dict[str, str]:
@@ -65,8 +67,8 @@ def _kinds(layout: Layout, formulas: Mapping[str, str]) -> dict[str, int]:
     """Return for each name its kind as a factor, which is an index of KINDS."""
     found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
     found |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
-    for name, meta in layout.coefficients.items():
-        found[name] = KINDS.index("tunable" if meta.tunable else "fixed")
+    for name, declaration in layout.coefficients.items():
+        found[name] = KINDS.index("tunable" if declaration.tunable else "fixed")
     for name, formula in formulas.items():
         found[name] = max((found[other] for other in names(formula)), default=0)
     return found

@@ -6,7 +6,8 @@ Between reversals, and while the inputs are held, the motion is a quadratic syst
 
 `equation_of` derives this table from the layout of a vehicle: the states y, the terms in the rate of each state, and a
 formula for each coefficient. `step.py` computes a step from it in Python, and the C code is generated from it. A new
-effect is a new term with its formula.
+effect is a new term with its formula. If the term contains a state that no other term contains, that state also needs
+an entry in `starts`, and its row must come before those of the states that no term contains.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -23,7 +24,7 @@ from .thrust import thrust_formulas
 
 @dataclass(frozen=True)
 class Term:
-    """A term in the rate of a state: a coefficient, which is multiplied by one or two states or stands alone."""
+    """A term in the rate of a state: a coefficient alone, or a coefficient times one or two states."""
 
     coefficient: str
     """A number or the name of a formula, possibly with a minus before it."""
@@ -40,7 +41,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Directed:
-    """A coefficient that depends on the direction of a velocity. Each of its terms contains that velocity."""
+    """A coefficient that depends on the direction of a velocity. Every term with it contains that velocity."""
 
     velocity: str
     forward: str
@@ -71,15 +72,16 @@ class Equation:
     rows: Mapping[str, tuple[Term, ...]]
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, str]
-    """Formulas from the vehicle's states to the states of the table at the start of a step. The states without a
-    formula start at 0: the integrals, which no term contains, and the progress of the lags."""
+    """Formulas from the states of the vehicle to the states of the table at the start of a step, and `square_length`,
+    which some of them use. States without a formula start at 0. These are the integrals, which no term contains, and
+    the progress of the lags. A state that a term contains must have a formula."""
     lags: Mapping[str, Mapping[str, str]]
     """For the progress of each lag: the forces that lag, each with the name of the steady thrust that it approaches.
 
     The progress p rises from 0 towards 1 during a piece of a step, and each force is then F + (steady - F) p."""
 
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Formulas for calculated variables that follow from the states and the other formulas."""
+    """Formulas for calculated variables that follow from the states, the orientation and the other formulas."""
     ends: Mapping[str, str] = field(default_factory=dict)
     """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
     tables: Mapping[str, ThrustTable] = field(default_factory=dict)
@@ -108,25 +110,27 @@ class Equation:
         }
 
     @cached_property
-    def inputs_of(self) -> dict[str, frozenset[str]]:
-        """The states that the rate of each state depends on."""
+    def states_in_rate(self) -> dict[str, frozenset[str]]:
+        """For each state, the states in its rate."""
         return {
             name: frozenset(factor for term in terms for factor in term.factors) for name, terms in self.rows.items()
         }
 
     @cached_property
     def used(self) -> frozenset[str]:
-        """The states that a term contains, and all of the attitude. The other states are integrals of these."""
-        return frozenset(self.heading.keys() & self.rows.keys()).union(*self.inputs_of.values())
+        """The states that a term contains, and the orientation. The other states are integrals of these.
+
+        In `rows`, the used states must come first, because the C code knows only their number.
+        """
+        return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
 
     @cached_property
     def components(self) -> tuple[tuple[str, ...], ...]:
-        """Groups of states that depend on each other. Each group comes after those that it depends on."""
-        reach = {name: set(inputs) for name, inputs in self.inputs_of.items()}
-        for middle in self.states:
-            for name in self.states:
-                if middle in reach[name]:
-                    reach[name] |= reach[middle]
+        """Groups of states that depend on each other. Each group comes after those that it depends on.
+
+        The groups that may settle come before the kinematic ones.
+        """
+        reach = self._reach
         groups: list[tuple[str, ...]] = []
         for name in self.states:
             group = tuple(n for n in self.states if n == name or (n in reach[name] and name in reach[n]))
@@ -138,20 +142,36 @@ class Equation:
             following = next(g for g in groups if all(reach[name] <= placed | set(g) for name in g))
             done.append(following)
             groups.remove(following)
-        settling = self.used - self.heading.keys()
-        settling = settling.union(*(reach[name] for name in settling))
+        settling = self._settling.union(*(reach[name] for name in self._settling))
         return tuple(sorted(done, key=settling.isdisjoint))
+
+    @cached_property
+    def _reach(self) -> dict[str, set[str]]:
+        """For each state, the states on which it depends, directly or through others."""
+        found = {name: set(states) for name, states in self.states_in_rate.items()}
+        for middle in self.states:
+            for name in self.states:
+                if middle in found[name]:
+                    found[name] |= found[middle]
+        return found
+
+    @cached_property
+    def _settling(self) -> frozenset[str]:
+        """The used states that may settle."""
+        return self.used - self.orientation.keys()
 
     @cached_property
     def dynamic(self) -> tuple[tuple[str, ...], ...]:
         """The components that may settle. The others are kinematic: only the heading and integrals."""
-        settling = self.used - self.heading.keys()
-        last = max(n for n, group in enumerate(self.components) if not settling.isdisjoint(group))
+        last = max(n for n, group in enumerate(self.components) if not self._settling.isdisjoint(group))
         return self.components[: last + 1]
 
     @cached_property
-    def heading(self) -> dict[str, str]:
-        """Formulas for the states of the table that are not states of the vehicle: cosine and sine of the heading."""
+    def orientation(self) -> dict[str, str]:
+        """Formulas for the orientation in the table.
+
+        It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
+        """
         return {name: formula for name, formula in self.starts.items() if name != formula}
 
     @cached_property
@@ -160,7 +180,7 @@ class Equation:
         directed = {name: d.formula for name, d in self.directed.items()}
         by_lag = {term.coefficient for terms in self.rows.values() for term in terms if self._is_lag(term)}
         forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
-        return {**self.parameters, **directed, **self.heading, **self.thrust, **forces}
+        return {**self.parameters, **directed, **self.orientation, **self.thrust, **forces}
 
     @cached_property
     def rates(self) -> dict[str, str]:
@@ -173,7 +193,7 @@ class Equation:
         return found
 
     def _is_lag(self, term: Term) -> bool:
-        """Return True for a term with the progress of a lag, which is 0 at the start of a piece."""
+        """Return True for a term that contains the progress of a lag. Such a term is 0 at the start of a piece."""
         return not self.lags.keys().isdisjoint(term.factors)
 
     @cached_property
@@ -189,27 +209,26 @@ def rate_formula(terms: Iterable[Term]) -> str:
 
 
 def equation_of(layout: Layout) -> Equation:
-    """Derive the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics."""
+    """Return the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics."""
     mass = _mass(layout)
     parameters = _parameters(layout, mass)
     directed: dict[str, Directed] = {}
     held = _held_forces(layout, mass)
     rows: dict[str, tuple[Term, ...]] = {}
-    for form in layout.axes:
-        v = form.axis.velocity
+    for v in layout.velocities:
         lagging = _lagging(layout, mass, v)
         terms = [Term(f"held_{v}"), *(Term(f"remaining_{v}_{curve}", (f"progress_{curve}",)) for curve in lagging)]
         for name, force in _accelerations(layout, mass, v).items():
+            coefficient = name
             if force.velocity and force.is_held:
                 held[name] = force.coefficient
                 directed[f"direction_{force.velocity}"] = Directed(force.velocity, "1", "-1")
-                terms.append(Term(f"direction_{force.velocity} * {name}", force.factors))
-                continue
-            if force.velocity:
+                coefficient = f"direction_{force.velocity} * {name}"
+            elif force.velocity:
                 directed[name] = Directed(force.velocity, force.coefficient, force.reverse)
             else:
                 (held if force.is_held else parameters)[name] = force.coefficient
-            terms.append(Term(name, force.factors))
+            terms.append(Term(coefficient, force.factors))
         coriolis = mass.coriolis(v) if layout.coupled else {}
         for factors, formula in coriolis.items():
             name = f"coupling_{v}" if len(coriolis) == 1 else f"coupling_{v}_{''.join(factors)}"
@@ -227,15 +246,23 @@ def equation_of(layout: Layout) -> Equation:
             lags[progress] = {f"F_{t.name}": f"steady_{t.name}" for t in layout.thrusters if t.curve == curve.name}
     rows |= attitude
     rows |= _kinematics(layout)
-    starts = {form.axis.velocity: form.axis.velocity for form in layout.axes}
+    starts = {v: v for v in layout.velocities}
     if "cos_psi" in rows:
         starts |= {"cos_psi": "cos(psi)", "sin_psi": "sin(psi)"}
-    tables = {table.name: table for curve in layout.curves for table in curve.tables}
-    equation = Equation(parameters, directed, thrust_formulas(layout), held, rows, starts, lags, tables=tables)
-    if not layout.has_attitude:
-        return equation
-    starts |= rotation_formulas()
-    return replace(equation, outputs=angle_formulas(), ends=quaternion_formulas())
+    if layout.has_attitude:
+        starts |= rotation_formulas()
+    return Equation(
+        parameters,
+        directed,
+        thrust_formulas(layout),
+        held,
+        rows,
+        starts,
+        lags,
+        outputs=angle_formulas() if layout.has_attitude else {},
+        ends=quaternion_formulas() if layout.has_attitude else {},
+        tables={table.name: table for curve in layout.curves for table in curve.tables},
+    )
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
@@ -244,7 +271,8 @@ def equation_of(layout: Layout) -> Equation:
 def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, Force]:
     """Return the forces as accelerations of an axis, by the names of their coefficients.
 
-    Forces along several axes accelerate the axis through the inverse of the mass matrix; equal products are added.
+    A force along another axis accelerates this one through the inverse of the mass matrix. Forces with the same effect
+    and the same factors are added. They must agree in `velocity` and `is_held`.
     """
     inverse = mass.inverse(axis)
     sums: dict[str, list[Force]] = {}
@@ -254,8 +282,8 @@ def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, For
             sums.setdefault("_".join((force.effect, axis, *others)), []).append(force)
     found = {}
     for name, forces in sums.items():
-        forward = joined(_times(inverse[force.axis], force.coefficient) for force in forces)
-        reverse = joined(_times(inverse[force.axis], force.reverse or force.coefficient) for force in forces)
+        forward = joined(_acceleration(inverse[force.axis], force.coefficient) for force in forces)
+        reverse = joined(_acceleration(inverse[force.axis], force.reverse or force.coefficient) for force in forces)
         found[name] = replace(forces[0], axis=axis, coefficient=forward, reverse=reverse)
     return found
 
@@ -263,7 +291,7 @@ def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, For
 _DRAG = ("linear", "quadratic")
 
 
-def _times(inverse: str, coefficient: str) -> str:
+def _acceleration(inverse: str, coefficient: str) -> str:
     """Write an acceleration: an acceleration per load times a load, which may begin with a minus."""
     sign = "-" if coefficient.startswith("-") else ""
     return f"{sign}{inverse} * {coefficient.removeprefix('-')}"
@@ -280,11 +308,12 @@ def _mass(layout: Layout) -> MassMatrix:
     for key, *axes in layout.cross:
         if key == "m_a":
             parts.setdefault((axes[0], axes[1]), []).append(cross_name(key, *axes))
-    moves = layout.coupled and layout.has(SURGE, SWAY, HEAVE)  # momentum along a missing axis has an effect
-    for pair, signed in _OF_CENTRE.items():
+    # with the coupling, momentum along an axis that the vehicle lacks still acts on its other axes
+    moves = layout.coupled and layout.has(SURGE, SWAY, HEAVE)
+    for pair, (sign, coordinate) in _OF_CENTRE.items():
         present = [axis for axis in pair if axis in gains]
-        if signed[-3:] in layout.restoring and (len(present) == 2 or (present and moves)):
-            parts.setdefault(pair, []).append(("-" if signed[0] == "-" else "") + f"m_rov * {signed[-3:]}")
+        if coordinate in layout.restoring and (len(present) == 2 or (present and moves)):
+            parts.setdefault(pair, []).append(f"{sign}m_rov * {coordinate}")
     entries = {}
     for pair, sums in parts.items():
         betas = " * ".join(f"beta_{axis}" for axis in pair if axis in gains)
@@ -293,14 +322,15 @@ def _mass(layout: Layout) -> MassMatrix:
 
 
 _OF_CENTRE = {
-    ("u", "q"): "z_G",
-    ("u", "r"): "-y_G",
-    ("v", "p"): "-z_G",
-    ("v", "r"): "x_G",
-    ("w", "p"): "y_G",
-    ("w", "q"): "-x_G",
+    ("u", "q"): ("", "z_G"),
+    ("u", "r"): ("-", "y_G"),
+    ("v", "p"): ("-", "z_G"),
+    ("v", "r"): ("", "x_G"),
+    ("w", "p"): ("", "y_G"),
+    ("w", "q"): ("-", "x_G"),
 }
-"""The entries of the mass matrix by a centre of mass outside of the origin, in units of the mass."""
+"""The entries of the mass matrix that follow from a centre of mass outside the origin, divided by the mass. Each is a
+sign and a coordinate."""
 
 
 def _parameters(layout: Layout, mass: MassMatrix) -> dict[str, str]:
@@ -322,7 +352,7 @@ def _parameters(layout: Layout, mass: MassMatrix) -> dict[str, str]:
 def _held_forces(layout: Layout, mass: MassMatrix) -> dict[str, str]:
     """Return formulas for the torque of every curve, (4), and for the held accelerations of every axis, (18).
 
-    A lag gives the axis a second one: the change of acceleration that remains until the thrust is steady.
+    For each curve with a lag, an axis has another formula: the change of acceleration until the thrust is steady.
     """
     found = {f"tau_{curve.name}": weighted(_torques(layout, curve, "F_{}")) for curve in layout.turning_curves}
     loads = {form.axis.velocity: _load(layout, form) for form in layout.axes}
@@ -344,7 +374,7 @@ def _held_forces(layout: Layout, mass: MassMatrix) -> dict[str, str]:
 
 
 def _load(layout: Layout, form: VehicleAxis) -> str:
-    """Return the force or moment along an axis that is constant while the inputs are held."""
+    """Return the force along an axis, or the moment about it, that is constant while the inputs are held."""
     axis = form.axis
     if axis is YAW:
         thrust = [(1.0, f"tau_{curve.name}") for curve in layout.turning_curves]
@@ -369,7 +399,10 @@ def _remaining(layout: Layout, axis: Axis, curve: Curve) -> str:
 
 
 def _torques(layout: Layout, curve: Curve, force: str) -> list[tuple[float, str]]:
-    """Return the torques of a curve's thrusters: weights and formulas. `force` has {} for the thruster's name."""
+    """Return a weight and a formula for the torque of each thruster of a curve.
+
+    In `force`, {} stands for the name of the thruster.
+    """
     found = []
     for thruster in layout.drivers(YAW):
         if thruster.curve == curve.name:
@@ -399,7 +432,7 @@ def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
 def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
     """Return the rows of the pose, which follows from the velocities and a steady current.
 
-    A vehicle that heads north has cos_psi = 1, sin_psi = 0.
+    A vehicle without yaw always heads north, so its cos_psi is 1 and its sin_psi is 0.
     """
     rows: dict[str, tuple[Term, ...]] = {}
     if layout.has_attitude:

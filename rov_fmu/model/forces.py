@@ -21,11 +21,13 @@ class Force:
     """The formula of the coefficient, a product that may begin with a minus."""
     factors: tuple[str, ...]
     velocity: str = ""
-    """The velocity on whose direction the coefficient depends, if it does."""
+    """The velocity on whose direction the coefficient depends, or an empty text."""
     reverse: str = ""
     """The formula of the coefficient for a negative velocity."""
     is_held: bool = False
-    """True when the coefficient depends on inputs. Its sign changes with that of `velocity`, if one is given."""
+    """True when the coefficient depends on inputs.
+
+    If `velocity` is given, the coefficient is multiplied by the sign of that velocity."""
 
 
 def forces_of(layout: Layout) -> Iterator[Force]:
@@ -51,7 +53,7 @@ def _drag(layout: Layout) -> Iterator[Force]:
 
 
 def _restoring(layout: Layout) -> Iterator[Force]:
-    """Yield the forces and moments of weight and buoyancy: W r_G x k - B r_B x k with k, the downward direction."""
+    """Yield the forces and moments of weight and buoyancy. The moment is W r_G x k - B r_B x k, where k points down."""
     if not (layout.restoring and layout.has_attitude):
         return
     x, y, z = (entry(3, n) for n in (1, 2, 3))
@@ -69,7 +71,10 @@ def _restoring(layout: Layout) -> Iterator[Force]:
 
 
 def _advance(layout: Layout) -> Iterator[Force]:
-    """Yield the loss of thrust by the speed of advance, F - d |c| v_a, in which v_a is linear in the velocities."""
+    """Yield the loss of thrust by the speed of advance.
+
+    The thrust is F - d |c| v_a, and the speed of advance v_a is linear in the velocities.
+    """
     for form in layout.axes:
         for other in layout.axes:
             parts = []

@@ -1,8 +1,8 @@
 """Formulas as text. They are evaluated in Python, differentiated, and translated to C.
 
 A formula is a Python expression of names, numbers, + - * /, comparisons, `and`, `or`, a choice `a if test else b`, and
-the functions sin, cos, abs, sqrt, pow, log and atan2. A name that is called and is none of these is a
-thrust table. Its value is a float.
+the functions sin, cos, abs, sqrt, pow, log and atan2. Any other name that is called is the name of a thrust table. The
+value of a formula is a float.
 """
 
 import ast
@@ -67,7 +67,10 @@ def joined(parts: Iterable[str]) -> str:
 
 
 def weighted(parts: Sequence[tuple[float, str]]) -> str:
-    """Write a weighted sum as one formula. Each part must be a product, or need no brackets in one."""
+    """Write a weighted sum as one formula.
+
+    Each part must be a formula that needs no brackets as a factor, and must not begin with a minus.
+    """
     return joined(
         part if weight == 1.0 else f"-{part}" if weight == -1.0 else f"{weight!r} * {part}" for weight, part in parts
     )
@@ -93,7 +96,8 @@ def compiled(
     """Compile formulas into one function. It takes values by name, and adds the values of the formulas to them.
 
     The formulas are evaluated in their order, and each may use those before it. `tables` are the functions that they
-    call besides FUNCTIONS, by their names. Raises ValueError when one of the texts is not a formula.
+    call besides FUNCTIONS, by their names. Raises SyntaxError when a text is not Python, and ValueError when it is not
+    a formula.
     """
     lines: list[ast.stmt] = []
     for name, formula in formulas.items():
@@ -140,7 +144,7 @@ def to_c(formula: str, name_in_c: Callable[[str], str]) -> str:
 
 
 def _c(node: ast.expr, name_in_c: Callable[[str], str]) -> tuple[str, int]:  # noqa: PLR0911 - a case for each syntax
-    """Return an expression in C, and its precedence. It is 9 for expressions that never need parentheses."""
+    """Return an expression in C and its precedence, which is 9 for expressions that never need parentheses."""
 
     def part(node: ast.expr, least: int) -> str:
         text, precedence = _c(node, name_in_c)
@@ -203,17 +207,17 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
         case ast.BinOp(left=left, op=ast.Mult(), right=right):
             first, second = change(left), change(right)
             return _added(
-                None if first is None else _times(first, right),
+                None if first is None else _product(first, right),
                 ast.Add(),
-                None if second is None else _times(left, second),
+                None if second is None else _product(left, second),
             )
         case ast.BinOp(left=left, op=ast.Div(), right=right):
             above, below = change(left), change(right)
-            rest = None if below is None else _times(node, below)
+            rest = None if below is None else _product(node, below)
             total = _added(above, ast.Sub(), rest)
             return None if total is None else ast.BinOp(total, ast.Div(), right)
         case ast.IfExp():
-            return _chosen(node.test, change(node.body), change(node.orelse))
+            return _choice(node.test, change(node.body), change(node.orelse))
         case ast.Call(func=ast.Name(id=function), args=[argument]):
             inner = change(argument)
             if inner is None:
@@ -222,13 +226,13 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
                 is_negative = ast.Compare(argument, [ast.Lt()], [ast.Constant(0.0)])
                 return ast.IfExp(is_negative, _negative(inner), inner)
             if function == "sqrt":
-                return ast.BinOp(inner, ast.Div(), _times(ast.Constant(2.0), node))
+                return ast.BinOp(inner, ast.Div(), _product(ast.Constant(2.0), node))
             if function not in FUNCTIONS:
-                return _times(ast.Call(ast.Name(f"{SLOPE}{function}"), [argument], []), inner)
+                return _product(ast.Call(ast.Name(f"{SLOPE}{function}"), [argument], []), inner)
             if function == "log":
                 return ast.BinOp(inner, ast.Div(), argument)
             slope = ast.Call(ast.Name("cos" if function == "sin" else "sin"), [argument], [])
-            return _times(slope if function == "sin" else _negative(slope), inner)
+            return _product(slope if function == "sin" else _negative(slope), inner)
         case ast.Call(func=ast.Name(id="pow"), args=[base, exponent]):  # the base is not negative
             first, second = change(base), change(exponent)
             less = ast.BinOp(exponent, ast.Sub(), ast.Constant(1.0))
@@ -239,18 +243,18 @@ def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
                 ast.Constant(0.0),
             )
             return _added(
-                None if first is None else _times(_times(exponent, power), first),
+                None if first is None else _product(_product(exponent, power), first),
                 ast.Add(),
-                None if second is None else _times(_times(node, logarithm), second),
+                None if second is None else _product(_product(node, logarithm), second),
             )
         case ast.Call(func=ast.Name(id="atan2"), args=[above, below]):
             first, second = change(above), change(below)
             total = _added(
-                None if first is None else _times(first, below),
+                None if first is None else _product(first, below),
                 ast.Sub(),
-                None if second is None else _times(second, above),
+                None if second is None else _product(second, above),
             )
-            square = ast.BinOp(_times(above, above), ast.Add(), _times(below, below))
+            square = ast.BinOp(_product(above, above), ast.Add(), _product(below, below))
             return None if total is None else ast.BinOp(total, ast.Div(), square)
     raise ValueError(f"{ast.unparse(node)}: a formula has no such part")
 
@@ -259,7 +263,7 @@ def _negative(node: ast.expr) -> ast.expr:
     return ast.UnaryOp(ast.USub(), node)
 
 
-def _times(left: ast.expr, right: ast.expr) -> ast.expr:
+def _product(left: ast.expr, right: ast.expr) -> ast.expr:
     return ast.BinOp(left, ast.Mult(), right)
 
 
@@ -269,7 +273,7 @@ def _added(left: ast.expr | None, operator: ast.operator, right: ast.expr | None
     return ast.BinOp(left, operator, right)
 
 
-def _chosen(test: ast.expr, body: ast.expr | None, otherwise: ast.expr | None) -> ast.expr | None:
+def _choice(test: ast.expr, body: ast.expr | None, otherwise: ast.expr | None) -> ast.expr | None:
     if body is None and otherwise is None:
         return None
     return ast.IfExp(test, body or ast.Constant(0.0), otherwise or ast.Constant(0.0))

@@ -1,9 +1,11 @@
 """The layout of a vehicle, and the declarations of its coefficients and variables (standard library only).
 
-A layout says which axes, thrust curves and thrusters a vehicle has, without the numbers.
+A layout says which axes, thrust curves, thrusters and fins a vehicle has, and which coefficients. It does not contain
+the values of the coefficients.
 
-Signs and symbols follow Fossen/SNAME and the paper: body frame x forward, y starboard, z down; earth frame
-north-east-down; u, v, w, r are surge, sway, heave and yaw velocity through the water. Heave is positive down.
+Signs and symbols follow Fossen/SNAME and the paper. The axes of the body frame are x forward, y starboard and z down.
+The earth frame is north-east-down. u, v, w are the velocities in surge, sway and heave through the water, and p, q, r
+are the angular velocities in roll, pitch and yaw. Heave is positive down.
 
 A coefficient is declared by its key in the vehicle file. Its name in the FMU also contains the axis or the curve to
 which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the curve t200 gives a_t_t200_reverse.
@@ -27,7 +29,7 @@ class Axis:
 
     name: str
     velocity: str
-    """The symbol of the velocity: u, v, w or r. The names of the axis's coefficients end in it."""
+    """The symbol of the velocity: u, v, w, p, q or r. The names of the coefficients of the axis end in it."""
     unit: str
     """The unit of the velocity."""
     positive: str
@@ -43,7 +45,7 @@ class Axis:
     external: str
     """The name of the input for a force or torque from outside."""
     inertia: str
-    """The coefficient that resists acceleration, together with the added mass: m_rov or I_r."""
+    """The coefficient that resists acceleration, together with the added mass: m_rov, I_p, I_q or I_r."""
     equations: tuple[str, str]
     """The numbers of the paper's equations of drag and motion."""
     place: int
@@ -141,7 +143,7 @@ def cross_declaration(key: str, *velocities: str) -> "Declaration":
     first, *others = (axes[velocity] for velocity in velocities)
     rotations = sum(axis.is_rotation for axis in (first, *others))
     lengths = ".".join(axis.position_unit for axis in others)
-    return CROSS[key].meta(
+    return CROSS[key].declaration(
         inertia=("kg", "kg.m", "kg.m2")[min(rotations, 2)],
         load=first.load,
         axis=first.name,
@@ -174,12 +176,15 @@ class Declaration:
     nominal: float = 1.0
     tunable: bool = False
     start: float = 0.0
-    """The value of an input that is not given, and of a command that acts before the first one."""
+    """The value of an input that is not given. A delayed command also has it until the first change arrives."""
 
 
 @dataclass(frozen=True)
 class CoefficientKind:
-    """A kind of coefficient. `unit` and `words` contain fields {...} for the texts of an axis or a curve."""
+    """A kind of coefficient.
+
+    `unit` and `words` are templates. Their fields {...} are filled with the texts of an axis or a curve.
+    """
 
     unit: str
     words: str
@@ -188,8 +193,8 @@ class CoefficientKind:
     needed: bool = True
     tunable: bool = False
 
-    def meta(self, **of: str) -> Declaration:
-        """Return the declaration of this coefficient of one axis or curve, whose texts are `of`."""
+    def declaration(self, **of: str) -> Declaration:
+        """Return the declaration of this coefficient for one axis or curve. `of` has the texts for the fields."""
         words = self.words.format(**of)
         return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
 
@@ -217,11 +222,13 @@ CROSS = {
     "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic damping a_d in {axis} by {other}", -1e6, 1e6),
     "lift": CoefficientKind("{load}.s2/{lengths}", "Lift in {axis} by {axes}", -1e6, 1e6),
 }
-"""Coefficients of two or three axes. Names end in the velocities: m_a_uq; of lift, they begin with the force: Y_ur."""
+"""The coefficients of two or three axes.
+
+Their names end in the velocities, as in m_a_uq. The name of a lift begins with the letter of the force, as in Y_ur."""
 COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
 """The coefficients of all commands together."""
 _QUARTER = 1.5708
-"""A quarter of a turn, rad, rounded up as people write it."""
+"""A quarter of a turn, rad. It is rounded up, because a file may have 1.5708."""
 ARM = {
     "R": CoefficientKind("m", f"Distance from the centre of mass to a rear thruster R, {cited('(4)')}", 0.0, 100.0),
     "gamma": CoefficientKind(
@@ -230,15 +237,17 @@ ARM = {
 }
 FIN = {
     "lift": CoefficientKind("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
-    "drag": CoefficientKind("N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, False),
+    "drag": CoefficientKind(
+        "N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, needed=False
+    ),
     "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
 }
 """The coefficients of a control surface."""
 CURVE = {
-    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, False),
-    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, False),
+    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
+    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
     "n_V": CoefficientKind(
-        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, False
+        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False
     ),
     "a_t": CoefficientKind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
     "b_t": CoefficientKind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
@@ -251,7 +260,7 @@ CURVE = {
     "c_0": CoefficientKind(
         "1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False
     ),
-    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, False),
+    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
     "d": CoefficientKind(
         "N.s/m", "Loss of thrust d of the {curve} per speed of advance at full command", 0.0, 1e6, needed=False
     ),
@@ -262,6 +271,8 @@ CURVE = {
         "s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False
     ),
 }
+REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
+"""The keys of CURVE that a curve with measured forces does not have."""
 AXIS = {
     "m_a": CoefficientKind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
     "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
@@ -275,11 +286,18 @@ AXIS = {
     "F_0": CoefficientKind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
 _AT_ZERO = "; at 0 the velocity never changes"
-"""What the description of β says where β may be 0."""
+"""The end of the description of β for the axes whose β may be 0."""
 TUNING = {
-    "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
+    "alpha": CoefficientKind(
+        "1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, needed=False, tunable=True
+    ),
     "beta": CoefficientKind(
-        "1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}" + _AT_ZERO, 0.0, 1e3, False, True
+        "1",
+        "Tuning β_{velocity}: scales acceleration in {axis}, {motion}" + _AT_ZERO,
+        0.0,
+        1e3,
+        needed=False,
+        tunable=True,
     ),
 }
 """The tuning factors of every axis; each is 1 unless the file gives it."""
@@ -300,32 +318,42 @@ class ThrustTable:
     forces: tuple[float, ...]
     """The force at each command, N."""
     slopes: tuple[float, ...]
-    """The derivative of the force by the command at each command, N."""
+    """The derivative of the force with respect to the command, at each command, N."""
     voltage: float = 0.0
     """The voltage at which the table was measured, V; 0 if the curve has only this table."""
 
     def force(self, command: float) -> float:
-        """Return the force at a command between -1 and 1: the cubic that has the forces and slopes at its ends."""
-        n, h, t = self._place(command)
-        f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
+        """Return the force at a command between -1 and 1.
+
+        It is the cubic that has the forces and the slopes at the ends of the interval of the command.
+        """
+        f, g, a, b, _, t = self._interval(command)
         return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
 
     def slope(self, command: float) -> float:
-        """Return the derivative of `force`."""
-        n, h, t = self._place(command)
-        f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
+        """Return the derivative of `force` with respect to the command."""
+        f, g, a, b, h, t = self._interval(command)
         return (a + t * (2.0 * (3.0 * (g - f) - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * (g - f)))) / h
 
-    def _place(self, command: float) -> tuple[int, float, float]:
-        """Return the interval of a command, its length, and the command's place in it between 0 and 1."""
+    def _interval(self, command: float) -> tuple[float, float, float, float, float, float]:
+        """Return the interval of a command.
+
+        It has the forces at its ends, the slopes there times its length, its length, and the share of it that lies
+        below the command.
+        """
         n = min(max(bisect_right(self.commands, command) - 1, 0), len(self.commands) - 2)
         h = self.commands[n + 1] - self.commands[n]
-        return n, h, (command - self.commands[n]) / h
+        t = (command - self.commands[n]) / h
+        return self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1], h, t
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) the sum for `together` thrusters, mirrored for c < 0."""
+    """A thrust curve.
+
+    For c > 0, the force of `together` thrusters is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
+    mirrored, unless it has coefficients for reverse. Tables replace both.
+    """
 
     name: str
     keys: tuple[str, ...] = ("a_t", "b_t")
@@ -338,7 +366,7 @@ class Curve:
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
 
     def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key: that of forward when the curve has none for reverse."""
+        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
         return coefficient_name(key if key in self.keys else key.removesuffix(REVERSE), self.name)
 
     @property
@@ -348,6 +376,8 @@ class Curve:
 
 
 Vector = tuple[float, float, float]
+FAINT = 1e-9
+"""Smaller effects, in N per N or m, are rounding errors of a direction."""
 
 
 def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
@@ -360,7 +390,10 @@ def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
 
 @dataclass(frozen=True)
 class Thruster:
-    """A thruster and its place. Its torque about z follows from its position, or is ±R sin γ F by its arm, (4)."""
+    """A thruster. Its moments follow from its position.
+
+    A thruster with an arm instead of a position has only the torque ±R sin γ F about z, (4).
+    """
 
     name: str
     curve: str
@@ -374,7 +407,10 @@ class Thruster:
     description: str = ""
 
     def effect(self, axis: Axis) -> float:
-        """Return the force along an axis, or the torque, of a force of 1 N. An arm's torque is in units of R sin γ."""
+        """Return the force along an axis, or the torque about it, of a thrust of 1 N.
+
+        The torque by an arm is in units of R sin γ.
+        """
         if self.position is None and axis.is_rotation:
             return float(self.arm) if axis is YAW else 0.0
         return effect_along(axis, self.direction, self.position or (0.0, 0.0, 0.0))
@@ -382,7 +418,7 @@ class Thruster:
 
 @dataclass(frozen=True)
 class Fin:
-    """A control surface: its lift, which is proportional to its angle, and its place."""
+    """A control surface. Its lift is proportional to its angle."""
 
     name: str
     direction: tuple[float, float, float]
@@ -411,16 +447,16 @@ class VehicleAxis:
     """The keys of AXIS that the vehicle has. It always has α and β."""
 
     def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key: that of forward when the axis has none for reverse."""
+        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
         return self.axis.coefficient(key if key in self.keys else key.removesuffix(REVERSE))
-
-
-FAINT = 1e-9  # a smaller effect, in m or N per N, is a rounding error of a direction
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The axes, curves and thrusters of a vehicle, without numbers."""
+    """The structure of a vehicle: everything except the values of its coefficients.
+
+    It has the axes, curves, thrusters, fins and inputs.
+    """
 
     axes: tuple[VehicleAxis, ...]
     """The axes in the order of AXES."""
@@ -497,13 +533,13 @@ class Layout:
         return self.coupled or self.has_attitude or bool(self.cross)
 
     @cached_property
-    def memory(self) -> tuple[str, ...]:
-        """The variables besides the states that a step continues: the heading, which counts turns."""
+    def continued(self) -> tuple[str, ...]:
+        """The variables that a step continues besides the states: with an attitude, the heading, which counts turns."""
         return ("psi",) if self.has_attitude else ()
 
     @cached_property
     def driven(self) -> "tuple[Thruster | Fin, ...]":
-        """The thrusters and the fins, which commands drive."""
+        """Everything that commands drive: the thrusters and the fins."""
         return (*self.thrusters, *self.fins)
 
     @cached_property
@@ -521,7 +557,7 @@ class Layout:
         return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
 
     def signs(self, axis: Axis) -> dict[str, float]:
-        """Return the commands that drive an axis in its positive direction: 1 or -1 for every input that acts on it.
+        """Return the sign of each command that acts on an axis: 1 or -1, whichever drives it in its positive direction.
 
         When the thrusters are symmetric, these commands leave the other axes at rest.
         """
@@ -541,25 +577,27 @@ class Layout:
     def coefficients(self) -> dict[str, Declaration]:
         """The coefficients, in the order of the FMU's variables."""
         inertias = {form.axis.inertia for form in self.axes}
-        found = {name: kind.meta() for name, kind in BODY.items() if name in inertias}
-        found |= {key: RESTORING[key].meta() for key in self.restoring}
+        found = {name: kind.declaration() for name, kind in BODY.items() if name in inertias}
+        found |= {key: RESTORING[key].declaration() for key in self.restoring}
         if self.has_arm:
-            found |= {key: kind.meta() for key, kind in ARM.items()}
+            found |= {key: kind.declaration() for key, kind in ARM.items()}
         if self.has_dead_time:
-            found |= {key: kind.meta() for key, kind in COMMANDS.items()}
+            found |= {key: kind.declaration() for key, kind in COMMANDS.items()}
         for curve in self.curves:
             words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-            found |= {curve.coefficient(key): kind.meta(**words) for key, kind in CURVE.items() if key in curve.keys}
+            found |= {
+                curve.coefficient(key): kind.declaration(**words) for key, kind in CURVE.items() if key in curve.keys
+            }
         for fin in self.fins:
             fins = {"fin": fin.description or f"fin {fin.name}"}
             keys = (key for key in FIN if key != "drag" or fin.has_drag)
-            found |= {fin.coefficient(key): FIN[key].meta(**fins) for key in keys}
+            found |= {fin.coefficient(key): FIN[key].declaration(**fins) for key in keys}
         for form in self.axes:
-            metas = metas_of(form.axis)
-            found |= {form.coefficient(key): metas[key] for key in AXIS if key in form.keys}
+            declared = declarations_of(form.axis)
+            found |= {form.coefficient(key): declared[key] for key in AXIS if key in form.keys}
         for form in self.axes:
-            metas = metas_of(form.axis)
-            found |= {form.axis.coefficient(key): metas[key] for key in TUNING}
+            declared = declarations_of(form.axis)
+            found |= {form.axis.coefficient(key): declared[key] for key in TUNING}
         for key, *velocities in self.cross:
             found[cross_name(key, *velocities)] = cross_declaration(key, *velocities)
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
@@ -573,7 +611,7 @@ class Layout:
     def commands(self) -> dict[str, Declaration]:
         """The inputs that drive the thrusters and the fins: fractions of the full command, or of the largest angle.
 
-        They are pulse widths instead if the vehicle has these.
+        If the vehicle has `pulse`, they are pulse widths instead.
         """
         if self.mix:
             words = {name: f"Command u_{name} of {_listed(gains)}" for name, gains in self.mix.items()}
@@ -610,9 +648,9 @@ class Layout:
             return {}
         return {
             delayed_name(name): Declaration(
-                meta.unit, f"Command {name} that acts after the dead time", start=meta.start
+                declaration.unit, f"Command {name} that acts after the dead time", start=declaration.start
             )
-            for name, meta in self.commands.items()
+            for name, declaration in self.commands.items()
         }
 
     @cached_property
@@ -652,7 +690,10 @@ class Layout:
 
     @cached_property
     def pose(self) -> dict[str, Declaration]:
-        """The position and heading, as far as the axes change them; these states follow the velocities."""
+        """The position, and the heading or the quaternion, as far as the axes change them.
+
+        These states come after the velocities.
+        """
         found = {}
         if self.has_attitude:
             if self.has(SURGE, SWAY, HEAVE):
@@ -683,10 +724,11 @@ class Layout:
         return self.velocities | self.pose | self.lagging
 
     @cached_property
-    def thrust(self) -> dict[str, Declaration]:
-        """The calculated variables that are neither states nor rates: thrust and torque, before the tuning α.
+    def calculated(self) -> dict[str, Declaration]:
+        """The calculated variables that are neither states nor rates.
 
-        They are the forces that are not states, and the torque of the thrusters of each curve.
+        They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, and the Euler
+        angles of a vehicle with an attitude. Forces and torques are those before the tuning α.
         """
         found = {
             f"F_{t.name}": _thrust(t, self.curve_of[t.name])
@@ -713,7 +755,7 @@ class Layout:
 
     @cached_property
     def at_rest(self) -> dict[str, float]:
-        """The states of the vehicle at rest in the origin, level and heading north."""
+        """The states of a vehicle that is at rest at the origin, is level and heads north."""
         return dict.fromkeys(self.state, 0.0) | ({"eta": 1.0} if self.has_attitude else {})
 
     @cached_property
@@ -725,12 +767,12 @@ class Layout:
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """The place of each variable in the arrays of the C code. The place of der(x) is len(state) after that of x."""
+        """The index of each variable in the arrays of the C code. That of der(x) is the index of x plus len(state)."""
         found = {name: place for place, name in enumerate([*self.inputs, *self.state])}
         first = len(found) + len(self.state)
         return found | {
             name: first + place
-            for place, name in enumerate([*self.thrust, *self.delayed, *self.coefficients, *self.initial])
+            for place, name in enumerate([*self.calculated, *self.delayed, *self.coefficients, *self.initial])
         }
 
     @cached_property
@@ -740,7 +782,7 @@ class Layout:
         return tuple(curve for curve in self.curves if curve.name in driving)
 
 
-def metas_of(axis: Axis) -> dict[str, Declaration]:
+def declarations_of(axis: Axis) -> dict[str, Declaration]:
     """Return the declarations of all coefficients that an axis can have, by their keys."""
     drag, motion = map(cited, axis.equations)
     words = {
@@ -756,7 +798,7 @@ def metas_of(axis: Axis) -> dict[str, Declaration]:
         "positive": axis.positive,
         "negative": axis.negative,
     }
-    return {key: kind.meta(**words) for key, kind in (AXIS | TUNING).items()}
+    return {key: kind.declaration(**words) for key, kind in (AXIS | TUNING).items()}
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -5,8 +5,8 @@ The effective mass matrix has the entries M_ij = (rigid body + added mass)_ij / 
 
     P' = P x omega + force,    L' = L x omega + P x v + moment.
 
-An axis without entries off the diagonal keeps its acceleration per load gain_i = beta_i/m_i. Other axes form blocks,
-and formulas for the inverse of a block follow from its factors M = L D L^T.
+An axis without entries off the diagonal has the acceleration per load gain_i = beta_i/m_i. The other axes form blocks.
+The inverse of a block follows from its factors M = L D L^T.
 """
 
 from collections.abc import Iterable, Mapping
@@ -36,7 +36,7 @@ class MassMatrix:
     entries: Mapping[tuple[str, str], str]
     """The formulas of the effective entries off the diagonal, by two velocities in the order of the axes.
 
-    The vehicle may lack one of the two axes. Such an entry is a momentum along the axis, or about it, that it lacks."""
+    The vehicle may lack one of the two axes. The entry then gives a momentum along or about the missing axis."""
 
     @cached_property
     def blocks(self) -> tuple[tuple[str, ...], ...]:
@@ -51,7 +51,10 @@ class MassMatrix:
         return not any(axis in block for block in self.blocks)
 
     def inverse(self, axis: str) -> dict[str, str]:
-        """Return a row of the inverse: the names of the accelerations of an axis by a unit load along other axes."""
+        """Return a row of the inverse.
+
+        For each axis that acts on this one, it has the name of the acceleration per load along that axis.
+        """
         for block in self.blocks:
             if axis in block:
                 return {other: f"inverse_{_pair(axis, other)}" for other in block}
@@ -73,7 +76,7 @@ class MassMatrix:
         """Return formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
         found: dict[str, str] = {}
         has_factor: set[tuple[str, str]] = set()
-        for n, row in enumerate(block):
+        for n, row in enumerate(block):  # M = L D L^T, row by row; L has the factors, D the pivots
             for m, column in enumerate(block[:n]):
                 parts = [f"mass_{column}{row}"] if (column, row) in self.entries else []
                 for k in block[:m]:
@@ -84,7 +87,7 @@ class MassMatrix:
                     found[f"factor_{row}{column}"] = f"({joined(parts)}) / pivot_{column}"
             squares = [f"-factor_{row}{k} * factor_{row}{k} * pivot_{k}" for k in block[:n] if (row, k) in has_factor]
             found[f"pivot_{row}"] = joined([f"mass_{row}{row}", *squares])
-        for n, row in enumerate(block):  # K L = 1, from the diagonal outwards
+        for n, row in enumerate(block):  # K L = 1, from the diagonal outwards; K has the names undo_..
             for m in reversed(range(n)):
                 column = block[m]
                 parts = []
@@ -92,7 +95,7 @@ class MassMatrix:
                     if (k, column) in has_factor:
                         parts.append(f"-factor_{k}{column}" if k == row else f"-undo_{row}{k} * factor_{k}{column}")
                 found[f"undo_{row}{column}"] = joined(parts) or "0"
-        for n, row in enumerate(block):
+        for n, row in enumerate(block):  # K^T D^-1 K
             for column in block[n:]:
                 parts = []
                 for k in block[block.index(column) :]:
@@ -106,15 +109,18 @@ class MassMatrix:
         found: dict[tuple[str, str], list[str]] = {}
         for other, inverse in self.inverse(axis).items():
             for pair, entries in self._products(other).items():
-                found.setdefault(pair, []).extend(sign + self._times(inverse, entry) for sign, entry in entries)
+                found.setdefault(pair, []).extend(sign + self._term(inverse, entry) for sign, entry in entries)
         return {pair: joined(parts) for pair, parts in sorted(found.items(), key=lambda item: _places(item[0]))}
 
-    def _times(self, inverse: str, entry: tuple[str, str]) -> str:
+    def _term(self, inverse: str, entry: tuple[str, str]) -> str:
         a, b = entry
         return f"{inverse} / gain_{a}" if a == b and self._is_alone(a) else f"{inverse} * mass_{a}{b}"
 
     def _products(self, axis: str) -> dict[tuple[str, str], list[tuple[str, tuple[str, str]]]]:
-        """Return the right side of Kirchhoff's equations for an axis: for each product, entries with their signs."""
+        """Return the right side of Kirchhoff's equations for an axis.
+
+        For each product of two velocities, it has entries of the mass matrix with their signs.
+        """
         found: dict[tuple[str, str], list[tuple[str, tuple[str, str]]]] = {}
         for sign, momentum, velocity in _KIRCHHOFF[axis]:
             if velocity not in self.gains:

@@ -66,7 +66,7 @@ class Rov:
     # ---- Thrust ----
 
     def curve_force(self, curve: Curve, command: float) -> float:
-        """Return the steady thrust (2) of one thruster (N) for a command."""
+        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage."""
         values = {"u_one": command, "voltage": self.layout.voltage or 0.0}
         *_, force = _thrust_of(curve)({**self.coefficients, **values}).values()
         return force
@@ -104,15 +104,15 @@ class Rov:
             **{name: inputs[name] for name in self.layout.inputs},
             **self._acting(inputs),
             **{name: state[name] for name in self.layout.state},
-            **{name: state[name] for name in self.layout.memory if name in state},
+            **{name: state[name] for name in self.layout.continued if name in state},
         }
 
-    def thrust(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the calculated variables of the thrusters by name."""
+    def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
         found = self._formulas.calculate(self._values(inputs, state))
-        for name in self.layout.memory:
+        for name in self.layout.continued:
             found[name] = unwrapped(found[name], state.get(name, found[name]))
-        return {name: found[name] for name in self.layout.thrust}
+        return {name: found[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
@@ -128,12 +128,13 @@ class Rov:
         return {name: found[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
-        """Return the states after h > 0 seconds with the inputs held. The result is exact up to rounding for any h.
+        """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
-        It is not finite when the motion overflows or takes too many pieces (rov_fmu/model/step.py).
+        The result is exact up to rounding for any h. It is not finite when the motion overflows or takes too many
+        pieces (rov_fmu/model/step.py).
         """
         after = step(self._formulas.table, self._values(inputs, state), h)
-        return {name: after[name] for name in (*self.layout.state, *self.layout.memory)}
+        return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
 
     # ---- One axis alone ----
 
@@ -171,7 +172,7 @@ class Rov:
             reverse = a, b + lost
         return Riccati(A, B + lost, gain * (alpha * thrust + load + self.load(form)), reverse)
 
-    def axes(self, inputs: Values) -> tuple[Riccati, ...]:
+    def motions(self, inputs: Values) -> tuple[Riccati, ...]:
         """Return the equation of each axis alone under held inputs, once the thrust is steady."""
         F = self.commanded(inputs)
         return tuple(

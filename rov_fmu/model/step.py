@@ -20,12 +20,13 @@ from .equation import Equation
 from .formula import compiled, names
 
 ORDER = 20
-"""The order of the series. A higher order costs more than its longer pieces save."""
+"""The order of the series. A higher order costs more than its longer pieces save. The C code has its own order."""
 MOST_PIECES = 10_000
-"""The most pieces of a step, enough for 1,000 s at rates of 10/s that never settle. A longer step is not computed."""
+"""The largest number of pieces of a step. It is enough for 1,000 s of motion that changes at 10/s and never settles. A
+step that needs more is not computed."""
 
 _EPSILON = 2.0**-53  # half a unit in the last place of 1
-_FADED = 1e-40  # a state below this share of its largest size has no influence any more, whatever the drag
+_FADED = 1e-40  # a state below this share of its largest size has no effect any more, whatever the drag is
 _RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers beyond ORDER are below rounding
 _SMALLEST = 1e-322  # rounding keeps smaller numbers from fading any further
 _SHORTEST = 2.0**-20  # within this share of a piece, the drag of a velocity that just touches 0 is negligible
@@ -55,18 +56,18 @@ class Table:
                 formulas[f"coefficient_{len(formulas)}"] = term.coefficient
         self.coefficients = list(formulas)
         self.coefficient_formulas = formulas
-        self.hold = compiled({**equation.program, **equation.forces, **formulas}, equation.measured)
-        self.arrive = compiled({force: after for force, (_, after) in equation.lagging.items()})
+        self.held_formulas = compiled({**equation.program, **equation.forces, **formulas}, equation.measured)
+        self.lag_formulas = compiled({force: after for force, (_, after) in equation.lagging.items()})
         self.products = sorted({factors for row in self.rows for _, factors in row if len(factors) == 2})
         self.used = {place[name] for name in equation.used}
         """The states that a term contains. The others are integrals of them."""
-        self.heading = {place[name] for name in equation.heading if name in place}
-        self.finish = compiled(equation.ends)
+        self.orientation = {place[name] for name in equation.orientation if name in place}
+        self.end_formulas = compiled(equation.ends)
         self.dynamic: list[tuple[set[int], set[int]]] = []
         """The components that may settle, in their order: the states of each, and the other states it depends on."""
         for component in equation.dynamic:
             group = {place[name] for name in component}
-            inputs = {place[name] for state in component for name in equation.inputs_of[state]}
+            inputs = {place[name] for state in component for name in equation.states_in_rate[state]}
             self.dynamic.append((group, inputs - group))
 
 
@@ -85,7 +86,7 @@ class Motion:
 
     def __init__(self, table: Table, values: Mapping[str, float]) -> None:
         self.table, self.values = table, dict(values)
-        found = table.hold(values)
+        found = table.held_formulas(values)
         self.steady = {name: found[name] for forces in table.equation.lags.values() for name in forces.values()}
         starts = {**found, **values}
         self.y = [float(starts[name]) if name in table.equation.starts else 0.0 for name in table.states]
@@ -130,7 +131,7 @@ class Motion:
     def hold(self) -> None:
         """Compute the coefficients for both directions of the velocities.
 
-        Before that, the lags whose forces have all arrived are ended: each force becomes exactly the steady thrust.
+        First, end the lags whose forces have all arrived: each of these forces becomes exactly the steady thrust.
         """
         table, values = self.table, self.values
         for progress, forces in table.equation.lags.items():
@@ -140,8 +141,8 @@ class Motion:
             if has_arrived:
                 values.update({force: self.steady[steady] for force, steady in forces.items()})
             self.put(table.place[progress], 1.0 if has_arrived else 0.0)
-        forward = table.hold({**values, **dict.fromkeys(table.equation.monitored, 1.0)})
-        reverse = table.hold({**values, **dict.fromkeys(table.equation.monitored, -1.0)})
+        forward = table.held_formulas({**values, **dict.fromkeys(table.equation.monitored, 1.0)})
+        reverse = table.held_formulas({**values, **dict.fromkeys(table.equation.monitored, -1.0)})
         self.forward = [forward[name] for name in table.coefficients]
         self.reverse = [reverse[name] for name in table.coefficients]
         self.direct(self.y)
@@ -200,7 +201,7 @@ class Motion:
 
     def has_settled(self) -> bool:
         """Return True when all states are constant, except for the heading and the integrals."""
-        return self.table.used - self.table.heading <= self.settled
+        return self.table.used - self.table.orientation <= self.settled
 
     def coast(self, h: float) -> None:
         """Move for h seconds of straight or circular motion, once all has settled.
@@ -209,7 +210,7 @@ class Motion:
         rates at the mean of y, which is y + (1 - cos wh)/(w^2 h) L y + (1 - sin(wh)/(wh))/w^2 L^2 y.
         """
         table, mean, end = self.table, list(self.y), list(self.y)
-        turning = table.heading - self.settled
+        turning = table.orientation - self.settled
         first = self.rates(mean)[0]
         second = self.rates([first[i] if i in turning else x for i, x in enumerate(mean)])[0]
         slope, bend = (hypot(*(rates[i] for i in turning)) for rates in (first, second))
@@ -227,7 +228,10 @@ class Motion:
         self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(end)]
 
     def follow_circle(self, first: Sequence[float], second: Sequence[float], w: float, angle: float) -> None:
-        """Follow the heading through a rotation with constant velocities; every whole turn changes it alike."""
+        """Follow the heading through a rotation with constant velocities.
+
+        Every whole turn changes it by the same angle.
+        """
         start = self.y
 
         def y_at(t: float) -> list[float]:
@@ -301,7 +305,7 @@ class Motion:
     def arrive(self) -> None:
         """Update the forces that lag, and the coefficients that follow from them, at the end of a piece."""
         progress = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
-        found = self.table.arrive({**self.values, **self.steady, **progress})
+        found = self.table.lag_formulas({**self.values, **self.steady, **progress})
         self.values.update({force: found[force] for force in self.table.equation.lagging})
         self.hold()
 
@@ -327,7 +331,7 @@ class Motion:
             if name in self.start:  # an integral has only counted the change
                 found[name] = x if name in equation.starts else self.start[name] + x
         if equation.ends:
-            after = self.table.finish({**self.start, **dict(zip(self.table.states, self.y, strict=True))})
+            after = self.table.end_formulas({**self.start, **dict(zip(self.table.states, self.y, strict=True))})
             found |= {name: after[f"next_{name}"] for name in QUATERNION} | {"psi": self.heading}
         return found
 
@@ -354,7 +358,7 @@ def _change(c: Sequence[float], t: float) -> float:
 def usable_time(c: Sequence[float]) -> float:
     """Return the time at which the terms decrease like the powers of _RATIO from the first three to the last three.
 
-    Of three neighbours, the largest counts, because every second or third coefficient of a series may be 0.
+    Of three neighbouring coefficients the largest counts, because every second or third coefficient may be 0.
     """
     first = next((n for n, x in enumerate(c) if x != 0.0), len(c))
     reach = inf
@@ -366,7 +370,10 @@ def usable_time(c: Sequence[float]) -> float:
 
 
 def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
-    """Return how long a velocity certainly keeps its sign, at most `length`, and whether it is 0 at that time."""
+    """Return a time up to which a velocity certainly keeps its sign, and whether the velocity is 0 at that time.
+
+    The time is at most `length`.
+    """
     first = next((n for n, x in enumerate(c) if x != 0.0), None)
     shortest = _SHORTEST * length
     while first is not None and length > shortest:

@@ -45,7 +45,7 @@ def curve_formulas(curve: Curve) -> dict[str, str]:
 
 
 def _fraction(name: str, pulse: tuple[float, float, float]) -> str:
-    """Return the command that a pulse width stands for, as a fraction. The two sides of neutral may differ."""
+    """Return the formula from a pulse width to its fraction. Above and below neutral, the scale may differ."""
     low, neutral, high = pulse
     below, above = neutral - low, high - neutral
     span = repr(above) if below == above else f"({above!r} if {name} > {neutral!r} else {below!r})"
@@ -57,27 +57,28 @@ def _saturated(name: str) -> str:
 
 
 def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
-    """Return formulas from the command of a thruster to its steady thrust, which is the last of them.
-
-    Adding 0 turns a negative zero into a positive one.
-    """
+    """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
     share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
-    found, signed = _from_tables(name, curve) if curve.tables else _from_coefficients(name, curve)
+    found, signed = _from_tables(name, curve) if curve.tables else _from_coefficients(name, curve, share)
     if "V_0" in curve.keys:
         signed = f"{signed} * pow(battery / {curve.coefficient('V_0')}, {curve.coefficient('n_V')})"
     if "d" in curve.keys:
-        found[f"loss_{name}"] = f"{_chosen(name, curve, 'd')} * abs(command_{name}){share}"
+        found[f"loss_{name}"] = f"{_by_direction(name, curve, 'd')} * abs(command_{name}){share}"
+    # + 0 makes 0.0 of -0.0
     return found | {f"steady_{name}" if curve.has_lag else f"F_{name}": f"{signed}{share if curve.tables else ''} + 0"}
 
 
-def _chosen(name: str, curve: Curve, key: str) -> str:
+def _by_direction(name: str, curve: Curve, key: str) -> str:
     """Return the coefficient of a curve for the direction of a thruster's command."""
     forward, reverse = curve.coefficient(key), curve.coefficient(key + REVERSE)
     return forward if forward == reverse else f"({reverse} if command_{name} < 0 else {forward})"
 
 
 def _from_tables(name: str, curve: Curve) -> tuple[dict[str, str], str]:
-    """Return the force of the tables, which is interpolated linearly between two voltages, times the scale."""
+    """Return the formula of the force of the tables, and the formula of the force times the scale.
+
+    Between two voltages, the force is interpolated linearly.
+    """
     command = f"command_{name}"
     formula = f"{curve.tables[-1].name}({command})"
     for table, following in reversed([*pairwise(curve.tables)]):
@@ -89,15 +90,17 @@ def _from_tables(name: str, curve: Curve) -> tuple[dict[str, str], str]:
     return {f"table_{name}": formula}, f"{curve.coefficient('k_t')} * table_{name}"
 
 
-def _from_coefficients(name: str, curve: Curve) -> tuple[dict[str, str], str]:
-    """Return the force a_t m^2 + b_t m, in which m is the part of the command beyond the dead band."""
+def _from_coefficients(name: str, curve: Curve, share: str) -> tuple[dict[str, str], str]:
+    """Return the formulas of the force a_t m^2 + b_t m, and the formula of the force with its sign.
+
+    m is the part of the command beyond the dead band.
+    """
     is_reverse = f"command_{name} < 0"
-    a_t, b_t = (_chosen(name, curve, key) for key in ("a_t", "b_t"))
-    share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
+    a_t, b_t = (_by_direction(name, curve, key) for key in ("a_t", "b_t"))
     signed = f"(-magnitude_{name} if {is_reverse} else magnitude_{name})"
     beyond, dead = f"beyond_{name}", ""
     if "c_0" in curve.keys:
-        c_0 = _chosen(name, curve, "c_0")
+        c_0 = _by_direction(name, curve, "c_0")
         dead = f" - {c_0}"
         signed = f"(0 if {beyond} < 0 or {beyond} == 0 and {c_0} > 0 else {signed})"
     return {

@@ -154,7 +154,7 @@ def accuracies(axis: Axis, errors: Mapping[Key, Errors]) -> tuple[Accuracy, ...]
 def measured_and_fitted(results: Identification) -> Iterator[MeasuredAndFitted]:
     """Yield the coefficients that recordings determine and that thrust tests or tables of points determine, too."""
     given: dict[str, MeasuredAndFitted] = {}
-    units = {name: meta.unit for name, meta in results.vehicle.layout.coefficients.items()}
+    units = {name: declaration.unit for name, declaration in results.vehicle.layout.coefficients.items()}
 
     def compare(measured: Estimate, fitted: Estimate, by: str, reason: str) -> Iterator[MeasuredAndFitted]:
         for name in measured.names:
@@ -195,8 +195,8 @@ def known(results: Identification) -> tuple[Known, ...]:
     }  # they are 1 by convention, not because a test is missing
     assumed = {name for result in results.axes for name in result.assumed} - fitted - alphas
     return tuple(
-        Known(name, vehicle.rov[name], vehicle.intervals.get(name), meta.unit, name in assumed)
-        for name, meta in vehicle.layout.coefficients.items()
+        Known(name, vehicle.rov[name], vehicle.intervals.get(name), declaration.unit, name in assumed)
+        for name, declaration in vehicle.layout.coefficients.items()
         if name in fitted | assumed
     )
 

@@ -42,7 +42,7 @@ from rov_fmu.model.layout import (
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.quantity import Finite, Quantity
-from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, where
+from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, keys_in_file
 from rov_fmu.vehicle.shipped import PAPER, PAPER_SOURCES, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -468,7 +468,7 @@ def _mistakes_in_known(file: _ReadableFile, description: Description) -> Iterato
     for _ in unknown[MOST:]:
         yield ""  # is only counted
     yield from check_quantities("known", {name: q for name, q in file.known.items() if name in possible}, possible)
-    tables = dict(where(description.layout))
+    tables = dict(keys_in_file(description.layout))
     for name, quantity in file.quantities(description.layout).items():
         if quantity and name in file.known:
             yield key_line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
@@ -485,7 +485,7 @@ def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:
 
 def _missing_halves(file: _ReadableFile, description: Description) -> Iterator[str]:
     """Yield a line for each coefficient without its partner, unless check_names_and_keys reports it already."""
-    given, tables = {*description.base_quantities, *description.known}, dict(where(description.layout))
+    given, tables = {*description.base_quantities, *description.known}, dict(keys_in_file(description.layout))
     for one, other in _pairs(description.layout):
         if one in given and other not in given and (one in file.known or not one.endswith(REVERSE)):
             table = "known" if one in file.known else ".".join(tables[one][:-1])

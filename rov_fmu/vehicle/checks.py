@@ -1,4 +1,4 @@
-"""Checks whether the tables of a vehicle file describe a vehicle; each mistake gives one line."""
+"""Checks that the tables of a vehicle file describe a possible vehicle. Each mistake gives one line."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import sin
@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.io.messages import did_you_mean, only, shown
+from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
 from rov_fmu.model.layout import (
     ARM,
@@ -18,6 +18,7 @@ from rov_fmu.model.layout import (
     HEAVE,
     LEAST_BETA,
     PITCH,
+    REPLACED_BY_TABLE,
     RESTORING,
     REVERSE,
     ROLL,
@@ -32,7 +33,7 @@ from rov_fmu.model.layout import (
     cross_name,
     cross_of,
 )
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names, in_words
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, Hardware, Parts, given_quantities
 
@@ -44,7 +45,7 @@ _TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "es
 def readable_parts(
     data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object], model: type[_Model]
 ) -> tuple[_Model, set[str]]:
-    """Return the file without the tables that have a mistake of form, and the names of its top tables that have one."""
+    """Return the file without the tables that could not be read, and the names of the top-level tables among these."""
     parts: dict[str, Any] = dict(data)
     wrong: dict[str, set[int | str | None]] = {}
     for place in (problem["loc"] for problem in problems):
@@ -62,7 +63,10 @@ def readable_parts(
 
 
 def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
-    """Yield a line for each mistake. A check that needs one of the `lost` tables, which have a mistake, is left out."""
+    """Yield a line for each mistake.
+
+    `lost` are the tables that could not be read. Checks that need one of them are left out.
+    """
     wrong_names = [*_check_names(parts, lost, data)]
     yield from wrong_names
     yield from _check_keys(parts)
@@ -182,19 +186,13 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
         given = given_quantities(curve, CURVE)
         place, key = f"curves.{name}", "table" if curve.table else "tables" if curve.tables else None
         if curve.table and curve.tables:
-            yield key_line(f"{place}.tables", "must not stand beside table")
+            yield key_line(f"{place}.tables", "must not be given together with table")
         if key:
-            replaced = (
-                "a_t",
-                "b_t",
-                "a_t_reverse",
-                "b_t_reverse",
-                "c_0",
-                "c_0_reverse",
-                *(("V_0", "n_V") if curve.tables else ()),
-            )
+            replaced = (*REPLACED_BY_TABLE, *(("V_0", "n_V") if curve.tables else ()))
             yield from (
-                key_line(f"{place}.{other}", f"must not stand beside {key}") for other in replaced if other in given
+                key_line(f"{place}.{other}", f"must not be given together with {key}")
+                for other in replaced
+                if other in given
             )
         else:
             yield from (
@@ -202,7 +200,7 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
             )
             if "k_t" in given:
                 yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
-        for one, other in (("V_0", "n_V"), ("n_V", "V_0"), ("d_reverse", "d")):
+        for one, other in (("V_0", "n_V"), ("n_V", "V_0")):
             if one in given and other not in given:
                 yield key_line(f"{place}.{other}", f"this key is missing, and {one} is there")
         needs_voltage |= "V_0" in given or bool(curve.tables)
@@ -303,7 +301,7 @@ def _check_needed_keys(
 
 
 _WITHOUT_TILTING = {"W": HEAVE, "B": HEAVE, "x_G": YAW, "y_G": YAW}
-"""The axes in which some keys of RESTORING act without roll and pitch."""
+"""For some keys of RESTORING, the axis in which they act even without roll and pitch."""
 
 
 def _users(key: str) -> str:
@@ -311,7 +309,7 @@ def _users(key: str) -> str:
     if key in ARM:
         return "yaw with thrusters that have the key arm needs it"
     first, *others = (axis.name for axis in AXES.values() if axis.inertia == key)
-    return f"{in_words([first, *others])} need it" if others else f"{first} needs it, and there is no [axes.{first}]"
+    return f"{listed([first, *others])} need it" if others else f"{first} needs it, and there is no [axes.{first}]"
 
 
 def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
@@ -320,7 +318,7 @@ def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
     for key in given:
         axes = [axis for axis in (_WITHOUT_TILTING.get(key), ROLL, PITCH) if axis]
         if not {*axes} & {*parts.axis_tables}:
-            yield key_line(f"body.{key}", f"acts only in {in_words([a.name for a in axes])}: remove it, or add an axis")
+            yield key_line(f"body.{key}", f"acts only in {listed([a.name for a in axes])}: remove it, or add an axis")
     for key in ("W", "B"):
         if given and key not in given:
             yield key_line(f"body.{key}", f"this key is missing, and {next(iter(given))} is there")
@@ -355,7 +353,9 @@ def _check_arm(parts: Parts, layout: Layout) -> Iterator[str]:
     if layout.has_arm and parts.arm and parts.arm.R and parts.arm.gamma:
         for name, factor in (("R", parts.arm.R.value), ("gamma", sin(parts.arm.gamma.value))):
             if factor == 0.0:
-                yield key_line(f"arm.{name}.value", "must be more than 0, or the arm R sin γ is none", factor)
+                yield key_line(
+                    f"arm.{name}.value", "must be more than 0, because otherwise the arm R sin γ is 0", factor
+                )
 
 
 def _check_coupling(parts: Parts, layout: Layout) -> Iterator[str]:
@@ -383,7 +383,7 @@ def _check_estimates(rows: Mapping[str, Estimated], quantities: Mapping[str, Qua
             hint = did_you_mean(name, quantities)
             mistakes.append(key_line(key, f"there is no such coefficient of this vehicle{hint}"))
         elif not (quantity and quantity.interval):
-            mistakes.append(key_line(key, f"{name} has no interval, so it is no estimate"))
+            mistakes.append(key_line(key, f"{name} has no interval, so it is not an estimate"))
         for other, value in row.correlation.items():
             if reason := _wrong_correlation(name, other, rows):
                 mistakes.append(key_line(f"{key}.correlation.{other}", reason, value))

@@ -9,14 +9,17 @@ from itertools import combinations
 from math import hypot, sqrt
 from typing import Any
 
+from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import PITCH, ROLL, YAW, Axis, Layout, cross_name
 from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.schema import where
+from rov_fmu.vehicle.schema import keys_in_file
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
-"""Thrusters can drive two axes only together if the sine of the angle between the axes' rows of effects is smaller."""
+"""The least sine of an angle that is not a rounding error.
+
+It decides whether the thrusters can drive two axes separately, and whether a thruster pushes sideways."""
 
 
 def check_layout(layout: Layout) -> Iterator[str]:
@@ -36,7 +39,7 @@ def check_thruster_places(layout: Layout) -> Iterator[str]:
     for thruster in layout.thrusters:
         key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
         if thruster.arm and thruster.position:
-            yield key_line(f"{key}.arm", "must not stand beside position")
+            yield key_line(f"{key}.arm", "must not be given together with position")
         elif thruster.arm and x <= 0.0:
             yield key_line(f"{key}.arm", "must be of a thruster that pushes ahead; give its position instead")
         elif thruster.arm and thruster.curve in losing:
@@ -112,7 +115,7 @@ def _unit(row: Sequence[float]) -> list[float]:
 
 def check_variable_names(layout: Layout) -> Iterator[str]:
     """Check that no two variables of the FMU have the same name."""
-    names = [*layout.inputs, *layout.state, *layout.thrust, *(name for name, _ in where(layout))]
+    names = [*layout.inputs, *layout.state, *layout.calculated, *(name for name, _ in keys_in_file(layout))]
     for name, count in Counter(names).items():
         if count > 1:
             yield key_line(name, "two variables of the FMU would have this name; rename a curve or a thruster")
@@ -135,7 +138,7 @@ def check_mass(rov: Rov) -> Iterator[str]:
     if not entries and not any(rov.coefficients.get(f"{axis}_G") for axis in "xyz"):
         return
     try:
-        mass = {name[5:]: value for name, value in rov.parameters.items() if name.startswith("mass_")}
+        mass = {name.removeprefix("mass_"): value for name, value in rov.parameters.items() if name.startswith("mass_")}
     except ZeroDivisionError:  # a pivot of a singular matrix, or a β
         yield key_line(
             "cross", "the mass matrix must be positive definite, not singular: reduce m_a_.., or x_G, y_G, z_G"
@@ -147,7 +150,7 @@ def check_mass(rov: Rov) -> Iterator[str]:
         most = sqrt(mass[a + a] * mass[b + b])
         if abs(mass.get(a + b, 0.0)) >= most:
             scale = sqrt(rov[f"beta_{a}"] * rov[f"beta_{b}"])
-            pair = in_words([names[axes.index(a)], names[axes.index(b)]])
+            pair = listed([names[axes.index(a)], names[axes.index(b)]])
             key = cross_name("m_a", a, b)
             place = f"cross.{key}" if (a, b) in entries else f"body.{(key := _centre(a, b))}"
             allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
@@ -157,7 +160,7 @@ def check_mass(rov: Rov) -> Iterator[str]:
     matrix = [[_entry(mass, a, b) / sqrt(mass[a + a] * mass[b + b]) for b in axes] for a in axes]
     if axes and _least_eigenvalue(matrix) < _LEAST:
         reduce = join_names([cross_name("m_a", a, b) for a, b in entries])
-        reason = f"the mass matrix of {in_words(names)} must be positive definite: reduce {reduce or 'x_G, y_G, z_G'}"
+        reason = f"the mass matrix of {listed(names)} must be positive definite: reduce {reduce or 'x_G, y_G, z_G'}"
         yield key_line("cross" if entries else "body", reason)
 
 
@@ -169,7 +172,10 @@ def doubts(rov: Rov) -> Iterator[str]:
 
 
 def _doubts_of_damping(rov: Rov) -> Iterator[str]:
-    """Doubt a linear damping that adds energy to some motions: its symmetric part has a negative eigenvalue."""
+    """Yield a line if the linear damping adds energy to some motions.
+
+    Its symmetric part then has a negative eigenvalue.
+    """
     cross = {(a, b): rov[cross_name("b_d", a, b)] for key, a, b, *_ in rov.layout.cross if key == "b_d"}
     if not cross:
         return
@@ -192,12 +198,12 @@ def _doubts_of_damping(rov: Rov) -> Iterator[str]:
     if _least_eigenvalue(matrix) < -_LEAST:
         coupled = {velocity for pair in cross for velocity in pair}
         yield key_line(
-            "cross", f"{adds} {in_words([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
+            "cross", f"{adds} {listed([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
         )
 
 
 def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
-    """Doubt a battery whose voltage is far above that at which a curve was measured."""
+    """Yield a line if the voltage of the battery is far above that at which a curve was measured."""
     voltage = rov.layout.voltage or 0.0
     for curve in rov.layout.curves:
         if "V_0" in curve.keys and voltage > _FAR_ABOVE * (V_0 := rov[curve.coefficient("V_0")]):
@@ -207,7 +213,7 @@ def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
 
 
 def _doubts_of_weight(rov: Rov) -> Iterator[str]:
-    """Doubt a weight that does not fit the mass, and a buoyancy that turns the vehicle upside down."""
+    """Yield a line if the weight does not fit the mass, and one if the buoyancy turns the vehicle upside down."""
     k = rov.coefficients
     if "W" not in k:
         return
@@ -221,19 +227,13 @@ def _doubts_of_weight(rov: Rov) -> Iterator[str]:
         yield key_line("body.z_B.value", f"{below}; z is positive down, so a centre of buoyancy above has less z", z_B)
 
 
-def in_words(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them: surge, sway and yaw."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
-
-
 def _centre(a: str, b: str) -> str:
     """Return the coordinate of the centre of mass in the entry of the mass matrix of a velocity and a rate."""
     return f"{'xyz'[3 - 'uvw'.index(a) - 'pqr'.index(b)]}_G"
 
 
 def _entry(entries: Mapping[str, float], a: str, b: str) -> float:
-    """Return an entry of a symmetric matrix, of which one half is given."""
+    """Return an entry of a symmetric matrix. `entries` are those of one half of it."""
     return entries.get(a + b, entries.get(b + a, 0.0))
 
 

@@ -40,7 +40,10 @@ class Cell:
 
     @property
     def rounds_to_printed(self) -> bool:
-        """True if the computed value, rounded to the printed digits, is the printed one, or if no value is printed."""
+        """True if the computed value, rounded to the printed digits, is the printed one.
+
+        True as well if no value is printed.
+        """
         if self.printed is None:
             return True
         half_unit = Decimal(5).scaleb(int(self.printed.as_tuple().exponent) - 1)

@@ -139,7 +139,10 @@ def derivative(key: str, axis: Axis) -> str:
 
 
 def derivative_hint(key: str) -> str:
-    """Return what to write instead of a key that is a derivative or a moment of inertia in another notation, or ""."""
+    """Return the end of a message about a key in another notation.
+
+    It says what to write instead of a derivative or a moment of inertia. It is empty for other keys.
+    """
     if inertia := re.fullmatch(r"I_?([xyz])\1?", key):
         return f"; write I_{dict(zip('xyz', 'pqr', strict=True))[inertia[1]]} in [body]"
     for name, form in _FORMS.items():

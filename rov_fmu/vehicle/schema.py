@@ -55,7 +55,7 @@ NOT_GIVEN = "not given"
 MOST = 32
 """The largest number of thrusters, curves or inputs."""
 _MOST_COEFFICIENTS = 1000
-"""The largest number of coefficients in a table; it exceeds that of the largest vehicle."""
+"""The largest number of coefficients in a table. The largest possible vehicle has fewer."""
 
 
 def _coefficients(
@@ -103,7 +103,7 @@ def _all_optional(table: Any, kinds: Mapping[str, CoefficientKind]) -> Any:
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
 
 
-class Body(_coefficients("Body", {key: kind.meta() for key, kind in (BODY | RESTORING).items()})):  # type: ignore[misc]
+class Body(_coefficients("Body", {key: kind.declaration() for key, kind in (BODY | RESTORING).items()})):  # type: ignore[misc]
     """The mass, needed for surge, sway and heave; the moments of inertia about the origin, needed for roll, pitch and
     yaw; weight and buoyancy with their centres, which act in roll and pitch."""
 
@@ -132,7 +132,7 @@ def _pulses(given: object) -> tuple[float, ...]:
     return tuple(usable)
 
 
-class Commands(_coefficients("Commands", {key: kind.meta() for key, kind in COMMANDS.items()})):  # type: ignore[misc]
+class Commands(_coefficients("Commands", {key: kind.declaration() for key, kind in COMMANDS.items()})):  # type: ignore[misc]
     """The form of the commands, and their way to the thrusters and fins."""
 
     model_config = DOCUMENTED
@@ -149,11 +149,11 @@ class Commands(_coefficients("Commands", {key: kind.meta() for key, kind in COMM
     commands of the FMU are pulse widths in µs instead of fractions from -1 to 1."""
 
 
-class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, ARM)):  # type: ignore[misc]
+class Arm(_coefficients("Arm", {key: kind.declaration() for key, kind in ARM.items()}, ARM)):  # type: ignore[misc]
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.meta(curve="curve", equation=layout.cited("(2)")) for key, kind in CURVE.items()}
+_CURVE = {key: kind.declaration(curve="curve", equation=layout.cited("(2)")) for key, kind in CURVE.items()}
 
 
 _Read = TypeVar("_Read", ThrustFile, CurrentTable)
@@ -241,7 +241,7 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
             return (self.table.path,)
         return tuple(row.table.path for row in self.tables or ())
 
-    def plain(self, name: str) -> layout.Curve:
+    def for_model(self, name: str) -> layout.Curve:
         """Return the curve of the model."""
         keys = _coefficient_keys(self, CURVE)
         measured: tuple[ThrustTable, ...] = ()
@@ -251,7 +251,7 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
             rows = enumerate(self.tables, 1)
             measured = tuple(row.table.table(f"thrust_{name}_{n}", row.voltage) for n, row in rows)
         if measured:
-            keys = ("k_t", *(key for key in keys if key in ("V_0", "n_V", "d", "d_reverse", "T")))
+            keys = ("k_t", *(key for key in keys if key not in ("k_t", *layout.REPLACED_BY_TABLE)))
         words = self.description or ""
         return layout.Curve(name, keys, self.together, words, self.equation, measured)
 
@@ -260,7 +260,7 @@ _AXIS_DESCRIPTION = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
 _tables = {
     axis.name: _coefficients(
         axis.name.capitalize(),
-        layout.metas_of(axis),
+        layout.declarations_of(axis),
         AXIS,
         _AXIS_DESCRIPTION.format(axis),
         {key: f"; give -{derivative(key, axis)} as a positive {key}" for key in ("m_a", "a_d", "b_d")},
@@ -283,7 +283,7 @@ OpenAxes = table_of("_OpenAxes", Strict, _open_axes, Axes.__doc__)
 
 
 _FARTHEST = 100.0
-"""The largest coordinate of a thruster from the centre of mass, in m."""
+"""The largest coordinate of a position, m."""
 
 
 def _vector(vector: object) -> object:
@@ -358,7 +358,7 @@ class Thruster(Strict):
     arm: Literal["port", "starboard"] | None = None
     """The side of a thruster that pushes ahead with the arm R sin γ, (4). This key replaces a position."""
 
-    def plain(self) -> layout.Thruster:
+    def for_model(self) -> layout.Thruster:
         """Return the thruster of the model, with a unit vector as its direction."""
         return layout.Thruster(
             self.name,
@@ -370,7 +370,7 @@ class Thruster(Strict):
         )
 
 
-class Fin(_coefficients("Fin", {key: kind.meta(fin="fin") for key, kind in FIN.items()}, FIN)):  # type: ignore[misc]
+class Fin(_coefficients("Fin", {key: kind.declaration(fin="fin") for key, kind in FIN.items()}, FIN)):  # type: ignore[misc]
     """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
     command."""
 
@@ -384,7 +384,7 @@ class Fin(_coefficients("Fin", {key: kind.meta(fin="fin") for key, kind in FIN.i
     """The direction of the lift at a positive command while the vehicle moves ahead."""
     position: Position
 
-    def plain(self) -> layout.Fin:
+    def for_model(self) -> layout.Fin:
         """Return the fin of the model, with a unit vector as its direction."""
         unit = _unit_vector(self.direction.value)
         return layout.Fin(self.name, unit, self.position.value, self.drag is not None, self.description or "")
@@ -466,12 +466,12 @@ class Hardware(Strict):
     def layout(self) -> Layout:
         """The layout of the vehicle, for the model."""
         axes = tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items())
-        curves = tuple(curve.plain(name) for name, curve in self.curves.items())
+        curves = tuple(curve.for_model(name) for name, curve in self.curves.items())
         coupled = bool(self.body and self.body.coupling)
-        thrusters = tuple(t.plain() for t in self.thruster)
+        thrusters = tuple(t.for_model() for t in self.thruster)
         cross = tuple(filter(None, map(layout.cross_of, self.cross)))
         restoring = tuple(key for key in RESTORING if self.body and getattr(self.body, key) is not None)
-        fins = tuple(fin.plain() for fin in self.fin)
+        fins = tuple(fin.for_model() for fin in self.fin)
         voltage = self.battery.voltage.value if self.battery else None
         pulse = self.commands.pulse if self.commands else None
         return Layout(
@@ -484,10 +484,10 @@ class Hardware(Strict):
         return bool(self.commands and self.commands.T_d)
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
-        """Return what these tables give for each coefficient of a vehicle; None where they do not give it."""
+        """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
         found: dict[str, Quantity | None] = {}
         fins = {fin.name: fin for fin in self.fin}
-        for name, (first, *keys) in where(of):
+        for name, (first, *keys) in keys_in_file(of):
             table: Any = fins if first == "fin" else getattr(self, first)
             for key in keys:
                 table = table.get(key) if isinstance(table, dict) else getattr(table, key, None)
@@ -542,8 +542,8 @@ class File(Parts):
     axes: Axes
 
 
-def where(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the name of each coefficient in the FMU, and its place in the vehicle file: the tables and the key."""
+def keys_in_file(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield the name of each coefficient in the FMU, and its tables and its key in the vehicle file."""
     yield from ((key, ("body", key)) for key in (*BODY, *RESTORING) if key in of.coefficients)
     yield from ((key, ("arm", key)) for key in ARM if key in of.coefficients)
     yield from ((key, ("commands", key)) for key in COMMANDS if key in of.coefficients)

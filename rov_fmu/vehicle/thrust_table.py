@@ -16,7 +16,7 @@ _THRUST = Column(FORCE_UNITS, also=("force",), minimum=-1e6, maximum=1e6)
 _CURRENT = Column({"A": 1.0}, minimum=0.0, maximum=1e4)
 _MOST_POINTS = 2000
 _WIDEST = 0.05
-"""The largest part of the commands, on each side, that a table may leave out. Thrust continues with its last slope."""
+"""The largest part of the commands that a table may leave out at each end."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,10 @@ class ThrustFile:
     """The force at each command, N."""
 
     def table(self, name: str, voltage: float = 0.0) -> ThrustTable:
-        """Return the table for the model: a monotone cubic between the points (Fritsch and Butland 1984)."""
+        """Return the table for the model: a monotone cubic between the points (Fritsch and Butland 1984).
+
+        Beyond the outermost points, the thrust continues with their slopes to the commands -1 and 1.
+        """
         from scipy.interpolate import PchipInterpolator  # takes long to import, and few vehicles have tables
 
         slopes = map(float, PchipInterpolator(self.commands, self.forces).derivative()(self.commands))
@@ -75,7 +78,7 @@ def read_thrust(path: Path) -> ThrustFile:
         return "must have the sign of its command" if command * force < 0.0 else None
 
     commands, forces = _points(path, "thrust", _THRUST, check)
-    if reason := _no_coverage(commands) or _no_thrust(commands, forces):
+    if reason := _why_incomplete(commands) or _why_no_curve(commands, forces):
         raise DataFileError(f"{path}: {reason}")
     return ThrustFile(path, commands, forces)
 
@@ -86,7 +89,7 @@ def read_current(path: Path) -> CurrentTable:
     Rows with equal commands become one point with their mean current.
     """
     commands, currents = _points(path, "current", _CURRENT)
-    if reason := _no_coverage(commands):
+    if reason := _why_incomplete(commands):
         raise DataFileError(f"{path}: {reason}")
     return CurrentTable(path, commands, currents)
 
@@ -113,8 +116,8 @@ def _points(
     return commands, tuple(fmean(points[command]) for command in commands)
 
 
-def _no_coverage(commands: Sequence[float]) -> str | None:
-    """Return why the commands do not reach from full thrust in reverse to full thrust ahead, or None."""
+def _why_incomplete(commands: Sequence[float]) -> str | None:
+    """Return the reason why the commands do not cover the whole range, or None."""
     if not 3 <= len(commands) <= _MOST_POINTS:
         return f"must have 3 to {_MOST_POINTS} different commands, not {len(commands)}"
     if commands[0] > _WIDEST - 1.0 or commands[-1] < 1.0 - _WIDEST:
@@ -123,8 +126,8 @@ def _no_coverage(commands: Sequence[float]) -> str | None:
     return None
 
 
-def _no_thrust(commands: Sequence[float], forces: Sequence[float]) -> str | None:
-    """Return why the forces are no thrust curve, or None."""
+def _why_no_curve(commands: Sequence[float], forces: Sequence[float]) -> str | None:
+    """Return the reason why the forces are not a thrust curve, or None."""
     if not forces[0] < 0.0 < forces[-1]:
         return "must give a force in reverse below 0 N, and one ahead above 0 N"
     if forces[bisect_right(commands, 0.0) - 1] != 0.0 or forces[bisect_left(commands, 0.0)] != 0.0:

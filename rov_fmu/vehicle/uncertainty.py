@@ -175,7 +175,7 @@ _NORMAL = quantile(inf)
 _EXACT = 1e-9
 """The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
 _WIDTH_IN_UNITS = 3.0
-"""The least width of a written interval in units of the last digit, which tells the width to a third."""
+"""The least width of a written interval in units of the last digit. The width is then known to a third."""
 _NEAR_ZERO = 1e-6
 """The value relative to the width of an interval around 0 below which it is written as 0."""
 
@@ -216,7 +216,7 @@ def _rounded(number: float, place: int) -> str:
 
 
 def significant(number: float, digits: int) -> str:
-    """Return a number with a number of significant digits: 0.30, 420."""
+    """Return a number as text with `digits` significant digits: 0.30, 420."""
     return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
 
 

@@ -64,7 +64,7 @@ class Alternative:
 
 @dataclass(frozen=True, repr=False)
 class Vehicle:
-    """An identified ROV."""
+    """A vehicle: its model, and where its numbers come from."""
 
     name: str
     identifier: str
@@ -194,7 +194,7 @@ def _number(name: str, value: object) -> float:
 
 
 def _contradictions(rov: Rov) -> Iterator[str]:
-    """Yield a line about coefficients that are within their bounds but impossible together."""
+    """Yield a line for each set of coefficients that are possible alone but not together."""
     for curve in (curve for curve in rov.layout.curves if not curve.tables):
         yield from no_thrust(curve, rov.coefficients, f"curve {curve.name}")
     if rov.layout.has_arm and rov["R"] * sin(rov["gamma"]) == 0.0:
@@ -205,7 +205,7 @@ def _contradictions(rov: Rov) -> Iterator[str]:
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError, and warns about numbers that are probably wrong.
 
-    `coming` is a report that need not exist yet.
+    `coming` is the path of a report that is about to be written, so it need not exist yet.
     """
     path = Path(path)
     data = read_toml(path, VehicleFileError)

@@ -16,18 +16,21 @@ from rov_fmu.io.seal import sealed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
 from rov_fmu.vehicle.description import Head
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, keys_in_file
 from rov_fmu.vehicle.thrust_table import CurrentTable
 from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
 
 _DECIMALS = 6
-"""The decimals of a correlation, which is close to 1 if the tests hardly separate two coefficients."""
+"""The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
 _DIGITS = 6
 """The significant digits of a number: more than any tank test gives, but few enough to be equal on every machine."""
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
-    """Return the text of a vehicle file in a folder. Raises ValueError if it cannot name a folder or a report."""
+    """Return the text of a vehicle file in a folder.
+
+    Raises ValueError if a file or folder of the vehicle is outside the folder, so that the vehicle file cannot name it.
+    """
     document = tomlkit.document()
     if made := vehicle.provenance:
         comment = f"Made from {made.data}: [provenance] tells how, and `interval` is 95 % confidence."
@@ -85,7 +88,7 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) ->
         tables["cross"] = {}
     if layout.mix:
         tables["inputs"] = {name: _inline_table(gains) for name, gains in layout.mix.items()}
-    for name, (*above, key) in where(layout):
+    for name, (*above, key) in keys_in_file(layout):
         if name in quantities:
             table = fins[above[1]] if above[0] == "fin" else _table_at(tables, above)
             table[key] = quantities[name]
@@ -152,12 +155,13 @@ def write_vehicle(vehicle: Vehicle, path: Path) -> None:
 
 
 def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str) -> None:
-    """Write a copy of the vehicle file `source` with other values of some coefficients. Raises as write_vehicle does.
+    """Write a copy of the vehicle file `source` with other values of some coefficients.
 
-    `reason` becomes the source of the coefficients that change. Everything else in the file stays as it is.
+    `reason` becomes the source of the coefficients that change. Everything else in the file stays as it is. Raises
+    VehicleFileError or OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
-    places = dict(where(vehicle.layout))
+    places = dict(keys_in_file(vehicle.layout))
     for name, exact in values.items():
         if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
             continue
@@ -297,7 +301,7 @@ def _quantity_table(
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
-    """Return an inline table with spaces inside the braces, as people write it."""
+    """Return an inline table with spaces inside the braces."""
     table = tomlkit.inline_table()
     table |= dict(entries)
     return cast(InlineTable, tomlkit.value(f"{{ {table.as_string()[1:-1]} }}"))

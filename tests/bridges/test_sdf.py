@@ -343,7 +343,7 @@ HALF_TURN = np.diag([1.0, -1.0, -1.0])
 
 def in_gazebo(rov: Rov, state: dict[str, float]) -> Array:
     """Position, rotation matrix and velocities of a state of the FMU, in Gazebo's frames."""
-    angles = state | rov.thrust(rov.layout.usual_inputs, state)
+    angles = state | rov.calculated(rov.layout.usual_inputs, state)
     turned = Rotation.from_euler("ZYX", [angles["psi"], angles.get("theta", 0.0), angles.get("phi", 0.0)]).as_matrix()
     velocity = [sign * state.get(name, 0.0) for name, sign in SIGNS.items()]
     return np.concatenate([EARTH @ [state[name] for name in "xyz"], (EARTH @ turned @ HALF_TURN).ravel(), velocity])

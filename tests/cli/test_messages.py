@@ -215,7 +215,7 @@ def test_platforms_of_a_program_are_guessed_too() -> None:
 @pytest.mark.parametrize("arguments", [["build", str(BARE), "-o"], ["fly", str(BARE), "-o"]])
 def test_a_folder_that_takes_no_files_is_refused_before_the_work(arguments: list[str], capsys: Capsys) -> None:
     line = refusal([*arguments, "/proc/x"], capsys)
-    assert line == "rov-fmu: /proc/x: cannot be written: the folder /proc takes no new files"
+    assert line == "rov-fmu: /proc/x: cannot be written: no new file can be made in the folder /proc"
 
 
 def test_without_a_browser_the_page_is_named(monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:

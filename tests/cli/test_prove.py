@@ -290,10 +290,10 @@ BAD: dict[str, tuple[Files, str]] = {
     "an unknown input": ({_U: "time,q\n0,1\n"}, f"{_U}: the FMU has no variable 'q'"),
     "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}: line 2, column 'y' = 'a': must be a finite number"),
     "NaN": ({_Y: "time,y\n0,nan\n"}, f"{_Y}: line 2, column 'y' = 'nan': must be a finite number"),
-    "semicolons": ({_Y: "time;y\n0,0;0,5\n"}, f"{_Y}: columns are parted by commas, and not by ';'"),
+    "semicolons": ({_Y: "time;y\n0,0;0,5\n"}, f"{_Y}: columns must be separated by commas, not by ';'"),
     "a torn row": ({_Y: "time,y\n0\n"}, f"{_Y}: line 2: 1 cells below 2 columns"),
     "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}: line 3: the time goes back"),
-    "a column twice": ({_Y: "time,y,y\n0,0,0\n"}, f"{_Y}: column 'y': there is such a column before"),
+    "a column twice": ({_Y: "time,y,y\n0,0,0\n"}, f"{_Y}: column 'y': this column occurs twice"),
     "no rows": ({_Y: "time,y\n"}, f"{_Y}: has no rows below a header"),
     "an open quote": ({_Y: 'time,"y\n0,1\n'}, f"{_Y}: not CSV: "),
     "another kind": ({_EXP: _exp("><SteadyState/>")}, f"{_EXP}: experiment 'a': SteadyState cannot be run"),
@@ -365,8 +365,8 @@ def _flipped(fmu: Path, path: Path) -> None:
 
 
 DAMAGE: dict[str, tuple[Callable[[Path, Path], None], str]] = {
-    "cut off": (_cut, "is no FMU, or a damaged one: "),
-    "a byte changed": (_flipped, f"is no FMU, or a damaged one: Bad CRC-32 for file '{MANIFEST}'"),
+    "cut off": (_cut, "is not an FMU, or is damaged: "),
+    "a byte changed": (_flipped, f"is not an FMU, or is damaged: Bad CRC-32 for file '{MANIFEST}'"),
     "not there": (lambda _, __: None, "there is no such file\n"),
     "a folder": (lambda _, path: path.mkdir(), "Is a directory"),
 }

@@ -68,7 +68,7 @@ def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Pat
     ("made_by_hand", "reason"),
     [
         (False, "has changed since identify wrote it"),
-        (True, "does not begin with a digest by identify, so it may be made by hand"),
+        (True, "does not begin with a digest by identify, so it may have been made by hand"),
     ],
 )
 def test_the_work_of_others_is_refused_before_anything_is_computed(
@@ -107,8 +107,8 @@ def test_force_replaces_the_work_of_others_and_reports_it(
     assert _identify(tank_tests, folder, "--force") == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
         f"{folder / 'rov.toml'}: replaced a file that has changed since identify wrote it",
-        f"{folder / 'r.html'}: replaced a file that does not begin with a digest by identify, so it may be made "
-        "by hand",
+        f"{folder / 'r.html'}: replaced a file that does not begin with a digest by identify, so it may have been "
+        "made by hand",
     ]
     assert [path.read_bytes() for path in sorted(folder.iterdir())] == [p.read_bytes() for p in sorted(made.iterdir())]
 

@@ -35,7 +35,7 @@ def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
     assert lines[0] == ["VideoRay", "Pro", "4", "after", "10", "s"]
     assert lines[3:] == [
         [name, f"{expected[name][-1]:.6g}", expected.units[name]]
-        for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.thrust)
+        for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.calculated)
     ]
 
 
@@ -163,7 +163,7 @@ WRONG = {
     ),
     "an input twice": (["--input", "commands.csv", "--set", "u_l=1"], "--set u_l: commands.csv has this input, too"),
     "no time": (["--input", "short.csv"], "short.csv: the last time is 0 s, and must be at least 1e-06"),
-    "no duration": (["--stop", "0"], "'--stop': '0' must be at least 1e-6 s\n"),
+    "no duration": (["--stop", "0"], "'--stop': '0' must be a number of at least 1e-6 s\n"),
     "a time in words": (["--step", "x"], "'--step': 'x' must be a number of at least 1e-6 s\n"),
     "too many results": (["--step", "1e-6"], "--step 1e-06: gives more than 1000000 results up to 10 s"),
     "a late end": (["--stop", "1e9"], "--stop 1e+09 needs a longer --step than 0.01 s: at least 1000 s\n"),

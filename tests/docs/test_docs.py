@@ -300,7 +300,7 @@ def test_every_variable_is_told(kind: str) -> None:
     told = {name for name in re.findall(r"`([^`]+)`", table) if "<" not in name}
     for pattern, of in re.findall(r"`([^`<]+)<(thruster|curve|axis)>`", table):
         told |= {f"{pattern}{name}" for name in known[of]}
-    names = {*layout.inputs, *layout.state, *layout.thrust, *layout.coefficients}
+    names = {*layout.inputs, *layout.state, *layout.calculated, *layout.coefficients}
     assert {name.removesuffix("_reverse") for name in names} <= told
 
 

@@ -32,7 +32,7 @@ def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], s
     """Return the states and the thrust of an FMU that FMPy steps, as an array of variables x times."""
     description = fmpy.read_model_description(str(folder))
     references = {v.name: v.valueReference for v in description.modelVariables}
-    outputs = [references[name] for name in (*rov.layout.state, *rov.layout.thrust)]
+    outputs = [references[name] for name in (*rov.layout.state, *rov.layout.calculated)]
     fmu = FMU2Slave(
         guid=description.guid,
         unzipDirectory=str(folder),
@@ -66,7 +66,7 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
     inputs = {name: np.array([each[name] for each in drawn]) for name in rov.layout.inputs}
     start = {name: x for name, x in random_state(rng, rov).items() if name not in QUATERNION}
     start |= {name: rng.uniform(-3.0, 3.0) for name in rov.layout.initial}
-    found = simulate(rov, times, {**inputs, **start}, [*rov.layout.state, *rov.layout.thrust])
+    found = simulate(rov, times, {**inputs, **start}, [*rov.layout.state, *rov.layout.calculated])
     assert found.failed == len(times)
     np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
 
@@ -119,11 +119,11 @@ def test_calculated_variables_agree_with_python() -> None:
         inputs, states = ([draw(rng, rov) for _ in range(vehicles)] for draw in (random_inputs, random_state))
         values = {name: np.array([[each[name]] for each in inputs]) for name in layout.inputs}
         values |= {name: np.array([[each[name]] for each in states]) for name in layout.state}
-        record = [*layout.thrust, *(f"der({name})" for name in layout.state)]
+        record = [*layout.calculated, *(f"der({name})" for name in layout.state)]
         found = simulate(rov, np.array([0.0, 1.0]), values, record, vehicles=vehicles).values[:, :, 0]
         for n in range(vehicles):
             rates = {f"der({name})": rate for name, rate in rov.derivatives(inputs[n], states[n]).items()}
-            expected = rov.thrust(inputs[n], states[n]) | rates
+            expected = rov.calculated(inputs[n], states[n]) | rates
             actual = dict(zip(record, found[:, n].tolist(), strict=True))
             assert actual == pytest.approx(expected, rel=1e-12, abs=1e-13)
 

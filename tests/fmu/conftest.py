@@ -26,5 +26,5 @@ def either_dir(fmi: int, request: pytest.FixtureRequest) -> Path:
 @pytest.fixture
 def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let builds in this process leave out the FMU's page, which takes most of their time."""
-    monkeypatch.setattr("rov_fmu.build.module", lambda _: b"")
+    monkeypatch.setattr("rov_fmu.build.web_module", lambda _: b"")
     monkeypatch.setattr("rov_fmu.build.documentation", lambda *_, **__: {})

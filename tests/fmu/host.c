@@ -5,7 +5,7 @@
  * everywhere. */
 #include "fmu.h"
 
-enum { N_OUTPUTS = N_STATES + N_THRUST };
+enum { N_OUTPUTS = N_STATES + N_OTHER };
 
 static int read_double(double *value)
 {
@@ -33,7 +33,7 @@ int main(int argc, char *argv[])
         inputs[i] = FIRST_REFERENCE + i;
     }
     for (unsigned i = 0; i < N_OUTPUTS; i++) {
-        outputs[i] = FIRST_REFERENCE + (i < N_STATES ? FIRST_STATE + i : FIRST_THRUST + i - N_STATES);
+        outputs[i] = FIRST_REFERENCE + (i < N_STATES ? FIRST_STATE + i : FIRST_OTHER + i - N_STATES);
     }
     double t = 0.0, h, values[N_INPUTS > N_OUTPUTS ? N_INPUTS : N_OUTPUTS];
     while (read_double(&h)) {

@@ -231,7 +231,7 @@ def test_both_flavours_warn_once_about_saturation_and_about_a_jump_in_time(
             slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.1)
             warned.append([m.text for m in log if m.status == WARNING])
         assert [len(texts) for texts in warned] == [1, 1, 1, 1, 2, 2]
-        assert "u_l = 1.5 saturates at 1; said once." in warned[0][0]
+        assert "u_l = 1.5 saturates at 1; logged once." in warned[0][0]
         assert "step from t = 1.5 does not begin at t = 1.2" in warned[-1][1]
         slave.freeInstance()
 

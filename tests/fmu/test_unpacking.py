@@ -113,7 +113,7 @@ def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp
     content = bytearray(_archive(_zeros(20)).getvalue())
     for sign, place in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
         struct.pack_into("<I", content, content.rindex(sign) + place, 1000)
-    with pytest.raises(FileError, match=r"^a\.fmu: is no FMU, or a damaged one: Bad CRC-32"):
+    with pytest.raises(FileError, match=r"^a\.fmu: is not an FMU, or is damaged: Bad CRC-32"):
         unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
     assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) <= 1000
 
@@ -129,5 +129,5 @@ def test_a_large_fmu_that_is_compressed_as_files_are_is_unpacked(tmp_path: Path)
 
 
 def test_an_archive_without_a_description_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"^a\.fmu: is no FMU that FMPy reads: .*modelDescription.xml"):
+    with pytest.raises(FileError, match=r"^a\.fmu: is not an FMU that FMPy can read: .*modelDescription.xml"):
         unpack_fmu(_archive(_member("resources/a")), Path("a.fmu"), tmp_path)

@@ -72,9 +72,11 @@ def slipped(recording: Recording, slip: Slip) -> Recording:
 
 def write_folder(folder: Path, written: Sequence[Recording]) -> Path:
     """Write a folder with logs of the VideoRay; mass, geometry, thrust and other axes are known."""
-    metas, others = K.layout.coefficients, {axis.name for axis in AXES} - {r.axis.name for r in written}
+    declarations, others = K.layout.coefficients, {axis.name for axis in AXES} - {r.axis.name for r in written}
     drag = [axis.coefficient(kind) for axis in AXES if axis.name in others for kind in ("a_d", "b_d", "beta")]
-    known = [f'{n} = {{ value = {K[n]!r}, unit = "{metas[n].unit}", source = "A pool" }}' for n in (*KNOWN, *drag)]
+    known = [
+        f'{n} = {{ value = {K[n]!r}, unit = "{declarations[n].unit}", source = "A pool" }}' for n in (*KNOWN, *drag)
+    ]
     head = ['name = "An ROV"', 'identifier = "an_rov"', 'version = "1"', 'description = "An ROV"', 'source = "A pool"']
     text = "\n".join(["[vehicle]", *head, "[known]", *known]) + "\n"
     (folder / "rov.toml").write_text(text, encoding="utf-8")

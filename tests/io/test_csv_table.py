@@ -103,7 +103,7 @@ def test_a_cell_without_a_number_says_what_to_do_where_a_number_is_needed(cell: 
 def test_decimal_commas_with_commas_between_the_cells_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match=r"column 3 = '25': there is no such column \(are these decimal commas\?"):
         _table(tmp_path, "length [m],time [s]\n0,5,25\n", time=MAYBE)
-    with pytest.raises(DataFileError, match="must be a number with a decimal point, unless ; parts the columns"):
+    with pytest.raises(DataFileError, match="must be a number with a decimal point, unless ; separates the columns"):
         _table(tmp_path, 'length [m],time [s]\n"0,5",25\n', time=MAYBE)
 
 

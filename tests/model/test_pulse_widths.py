@@ -45,7 +45,7 @@ def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Rov) -> None:
         found = lines[0].step(of_pulses, pulses, state, 0.07 * n, 0.07)
         assert found == lines[1].step(rov, fractions, state, 0.07 * n, 0.07)
         assert of_pulses.derivatives(pulses, state) == rov.derivatives(fractions, state)
-        assert of_pulses.thrust(pulses, state) == rov.thrust(fractions, state)
+        assert of_pulses.calculated(pulses, state) == rov.calculated(fractions, state)
         state = {name: found[name] for name in state}
 
 
@@ -68,7 +68,7 @@ def test_neutral_gives_no_thrust_and_is_the_start_value(rov: Rov) -> None:
     assert set(of_pulses.commanded(usual).values()) == {0.0}
     assert of_pulses.layout.usual_inputs.keys() == rov.layout.usual_inputs.keys()
     times = np.array([0.0, 0.3, 0.6])
-    names = [*rov.layout.state, *rov.layout.thrust]
+    names = [*rov.layout.state, *rov.layout.calculated]
     assert (
         simulate(of_pulses, times, record=names).values.tolist() == simulate(rov, times, record=names).values.tolist()
     )

@@ -37,7 +37,7 @@ def held(rov: Rov, **values: float) -> State:
 
 
 def thrust(rov: Rov, **commands: float) -> Values:
-    return rov.thrust(held(rov, **commands), at_rest(rov))
+    return rov.calculated(held(rov, **commands), at_rest(rov))
 
 
 # ---- Thrust ----
@@ -70,7 +70,7 @@ def test_each_rear_thruster_has_half_the_pair_and_the_torque_of_4(k: Rov) -> Non
 @pytest.mark.parametrize("beyond", [1.0 + 1e-15, 1.5, 1e300])
 def test_commands_beyond_full_thrust_saturate(k: Rov, beyond: float) -> None:
     full, more = held(k, u_l=1.0, u_r=-1.0, u_t=1.0), held(k, u_l=beyond, u_r=-beyond, u_t=beyond)
-    assert k.thrust(more, at_rest(k)) == k.thrust(full, at_rest(k))
+    assert k.calculated(more, at_rest(k)) == k.calculated(full, at_rest(k))
     assert k.step(more, at_rest(k), 1.0) == k.step(full, at_rest(k), 1.0)
 
 
@@ -200,7 +200,7 @@ def test_an_axis_alone_has_the_numbers_of_18() -> None:
     assert motion.reverse == pytest.approx((gain * 190.0, gain * (4.0 + 0.5 * 4.0)))
     assert pytest.approx(gain * (0.5 * 20.0 + 3.0 + 0.1)) == motion.C
     inputs = held(rov, X_ext=2.0)
-    assert [axis.C for axis in rov.axes(inputs)][:1] == pytest.approx([gain * (2.0 + 0.1)])
+    assert [axis.C for axis in rov.motions(inputs)][:1] == pytest.approx([gain * (2.0 + 0.1)])
 
 
 def test_the_net_weight_is_a_load_in_heave_alone() -> None:
@@ -237,5 +237,5 @@ def test_an_arm_turns_the_force_of_a_thruster_by_4(k: Rov) -> None:
 @pytest.mark.parametrize("turns", [0.0, 1.0, -3.0])
 def test_the_heading_counts_turns_from_the_one_before(turns: float) -> None:
     state = at_rest(SIX) | {"eta": cos(0.25), "epsilon_3": sin(0.25)}
-    assert SIX.thrust(still(SIX), state | {"psi": 2.0 * pi * turns})["psi"] == pytest.approx(0.5 + 2.0 * pi * turns)
-    assert SIX.thrust(still(SIX), state)["psi"] == pytest.approx(0.5)
+    assert SIX.calculated(still(SIX), state | {"psi": 2.0 * pi * turns})["psi"] == pytest.approx(0.5 + 2.0 * pi * turns)
+    assert SIX.calculated(still(SIX), state)["psi"] == pytest.approx(0.5)

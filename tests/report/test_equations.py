@@ -64,7 +64,7 @@ def exactly(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
     """Return the rates and the calculated variables of a vehicle."""
     if rov.layout.has_attitude:
         rates = {f"der({name})": x for name, x in rov.derivatives(inputs, state).items()}
-        return rates | rov.thrust(inputs, state)
+        return rates | rov.calculated(inputs, state)
     return {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
 
 
@@ -94,7 +94,7 @@ def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict
             at |= {
                 f"loss_{t.name}": of_sum(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]}) for t in curve.thrusters
             }
-    for name in rov.layout.thrust:
+    for name in rov.layout.calculated:
         if name not in at and name.startswith("F_"):
             at[name] = exact[name]
     for curve in shown.curves:
@@ -124,7 +124,7 @@ def test_the_equations_shown_are_those_of_the_vehicle(kind: str) -> None:
     found = check(rov, random.Random(1), 10)
     states = {name for name in rov.layout.state if not name.startswith("F_")}
     assert {f"der({name})" for name in states} <= found, "every rate has its equation"
-    assert {name for name in rov.layout.thrust if not name.startswith("F_")} <= found
+    assert {name for name in rov.layout.calculated if not name.startswith("F_")} <= found
 
 
 @pytest.mark.parametrize("vehicles", [50, pytest.param(1000, marks=pytest.mark.long)])

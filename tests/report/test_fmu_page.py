@@ -15,7 +15,7 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import Content, native_content, python_content
-from rov_fmu.fmu.module import module
+from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.page.live import Flown, fly_page
@@ -112,8 +112,8 @@ def test_what_flies_is_small_and_its_script_alone_is_allowed(page: str, vehicle:
 
 @pytest.mark.long
 def test_what_flies_for_another_vehicle_is_the_same_twice(heavy: Vehicle) -> None:
-    compiled = module(heavy.rov)
-    assert module(heavy.rov) == compiled
+    compiled = web_module(heavy.layout)
+    assert web_module(heavy.layout) == compiled
     check_live_section(page_without_plots(heavy, module=compiled), heavy)
 
 
@@ -421,7 +421,7 @@ def test_a_sum_has_its_signs_before_its_numbers() -> None:
 def test_words_of_variables_fit_what_they_are_of(vehicle: Vehicle) -> None:
     layout, other = vehicle.layout, VEHICLES["neither lag nor coupling"].layout
     assert layout.inputs["u_l"].description == "Command u_l: left thruster, positive forward; saturates at ±1"
-    assert "(4)" in layout.thrust["tau_rear"].description
-    assert "(4)" not in other.thrust["tau_t200"].description
+    assert "(4)" in layout.calculated["tau_rear"].description
+    assert "(4)" not in other.calculated["tau_t200"].description
     assert other.coefficients["m_a_r"].description == "Added moment of inertia m_a of yaw"
     assert other.coefficients["m_a_u"].description == "Added mass m_a of surge"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.module import module
+from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.model.layout import HEAVE, Thruster
 from rov_fmu.model.rov import Rov
@@ -40,7 +40,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
         path = folder / f"{kind}.html"
         if not path.exists():
             vehicle = a_vehicle(SIX) if kind == "six" else four_axes(load_vehicle(FILES[kind]))
-            path.write_text(fly_page([Flown(vehicle, module(vehicle.rov))]), encoding="utf-8")
+            path.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
         return path.as_uri()
 
     return page
@@ -106,7 +106,7 @@ _FLY = """legs => {
 def a_manoeuvre(vehicle: Vehicle) -> list[Leg]:
     """Return random commands (some of which saturate), loads, currents and tunings, for 5 ms to 5 s each."""
     rng, layout = random.Random(vehicle.identifier), vehicle.layout
-    tunable = [name for name, meta in layout.coefficients.items() if meta.tunable]
+    tunable = [name for name, declaration in layout.coefficients.items() if declaration.tunable]
     return [
         {
             "length": exp(rng.uniform(log(5e-3), log(5.0))),
@@ -232,7 +232,7 @@ def test_a_frame_is_drawn_in_time(pages: Callable[[str], str], visit: Visitor) -
 def tilting(tmp_path: Path, quiet: Visitor) -> Any:
     """The page of a vehicle with six axes."""
     target = tmp_path / "six.html"
-    target.write_text(fly_page([Flown(a_vehicle(SIX), module(SIX))]), encoding="utf-8")
+    target.write_text(fly_page([Flown(a_vehicle(SIX), web_module(SIX.layout))]), encoding="utf-8")
     return flying(quiet, target.as_uri()).page
 
 
@@ -271,7 +271,7 @@ def test_each_rotation_has_its_key(tilting: Any, key: str, velocity: str) -> Non
 def test_a_command_acts_after_the_dead_time(tmp_path: Path, quiet: Visitor) -> None:
     """The dead time is 0.1 s. A reset forgets the command on its way."""
     vehicle, target = load_vehicle(THRUST_EFFECTS), tmp_path / "late.html"
-    target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))]), encoding="utf-8")
+    target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
     before, after, anew = flying(quiet, target.as_uri()).page.evaluate("""() => {
         live.pause(true);
         live.flight.set({ u_bow: 1 });
@@ -290,7 +290,7 @@ def test_pulse_widths_are_flown_by_fractions(tmp_path: Path, quiet: Visitor) -> 
     """The model gets pulse widths, from the sliders, the step tests and a reset alike."""
     vehicle, target = load_vehicle(SHIPPED["videoray"]), tmp_path / "pulses.html"
     of_pulses = replace(vehicle, rov=pulsed(vehicle.rov, (1100.0, 1480.0, 1900.0)))
-    flown = [Flown(of_pulses, module(of_pulses.rov)), Flown(vehicle, module(vehicle.rov))]
+    flown = [Flown(of_pulses, web_module(of_pulses.layout)), Flown(vehicle, web_module(vehicle.layout))]
     target.write_text(fly_page(flown), encoding="utf-8")
     moved = flying(quiet, target.as_uri()).page.evaluate("""() => {
         live.pause(true);
@@ -347,7 +347,7 @@ def test_keys_act_at_once_on_a_page_that_is_only_flown(tmp_path: Path, quiet: Vi
     """A compact page is embedded in another one, whose focus it leaves alone."""
     for compact in (False, True):
         target = tmp_path / f"{compact}.html"
-        target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))], compact=compact), encoding="utf-8")
+        target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))], compact=compact), encoding="utf-8")
         page = flying(quiet, target.as_uri()).page
         assert (page.evaluate("document.activeElement.id") == "live-stage") != compact
         if not compact:
@@ -542,7 +542,7 @@ def four_thrusters(tmp_path_factory: pytest.TempPathFactory) -> str:
     layout = replace(vehicle.layout, thrusters=tuple(Thruster(*one) for one in _FOUR))
     rov = Rov(layout, {name: vehicle.rov.coefficients[name] for name in layout.coefficients})
     target = tmp_path_factory.mktemp("four") / "four.html"
-    target.write_text(fly_page([Flown(a_vehicle(rov), module(rov))]), encoding="utf-8")
+    target.write_text(fly_page([Flown(a_vehicle(rov), web_module(rov.layout))]), encoding="utf-8")
     return target.as_uri()
 
 
@@ -893,7 +893,7 @@ def test_the_legend_tells_what_was_measured_only_where_something_was(
 
 def test_a_compact_page_shows_the_picture_and_the_charts_in_a_small_frame(tmp_path: Path, quiet: Visitor) -> None:
     target, vehicle = tmp_path / "compact.html", load_vehicle(SHIPPED["videoray"])
-    target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))], compact=True), encoding="utf-8")
+    target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))], compact=True), encoding="utf-8")
     page = flying(quiet, target.as_uri(), width=720, height=620).page
     for shown in ("#live-picture", "#live-chart-surge", "#live-reset", "#live-right"):
         box = page.locator(shown).evaluate(BOX)

@@ -147,7 +147,7 @@ def test_a_build_with_a_wrong_picture_ends_with_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots and the module for the page
-    monkeypatch.setattr("rov_fmu.build.module", lambda _: None)  # take most of the time
+    monkeypatch.setattr("rov_fmu.build.web_module", lambda _: None)  # take most of the time
     vehicle = _picture("model.png", tmp_path / "own", NO_PNG["text"])
     assert main(["build", str(vehicle), "--platform", "host", "-o", str(tmp_path / "out.fmu")]) == 2
     error = capsys.readouterr().err

@@ -39,8 +39,10 @@ MADE = replace(
 def _has(vehicle: Vehicle, **other: float) -> dict[str, Variable]:
     """The coefficients of an FMU that is built from a vehicle."""
     return {
-        name: Variable(name, n, "Real", "parameter", True, True, meta.minimum, meta.maximum, meta.unit, value)
-        for n, (name, meta) in enumerate(vehicle.layout.coefficients.items())
+        name: Variable(
+            name, n, "Real", "parameter", True, True, declaration.minimum, declaration.maximum, declaration.unit, value
+        )
+        for n, (name, declaration) in enumerate(vehicle.layout.coefficients.items())
         for value in [other.get(name, vehicle.rov[name])]
     }
 

@@ -253,7 +253,7 @@ REFUSED = {
         "0,0,0,0",
         "columns 'u_t [%]', 'command [%]'",
     ),
-    "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "there is such a column before"),
+    "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "this column occurs twice"),
     "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),
     "fractions as pulses": ("time [s],u_t [us],depth [m]", "0,0.5,1", "no pulse beyond 1 us: fractions under [us]?"),
     "percent as pulses": ("time [s],u_t [us],depth [m]", "0,50,1", "no pulse beyond 100 us: percent under [us]?"),

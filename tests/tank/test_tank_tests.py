@@ -236,7 +236,7 @@ BAD: list[tuple[str, str, str]] = [
     ("steady_surge.csv", STEADY + "0.2,0.3\n", "'command [%]' | fractions under [%]"),
     ("steady_surge.csv", "command [1],velocity [m/s]\n20,0.3\n", "line 2 | 'command [1]' = '20' | at most 1"),
     ("steady_surge.csv", "command [%],velocity\n20,0.3\n", "line 1 | column 2 = 'velocity' | [m/s]"),
-    ("steady_surge.csv", "command [%],velocity [m/s],command [1]\n", "line 1 | column 3 | [1]' | before"),
+    ("steady_surge.csv", "command [%],velocity [m/s],command [1]\n", "line 1 | column 3 | [1]' | twice"),
     ("steady_surge.csv", STEADY, "line 1 | no rows"),
     ("steady_surge.csv", STEADY + "20,\udcb5\n", "UTF-8 | byte 30"),
     ("steady_surge.csv", STEADY + '20,"0.3\n', "line 2"),

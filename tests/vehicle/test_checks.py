@@ -186,7 +186,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "an arm of no length": ({"arm.R.value": 0.0}, [("arm.R.value = 0.0", "more than 0")]),
     "two places": (
         {"thruster.l.position": place(0.0, 0.1, 0.0)},
-        [("thruster.l.arm", "must not stand beside position")],
+        [("thruster.l.arm", "must not be given together with position")],
     ),
     "an arm of a thruster astern": (
         {"thruster.l.direction.value": [-1.0, 0.0, 0.0]},

@@ -55,7 +55,7 @@ def check_usable(vehicle: Vehicle) -> None:
     inputs = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, (0.3, 0.2, -0.1, 1.0), strict=False))
     h = 0.1
     if layout.coupled:  # coupled axes settle together; until then the fastest decay limits each piece
-        axes = vehicle.rov.axes(inputs)
+        axes = vehicle.rov.motions(inputs)
         drags = [(axis, drag) for axis in axes for drag in ((axis.A, axis.B), axis.reverse or (0.0, 0.0))]
         h = min(h, 1000.0 / max(1.0, *(B + 2.0 * sqrt(A * abs(axis.C)) for axis, (A, B) in drags)))
     after = vehicle.rov.step(inputs, dict.fromkeys(layout.state, 0.0), h)

@@ -8,7 +8,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.io.paths import MODELS
 from rov_fmu.model.layout import AXES as AXIS_KINDS
-from rov_fmu.model.layout import AXIS, BODY, CURVE, RESTORING, TUNING, metas_of
+from rov_fmu.model.layout import AXIS, BODY, CURVE, RESTORING, TUNING, declarations_of
 from rov_fmu.vehicle.json_schema import json_schema
 
 KEPT = MODELS / "vehicle.schema.json"
@@ -22,9 +22,9 @@ def test_the_file_in_the_repository_is_the_schema(capsys: pytest.CaptureFixture[
 def test_it_has_every_kind_of_coefficient_with_unit_and_bounds() -> None:
     tables: dict[str, Any] = json_schema()["$defs"]
     kinds = {
-        "Body": {key: kind.meta() for key, kind in (BODY | RESTORING).items()},
-        "Curve": {key: kind.meta(curve="", equation="") for key, kind in CURVE.items()},
-        **{f"_{axis.name.capitalize()}": metas_of(axis) for axis in AXIS_KINDS.values()},
+        "Body": {key: kind.declaration() for key, kind in (BODY | RESTORING).items()},
+        "Curve": {key: kind.declaration(curve="", equation="") for key, kind in CURVE.items()},
+        **{f"_{axis.name.capitalize()}": declarations_of(axis) for axis in AXIS_KINDS.values()},
     }
     assert {*kinds["_Yaw"]} == {*AXIS, *TUNING}
     for table, declarations in kinds.items():

@@ -15,7 +15,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Curve, Declaration, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.description import _identifier
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_mass, check_thruster_places, doubts, in_words
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_mass, check_thruster_places, doubts
 from rov_fmu.vehicle.published import Cell
 from rov_fmu.vehicle.quantity import derivative_hint, within
 from rov_fmu.vehicle.schema import Estimated, _near, _not_zero, _pulses, _rising, _unit_vector
@@ -181,10 +181,6 @@ def test_full_command_must_give_a_force_in_each_direction(values: dict[str, floa
 
 
 # ---- Mass, damping, weight ----
-
-
-def test_names_are_listed_as_in_a_sentence() -> None:
-    assert [in_words(names) for names in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
 
 
 @pytest.mark.parametrize(("share", "possible"), [(0.999, True), (-0.999, True), (1.001, False), (-1.001, False)])

@@ -228,14 +228,17 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "coefficients beside a table": (
         {"curves.bow.a_t": quantity(1.0, "N")},
-        "curves.bow.a_t: must not stand beside table",
+        "curves.bow.a_t: must not be given together with table",
     ),
     "no thrust at all": ({"curves.lift.b_t": GONE}, "curves.lift.b_t: this key is missing"),
     "a scale without a table": ({"curves.lift.k_t": quantity(1.0, "1")}, "curves.lift.k_t: scales a table"),
-    "a table and tables": ({"curves.main.table": _FILES[0]}, "curves.main.tables: must not stand beside table"),
+    "a table and tables": (
+        {"curves.main.table": _FILES[0]},
+        "curves.main.tables: must not be given together with table",
+    ),
     "tables and an exponent": (
         {"curves.main.n_V": quantity(1.0, "1"), "curves.main.V_0": quantity(12.0, "V")},
-        "curves.main.V_0: must not stand beside tables",
+        "curves.main.V_0: must not be given together with tables",
     ),
     "no exponent": ({"curves.bow.n_V": GONE}, "curves.bow.n_V: this key is missing, and V_0 is there"),
     "only a loss in reverse": ({"curves.main.d": GONE}, "curves.main.d: this key is missing, and d_reverse is there"),

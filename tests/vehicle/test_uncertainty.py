@@ -74,7 +74,7 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "of no estimate": (
         lambda text: text.replace("beta_r = { err", "m_rov = { err"),
-        "estimates.m_rov: m_rov has no interval, so it is no estimate",
+        "estimates.m_rov: m_rov has no interval, so it is not an estimate",
     ),
     "with no estimate": (
         lambda text: text.replace("{ a_d_u =", "{ m_rov ="),

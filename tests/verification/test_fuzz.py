@@ -116,7 +116,12 @@ PLANTED = {
         "the numbers are those of other coefficients|goes another way",
     ),
     "a state is not freed": ("saved.c", "    free(saved);\n", "", "LeakSanitizer: detected memory leaks"),
-    "overflow is not looked at": ("instance.c", "if (sum != 0.0) {", "if (sum > 0.0) {", "broken property"),
+    "overflow is not looked at": (
+        "instance.c",
+        "if (!all_finite(next, N_STATES)) {",
+        "if (!all_finite(next, 0)) {",
+        "broken property",
+    ),
     "a failed step moves the time": (
         "instance.c",
         "    TRY(check_step(f, t, h));\n    TRY(advance",

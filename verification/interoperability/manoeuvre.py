@@ -59,7 +59,7 @@ class Manoeuvre:
     @cached_property
     def outputs(self) -> tuple[str, ...]:
         """The names of the outputs."""
-        return (*self.rov.layout.state, *self.rov.layout.thrust)
+        return (*self.rov.layout.state, *self.rov.layout.calculated)
 
     def inputs_at(self, time: float) -> dict[str, float]:
         """Return all inputs of the step that starts at a time."""
@@ -98,7 +98,7 @@ class Manoeuvre:
         for time in TIMES:
             if time > 0.0:
                 state = rov.step(inputs, state, STEP)
-            rows.append({"time": time, **state, **rov.thrust(inputs, state)})
+            rows.append({"time": time, **state, **rov.calculated(inputs, state)})
             inputs = self.inputs_at(time)
         return rows
 

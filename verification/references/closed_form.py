@@ -42,7 +42,7 @@ def axis_of(equation: Riccati) -> Axis:
 
 def axes(rov: Rov, inputs: Mapping[str, float]) -> tuple[Axis, ...]:
     """Return the motion of every axis of a vehicle without lag and coupling under held inputs."""
-    return tuple(map(axis_of, rov.axes(inputs)))
+    return tuple(map(axis_of, rov.motions(inputs)))
 
 
 def advance(

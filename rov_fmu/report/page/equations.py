@@ -95,7 +95,7 @@ def of(layout: Layout) -> Equations:
     """Return the equations of a vehicle."""
     equation = equation_of(layout)
     inlined = _inlined(layout, equation)
-    rotation = [name for name in equation.heading if name.startswith("R_")]
+    rotation = [name for name in equation.orientation if name.startswith("R_")]
     reader = Reader(inlined)
 
     def line(name: str, formula: str, reference: str = "") -> Line:
@@ -150,7 +150,7 @@ def of(layout: Layout) -> Equations:
         ],
         curves,
         [rate(name, equation.rates[name]) for name in layout.pose],
-        [line(name, equation.heading[name]) for name in rotation],
+        [line(name, equation.orientation[name]) for name in rotation],
         [line(name, formula) for name, formula in equation.outputs.items()],
     )
 

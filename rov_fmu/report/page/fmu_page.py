@@ -1,6 +1,6 @@
 """The page documentation/index.html of an FMU: one file with the numbers and plots of its vehicle."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
@@ -16,6 +16,7 @@ from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import REPORT
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
+from rov_fmu.io.messages import listed
 from rov_fmu.model.layout import ARM, Axis, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
@@ -80,8 +81,8 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
         groups=[list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))],
         reversing=_reversing,
         settable=[v.name for v in variables(rov) if v.name in layout.state and v.start is not None] + [*layout.initial],
-        other_axes=_listed(name for name in _AXES if name not in layout.kinds).capitalize(),
-        coupled=_listed(equations.coupled(layout)),
+        other_axes=listed(name for name in _AXES if name not in layout.kinds).capitalize(),
+        coupled=listed(equations.coupled(layout)),
         has_full_mass=any(line.coupled for line in shown.motion),
         equations=shown,
         mathml=equations.MathML(layout),
@@ -219,15 +220,9 @@ def _mirrored(layout: Layout) -> str:
     return " and ".join(found)
 
 
-def _listed(words: Iterable[str]) -> str:
-    """Return words as a list in a sentence: surge, sway and yaw."""
-    *first, last = [*words] or [""]
-    return f"{', '.join(first)} and {last}" if first else last
-
-
 def _is_tuned(rov: Rov) -> bool:
     """Return True unless each alpha and beta is 1."""
-    return any(rov[name] != 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable)
+    return any(rov[name] != 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------------------------

@@ -130,7 +130,7 @@ def _data(flown: Flown) -> dict[str, Any]:
             _thruster(rov, thruster, label) for thruster, label in zip(layout.thrusters, _labels(rov), strict=True)
         ],
         "fins": [{"at": fin.position, "along": fin.direction} for fin in layout.fins],
-        "tunable": [name for name, meta in layout.coefficients.items() if meta.tunable],
+        "tunable": [name for name, declaration in layout.coefficients.items() if declaration.tunable],
         "tests": list(_tests(vehicle)),
         "size": size_of(rov),
     }
@@ -235,9 +235,9 @@ def _loads(rov: Rov, start: Mapping[str, float]) -> Iterator[tuple[str, float, s
     Loads end at the strongest thrust, and others at 1, or at twice their start value if that is more.
     """
     most = {form.axis.external: _round(rov.strongest(form.axis)) for form in rov.layout.axes}
-    for name, meta in rov.layout.inputs.items():
+    for name, declaration in rov.layout.inputs.items():
         if name not in rov.layout.commands:
-            yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(meta.unit)
+            yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(declaration.unit)
 
 
 def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:

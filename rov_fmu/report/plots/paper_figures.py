@@ -5,7 +5,7 @@ measured velocity is that of the thrust curve, (11)-(13). The forces behind the 
 recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import partial
@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.points.quadratic_fit import fit_quadratic, quadratic
+from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, check_targets, folder_made, write_whole
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
@@ -125,7 +126,7 @@ def paper_figures() -> Iterator[PaperFigure]:
     for axis, (name, source) in _STEP_FIGURES.items():
         yield PaperFigure(
             name,
-            f"Velocity in {axis} after steps of the command to {_listed(_STEPS)} %: the non-linear model "
+            f"Velocity in {axis} after steps of the command to {listed(map(str, _STEPS))} %: the non-linear model "
             f"(dashed) and the scaled model (solid) of {_PAPER}{source}. Dotted: measured V_ss. "
             f"{_measured_taus(tables[axis])} The paper does not print the recordings.",
             (partial(_steps, k=k, table=tables[axis]),),
@@ -133,7 +134,7 @@ def paper_figures() -> Iterator[PaperFigure]:
     axes = [form.axis.name for form in vehicle.layout.axes]
     yield PaperFigure(
         "steady_velocity",
-        f"Steady velocity over the command in {_listed(axes)}: the model of {_PAPER} (dashed), the model refitted to "
+        f"Steady velocity over the command in {listed(axes)}: the model of {_PAPER} (dashed), the model refitted to "
         "all measured V_ss and Tau (solid), and the measured V_ss (points).",
         tuple(partial(_steady, k=k, refit=refit, table=tables[axis], has_legend=axis == axes[0]) for axis in axes),
     )
@@ -144,14 +145,8 @@ def _measured_taus(table: ResponseTable) -> str:
     without = [command for command in _STEPS if not measured_step(table, Decimal(command)).Tau]
     if len(without) == len(_STEPS):
         return "The paper has no measured Tau."
-    missing = f"; there is none at {_listed(without)} %" if without else ""
+    missing = f"; there is none at {listed(map(str, without))} %" if without else ""
     return f"Points: measured Tau, at 63 % of the measured V_ss{missing}."
-
-
-def _listed(words: Sequence[object]) -> str:
-    """Return words in running text: 30, 50 and 70."""
-    *first, last = map(str, words)
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable, *, has_legend: bool) -> None:

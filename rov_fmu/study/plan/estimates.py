@@ -6,6 +6,7 @@ from math import isclose
 
 import numpy as np
 
+from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.model import Variable, unsettable
 from rov_fmu.study.plan.plan import Plan
@@ -104,4 +105,4 @@ def _listed(words: Sequence[str]) -> str:
     some = [*words[:_SHOWN]]
     if len(words) > _SHOWN:
         some.append(f"{len(words) - _SHOWN} more")
-    return f"{', '.join(some[:-1])} and {some[-1]}" if len(some) > 1 else some[0]
+    return listed(some)

@@ -161,7 +161,7 @@ def test_a_quaternion_of_zero_is_refused(fmu: Fmu) -> None:
         rov.reach(CONTINUOUS)
         before = states(rov)
         assert put(rov, before | nothing) == DISCARD
-        assert rov.log[-1].text.endswith("the quaternion is 0, which is no attitude; the states stay as they are.")
+        assert rov.log[-1].text.endswith("the quaternion is 0, which has no direction; the states are not changed.")
         assert states(rov) == before
         assert rov.set(nothing) == OK  # one of them after the other may be 0
         assert rov.get_by(fmu.references(["psi"]), room()) == DISCARD

@@ -103,7 +103,7 @@ def test_steps_are_those_of_the_fractions_bit_for_bit(fmus: Pair) -> None:
 def test_derivatives_in_model_exchange_are_those_of_the_fractions(fmus: Pair) -> None:
     """The values are equal bit for bit, and the directional derivatives have the scale of a pulse width."""
     rng = random.Random(2)
-    unknowns = [f"der({name})" for name in STATES] + [*FRACTIONS.layout.thrust]
+    unknowns = [f"der({name})" for name in STATES] + [*FRACTIONS.layout.calculated]
     low, neutral, high = PULSE
     steep: set[str] = set()
     with fmus[0].instance(MODEL_EXCHANGE) as rov, fmus[1].instance(MODEL_EXCHANGE) as other:

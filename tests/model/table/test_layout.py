@@ -64,7 +64,7 @@ WORDS = {
 @pytest.mark.parametrize("name", WORDS)
 def test_variables_are_described_in_the_terms_of_the_vehicle(name: str) -> None:
     layout = rov_fmu.load(SHIPPED[name]).layout
-    declared = layout.inputs | layout.state | layout.thrust | layout.coefficients
+    declared = layout.inputs | layout.state | layout.calculated | layout.coefficients
     assert {key: declared[key].description for key in WORDS[name]} == WORDS[name]
 
 
@@ -186,7 +186,7 @@ def test_the_thrust_of_a_thruster_is_described_as_its_share_of_the_curve(togethe
     layout = replace(_layout(*thrusters), curves=(Curve("c", ("a_t", "b_t", "d"), together),))
     place = f"Thrust F_a: thruster a{share}, in water at rest, positive astern and to starboard"
     words = f"{place}, equation (2) of Enevoldsen et al. 2018"
-    assert layout.thrust["F_a"].description == words
+    assert layout.calculated["F_a"].description == words
 
 
 def test_a_voltage_is_bounded_by_the_tables_and_otherwise_only_below() -> None:
@@ -229,8 +229,8 @@ def test_the_rates_stand_between_the_states_and_the_thrust() -> None:
     assert places[:n] == [*range(n)]
     assert places[n:] == [*range(n + len(layout.state), n + len(layout.state) + len(places) - n)]
     assert [*layout.pose] == ["x", "y", "z", "eta", "epsilon_1", "epsilon_2", "epsilon_3"]
-    assert [meta.nominal for meta in layout.pose.values()] == [10.0] * 3 + [1.0] * 4
-    assert {name: (meta.minimum, meta.maximum) for name, meta in layout.angles.items()} == {
+    assert [declaration.nominal for declaration in layout.pose.values()] == [10.0] * 3 + [1.0] * 4
+    assert {name: (declaration.minimum, declaration.maximum) for name, declaration in layout.angles.items()} == {
         "phi": pytest.approx((-3.141592653589793, 3.141592653589793)),
         "theta": pytest.approx((-1.5707963267948966, 1.5707963267948966)),
         "psi": (-inf, inf),

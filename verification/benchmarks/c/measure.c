@@ -50,7 +50,7 @@ void core(vehicle *at, double state[N_STATES], double h, long steps)
     (void)steps;
     double next[N_STATES], heading = 0.0;
     memcpy(&at->at[FIRST_STATE], state, sizeof next);
-    CHECK(model_step(at->at, &at->numbers, h, next, &heading) > 0);
+    CHECK(motion_step(at->at, &at->numbers, h, next, &heading) > 0);
     memcpy(state, next, sizeof next);
 }
 

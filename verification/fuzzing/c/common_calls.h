@@ -148,7 +148,7 @@ static void PLAY(GetReal)(slot *s)
     for (size_t i = 0; i < n && vr != NULL; i++) {
         const unsigned place = place_of(vr[i]);
         good = good && place < N_VARIABLES + (FMI_VERSION == 3); /* the time */
-        derived = derived || (place >= FIRST_CALCULATED && place < (MAY_OVERFLOW ? FIRST_COEFFICIENT : FIRST_THRUST));
+        derived = derived || (place >= FIRST_CALCULATED && place < (MAY_OVERFLOW ? FIRST_COEFFICIENT : FIRST_OTHER));
     }
     verdict wanted = legal(s, WHICH(GetReal), good);
     if (wanted == ALLOWED && derived && !is_moderate(s->f)) {

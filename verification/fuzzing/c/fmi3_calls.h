@@ -45,7 +45,7 @@ static void update_step(fmi3InstanceEnvironment environment, double time, bool m
     slot *const s = environment;
     updates *const u = s->inside;
     PROPERTY(u != NULL && s->at.mode == STEP, "an update in %s", mode_name(s->at.mode));
-    const double pieces = fmin(fmax(1.0, ceil(u->h / 1e-4 * (1.0 - 1e-9))), MOST_PIECES), from = u->gone;
+    const double pieces = fmin(fmax(1.0, ceil(u->h / 1e-4 * (1.0 - 1e-9))), MOST_UPDATES), from = u->gone;
     if (u->n > 0) {
         u->gone = u->n < pieces ? fmin(u->length, u->h * (u->n / pieces)) : u->length;
         check_step_law(before(s), s->f, u->gone - from);

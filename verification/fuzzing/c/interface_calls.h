@@ -47,7 +47,7 @@ static void PLAY(SetContinuousStates)(slot *s)
     for (size_t i = 0; i < n && good; i++) {
         good = isfinite(x[i]);
     }
-    good = good && model_has_attitude(x);
+    good = good && model_has_direction(x);
     if (CALL(s, good, true, SetContinuousStates, s->f, x, n)) {
         PROPERTY(memcmp(&s->f->now.values[FIRST_STATE], x, n * sizeof *x) == 0, "not set");
     }

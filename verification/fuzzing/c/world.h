@@ -178,7 +178,7 @@ static void copy_instance(unsigned char *to, const fmu *from)
     memcpy(to, from, sizeof *from);
     ((fmu *)(void *)to)->function = NULL;
     memset(&((fmu *)(void *)to)->now.values[FIRST_CALCULATED], 0,
-           (N_STATES + N_THRUST - HAS_DEAD_TIME * N_COMMANDS) * sizeof(double)); /* the commands that act are remembered */
+           (N_STATES + N_OTHER - HAS_DEAD_TIME * N_COMMANDS) * sizeof(double)); /* the commands that act are remembered */
 }
 
 static fmu *before(const slot *s)
