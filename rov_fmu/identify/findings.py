@@ -101,12 +101,12 @@ _LENGTH_CAUSES = {
     10.0: "is it in dm, or is the scale of the sensor wrong",
     0.1: "is the unit or the scale of the sensor wrong",
     0.01: "are metres labelled as cm",
-    0.001: "are metres taken for mm",
+    0.001: "are metres labelled as mm",
 }
 _ANGLE_CAUSES = {
     pi / 180.0: "are radians labelled as degrees",
-    180.0 / pi: "are degrees taken for radians",
-    10.0: "is it in tenths of a degree, or the scale of the sensor wrong",
+    180.0 / pi: "are degrees labelled as radians",
+    10.0: "is it in tenths of a degree, or is the scale of the sensor wrong",
     100.0: "is it in hundredths of a degree",
     0.1: "is the unit or the scale of the sensor wrong",
 }
@@ -324,7 +324,7 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     "fractions as percent": (
         "{files}: no command exceeds {percent:.2g} % of the full command, which is too weak to move an "
-        "ROV: are fractions [1] taken for percent [%]?"
+        "ROV: are fractions [1] labelled as percent [%]?"
     ),
     "slow time constants": (
         "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: is it in ms?"

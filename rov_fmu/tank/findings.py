@@ -110,7 +110,9 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "constant motion": "{files}: the recording of {axes} is left out: the {quantity} never changes",
     "constant push": "{files}: the recording of {axes} is left out: the thrust along it never changes",
-    "cancelling thrusters": "{files}: the recording of {axes} is left out: its thrusters cancel each other all the time",
+    "cancelling thrusters": (
+        "{files}: the recording of {axes} is left out: its thrusters cancel each other all the time"
+    ),
     "axis not pushed": (
         "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "
         "{axes}. If it was driven that way, check the directions of the thrusters and the signs of their commands"

@@ -50,8 +50,10 @@ class Attitude:
             "z": np.cos(theta) * (np.sin(phi) * v + np.cos(phi) * w) - np.sin(theta) * u - w,
             "psi": (r + pitching) / (np.cos(phi) * np.cos(theta)) - r,
         }
-        found = {"phi": phi[None, :], "theta": theta[None, :]}
-        found |= {f"der({name})": np.gradient(angle, time, axis=1) for name, angle in found.items()}
+        angles = {"phi": phi, "theta": theta}
+        angles |= {f"der({name})": np.gradient(angle, time) for name, angle in angles.items()}
+        shape = next(iter(motion.values())).shape
+        found = {name: np.broadcast_to(angle, shape) for name, angle in angles.items()}
         for name, rate in rates.items():
             if name in motion:
                 found[name] = motion[name] + cumulative_trapezoid(rate, time, initial=0.0)

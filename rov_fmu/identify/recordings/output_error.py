@@ -147,11 +147,9 @@ class _Fit:
         everything = self.model(extras, noise, with_prior=True)
         whole = self.analysed(everything, x, 1e-4)  # effects that are not identifiable settle slowly
         kept, x = earn_their_place(whole)
-        chosen = self.analysed(self.model(kept, noise), x)
-        while (fewer := earn_their_place(chosen))[0] != kept:  # extras were dropped to first order only
-            kept, x = fewer
-            chosen = self.analysed(self.model(kept, noise), x)
+        chosen = self.reduced(self.analysed(self.model(kept, noise), x), noise)
         chosen = self.exchanged(self.simplest(chosen, noise), extras, noise)
+        chosen = self.reduced(chosen, noise)  # without a wrong effect, others may not be justified
         kept = chosen.model.extras
         if (better := self.voted(chosen)) != kept:
             x = chosen.x[chosen.model.places_of(better)]
@@ -178,6 +176,12 @@ class _Fit:
             yield model.start(coefficients, values)
             if not late:
                 return
+
+    def reduced(self, analysis: ResidualAnalysis, noise: Array) -> ResidualAnalysis:
+        """Leave out the extras that the data do not justify, and fit the others again, until all are justified."""
+        while (fewer := earn_their_place(analysis))[0] != analysis.model.extras:
+            analysis = self.analysed(self.model(fewer[0], noise), fewer[1])
+        return analysis
 
     def simplest(self, analysis: ResidualAnalysis, noise: Array) -> ResidualAnalysis:
         """Drop groups of extras that are not justified together, by the Bayesian criterion.

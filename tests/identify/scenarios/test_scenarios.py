@@ -29,6 +29,7 @@ OFTEN = (
     "pilot",
     "switches between rows at 5 Hz",
     "tether",
+    "tilt with roll and pitch",
     "load, delay, reverse, correlated noise",
 )
 """The scenarios that the long tests run with 20 seeds. All of them are run with 200 seeds once a week."""
