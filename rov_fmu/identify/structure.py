@@ -25,6 +25,7 @@ from rov_fmu.identify.simulation.linear_response import LinearResponse
 from rov_fmu.model.layout import SURGE, SWAY
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import without_spikes
 
 _CHANCE = 1e-4
@@ -52,12 +53,11 @@ _LOGGED = 1.2
 def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     """Yield a finding for each recording that the model does not explain: the most likely cause, and since when."""
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
-        all_cases = (_case(fit, s) for s in fit.simulations if np.ptp(s.residuals) > _NEGLIGIBLE * np.ptp(s.measured))
-        cases = [case for case in all_cases if case.spectrum is not None]
+        cases = _cases(fit)
         misfits = _misfits(cases) if cases else {}
     if not misfits:
         return
-    logged = {name for case in cases for name in case.simulation.recording.context}
+    logged = {name for case in cases for name in case.recording.context}
     scores = {name: misfit.score * (_LOGGED if name in logged else 1.0) for name, misfit in misfits.items()}
     cause = max(scores, key=lambda name: scores[name])
     if cause != "lag":  # a lag explains part of many a misfit, and an unknown force most of it
@@ -69,7 +69,7 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     for n, (case, part) in enumerate(zip(cases, parts, strict=True)):
         start = case.visible_from(part)
         if n == worst or (start is not None and cause != "odd one"):
-            found = Finding("unexplained", fit.axis.name, file=case.simulation.recording.file, names={"cause": cause})
+            found = Finding("unexplained", fit.axis.name, file=case.recording.file, names={"cause": cause})
             if cause == "lag":
                 found = replace(found, kind="lag suggested", names={})
             yield replace(found, numbers={"start": start or 0.0})
@@ -84,12 +84,31 @@ def _odd_one(cases: Sequence["_Case"]) -> int | None:
     return odd[0] if len(odd) == 1 else None
 
 
-def _case(fit: RecordingsFit, s: Simulation) -> "_Case":
-    return _Case(s, LinearResponse(fit.rov, s.recording, s.time, s.velocity, fit.delay_of(s.recording.file)))
+def _cases(fit: RecordingsFit) -> list["_Case"]:
+    """Return the recordings that can be tested.
+
+    One recording may show little of its slow noise. Relative to its fast noise, its spectrum is therefore at least the
+    mean of the spectra of all recordings with the same sensor.
+    """
+    found: list[tuple[_Recorded, Array]] = []
+    for s in fit.simulations:
+        if np.ptp(s.residuals) > _NEGLIGIBLE * np.ptp(s.measured):
+            delay = fit.delay_of(s.recording.file)
+            recorded = _Recorded(s, LinearResponse(fit.rov, s.recording, s.time, s.velocity, delay))
+            if (spectrum := recorded.spectrum()) is not None:
+                found.append((recorded, spectrum))
+    cases = []
+    for recorded, own in found:
+        is_position = recorded.simulation.recording.is_position
+        alike = [other for each, other in found if each.simulation.recording.is_position == is_position]
+        at = np.linspace(0.0, 1.0, len(own), endpoint=False)  # frequencies relative to that of sampling
+        shapes = [np.interp(at, np.linspace(0.0, 1.0, len(o), endpoint=False), o / o[-1]) for o in alike]
+        cases.append(_Case(recorded, np.maximum(own, own[-1] * np.mean(shapes, axis=0))))
+    return cases
 
 
 @dataclass(frozen=True, eq=False)
-class _Case:
+class _Recorded:
     """One recording, and the linear response of the fitted model at its n samples."""
 
     simulation: Simulation
@@ -181,17 +200,33 @@ class _Case:
             return np.zeros(len(self.simulation.time))
         return np.interp(self.simulation.time, self.simulation.recording.time[there], values[there])
 
-    # ---- Noise ----
-
     @cached_property
     def residuals(self) -> Array:
         """The residuals without spikes."""
         return without_spikes(self.simulation.residuals)
 
-    @cached_property
     def spectrum(self) -> Array | None:
-        """The variance of the noise in each coefficient of its cosine transform; None for too few samples."""
+        """Return the variance of the noise in each coefficient of its cosine transform; None for too few samples."""
         return noise_spectrum(self.residuals, np.hstack([self.shared, self.own, *self.causes.values()]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """One recording, whitened by the spectrum of the sensor's noise."""
+
+    recorded: _Recorded
+    spectrum: Array
+    """n: the variance of the noise in each coefficient of its cosine transform."""
+
+    @property
+    def recording(self) -> Recording:
+        """The recording itself."""
+        return self.recorded.simulation.recording
+
+    @property
+    def time(self) -> Array:
+        """The times of its n samples, s."""
+        return self.recorded.simulation.time
 
     @cached_property
     def spread(self) -> Array:
@@ -199,8 +234,7 @@ class _Case:
 
         The unknown times of switches add to the noise of the sensor.
         """
-        assert self.spectrum is not None
-        S = cosines(self.response.by_switches())[:_COEFFICIENTS]
+        S = cosines(self.recorded.response.by_switches())[:_COEFFICIENTS]
         return np.asarray(np.linalg.cholesky(S @ S.T + np.diag(self.spectrum[:_COEFFICIENTS])))
 
     def white(self, values: Array) -> Array:
@@ -210,29 +244,28 @@ class _Case:
     @cached_property
     def white_shared(self) -> Array:
         """The whitened response to errors that all recordings share."""
-        return self.white(self.shared)
+        return self.white(self.recorded.shared)
 
     @cached_property
     def white_own(self) -> Array:
         """The whitened response to errors of this recording."""
-        return self.white(self.own)
+        return self.white(self.recorded.own)
 
     @cached_property
     def white_residuals(self) -> Array:
         """The whitened residuals."""
-        return self.white(self.residuals)
+        return self.white(self.recorded.residuals)
 
     @cached_property
     def white_causes(self) -> dict[str, Array]:
         """The whitened response to each cause."""
-        return {name: self.white(response) for name, response in self.causes.items()}
+        return {name: self.white(response) for name, response in self.recorded.causes.items()}
 
     def visible_from(self, misfit: Array) -> float | None:
         """Return the time from which a whitened misfit exceeds the sensor's noise, s; None where it never does."""
-        assert self.spectrum is not None
-        values = idct(self.spread @ misfit, n=len(self.simulation.time), norm="ortho")
+        values = idct(self.spread @ misfit, n=len(self.time), norm="ortho")
         visible = np.flatnonzero(np.abs(values) > np.sqrt(np.mean(self.spectrum)))
-        return float(self.simulation.time[visible[0]]) if visible.size else None
+        return float(self.time[visible[0]]) if visible.size else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,14 +298,14 @@ def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
     free = basis(scaled(np.hstack([shared, block_diag(*(case.white_own for case in cases))])), 1e-6)
     residuals = np.concatenate([case.white_residuals for case in cases])
     residuals -= free @ (free.T @ residuals)
-    names = dict.fromkeys(name for case in cases for name in case.causes)
+    names = dict.fromkeys(name for case in cases for name in case.white_causes)
     if len(cases) == 1:
         del names["recording"]
-    if len({case.simulation.recording.is_position for case in cases}) == 1:
+    if len({case.recording.is_position for case in cases}) == 1:
         del names["scale"]
     found = {}
     for name in names:
-        size = max(case.causes[name].shape[1] for case in cases if name in case.causes)
+        size = max(case.white_causes[name].shape[1] for case in cases if name in case.white_causes)
         parts = [case.white_causes.get(name, np.zeros((len(case.spread), size))) for case in cases]
         columns = scaled(block_diag(*parts) if name in _BY_RECORDING else np.concatenate(parts))
         own = basis(columns - free @ (free.T @ columns), 1e-3)
