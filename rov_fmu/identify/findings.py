@@ -269,8 +269,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     "recordings against forces": (
         "{axes}: the recordings ask for another {curve} thrust than its forces: {joint:.3g} N and not {alone:.3g} N at "
-        "a command of {command:.0%}. A thruster may push less in motion than at a scale, or the scale or the battery "
-        "may differ. The vehicle has the curve that fits both best"
+        "a command of {command:.0%}. A thruster may push less in motion than when it is held, or the scale or the "
+        "battery may differ. The vehicle has the curve that fits both best"
     ),
     # Effects
     "switches between rows": (

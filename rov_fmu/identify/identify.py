@@ -339,7 +339,7 @@ def _unusable(
 
 def _reason(error: NoFitError | MotionError) -> str:
     """Return why there is no fit, and what to check."""
-    return error.reason if isinstance(error, NoFitError) else f"{error}. Check units and signs"
+    return error.reason if isinstance(error, NoFitError) else f"{error}. Check the units and signs"
 
 
 def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:

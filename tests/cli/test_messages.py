@@ -125,7 +125,7 @@ TYPED: dict[str, tuple[list[str], str]] = {
     ),
     "points without a velocity": (
         [*_HEAVE, "--points", "taus.csv"],
-        "taus.csv: no row has a velocity, which alpha is tuned by: there is no V_ss",
+        "taus.csv: no row has a velocity, and alpha is tuned to velocities",
     ),
     "a vehicle for the points": ([*_HEAVE, "--points", "mine.toml"], "mine.toml, line 1 = '# VideoRay Pro 4 as "),
     "a recording for a vehicle": (["fly", "log.csv"], "log.csv: must be a vehicle file (TOML), and not a recording"),
@@ -227,7 +227,7 @@ def test_without_a_browser_the_page_is_named(monkeypatch: pytest.MonkeyPatch, ca
     assert opened == [page.as_uri()]
     assert page.is_file()
     shutil.rmtree(page.parent)
-    assert err.startswith("rov-fmu: no browser could be opened: open this file, ")
+    assert err.startswith("rov-fmu: no browser could be opened. Open this file in a browser, ")
     assert err.count("\n") == 1
     assert "-o PAGE.html" in err
 
@@ -323,7 +323,7 @@ TABLES: dict[str, tuple[str, str, str]] = {
     "a log without a command": (
         "log_heave.csv",
         "time [s],depth [m]\n" + _ROWS,
-        "line 1: no column of commands: u_l, u_r, u_t or command, each in [%], [1] or [us]",
+        "line 1: there is no column of commands. Possible columns: u_l, u_r, u_t or command, each in [%], [1] or [us]",
     ),
     "a command with its unit in other brackets": (
         "log_heave.csv",
@@ -441,7 +441,7 @@ def test_wrong_inputs_of_a_plan_are_one_line(here: Path, videoray_fmu: Path, cap
         (["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.05"], ["alpha_u = 0.102"]),
         (
             ["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "500"],
-            ["beta_u = 0.00114 is not within the usual 0.05 ... 1.2: the vehicle would move as if its inertia were"],
+            ["beta_u = 0.00114 is not within the usual 0.05 ... 1.2. The vehicle would move as if its inertia were"],
         ),
         (["videoray", "--axis", "heave", "--command", "0.3", "--v-ss", "2", "--tau", "9000"], ["alpha_w", "beta_w"]),
         (["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "0.6"], []),

@@ -401,5 +401,5 @@ def test_a_tolerance_is_finite_and_above_zero(tolerance: str, foreign: Path, cap
 
 def test_a_vehicle_is_no_fmu(capsys: Capsys) -> None:
     assert main(["prove", "videoray"]) == 2
-    expected = "must be an FMU; `rov-fmu build videoray` makes one of the vehicle with this name"
+    expected = "must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name"
     assert capsys.readouterr().err == f"rov-fmu: videoray: {expected}\n"

@@ -136,7 +136,7 @@ def test_without_a_browser_a_plot_has_another_way(here: Path, monkeypatch: pytes
     monkeypatch.setattr(webbrowser, "open", lambda _: False)
     monkeypatch.setattr("tempfile.tempdir", str(here))
     assert main(["simulate", str(BARE), "--plot"]) == 0
-    assert capsys.readouterr().err.endswith("; --plot FILE.svg writes it where you want it\n")
+    assert capsys.readouterr().err.endswith(" Use --plot FILE.svg to write it to another place\n")
 
 
 def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:
@@ -153,7 +153,7 @@ WRONG = {
     "no value": (["--set", "u_l"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
     "a word": (["--set", "u_l=a"], "--set u_l=a: 'a' must be a finite number"),
     "NaN": (["--set", "u_l=nan"], "--set u_l=nan: 'nan' must be a finite number"),
-    "twice": (["--set", "u_l=1", "--set", "u_l=2"], "--set u_l=2: u_l is set before"),
+    "twice": (["--set", "u_l=1", "--set", "u_l=2"], "--set u_l=2: u_l is set twice"),
     "out of bounds": (["--set", "a_d_u=-1"], "a_d_u = -1.0: must be within 0 ... 1000000 N.s2/m2"),
     "no table": (["--input", "none.csv"], "none.csv: there is no such file\n"),
     "a column of no input": (["--input", "wrong.csv"], "wrong.csv: column 'ul': there is no such input, only u_l"),
@@ -176,7 +176,7 @@ WRONG = {
     "a cell that is not finite": (["--input", "nan.csv"], "nan.csv: line 3, column 'u_l' = 'nan': must be a finite nu"),
     "another table": (["-o", "result.txt"], "--output result.txt: the name must end with .csv or .parquet"),
     "another picture": (["--plot", "a.gif"], "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
-    "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; without a file, --plot comes after VEH"),
+    "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; put --plot without a file after VEH"),
     "a value after a blank": (["--set", "u_l", "0.3"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
     "a unit": (
         ["--input", "unit.csv"],

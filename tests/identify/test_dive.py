@@ -111,7 +111,10 @@ def test_a_fit_at_a_limit_is_refused_with_one_line() -> None:
     check_limits(TRUTH, model.data, NAMES, extras, x)
     _, high = limits(TRUTH, model.data, NAMES, extras, len(x))
     x[len(NAMES)] = high[len(NAMES)]
-    with pytest.raises(NoFitError, match=r"^dive\.tlog: no surge of a vehicle .* a load of [0-9.]+ N would do it best"):
+    with pytest.raises(
+        NoFitError,
+        match=r"^dive\.tlog: no vehicle with this thrust .* in surge\. The best fit .*: a load of [0-9.]+ N\.",
+    ):
         check_limits(TRUTH, model.data, NAMES, extras, x)
 
 
@@ -130,7 +133,7 @@ def test_a_fitted_thrust_that_is_impossible_is_a_misfit_of_the_recordings(
     model, _ = simulator(dived(20.0).recorded())
     check_thrust(TRUTH, model.data)
     with pytest.raises(
-        NoFitError, match=rf"^dive\.tlog: no t200 thrust .* in surge, sway, yaw: {words} would do it best"
+        NoFitError, match=rf"^dive\.tlog: no possible t200 thrust .* in surge, sway, yaw\. The best fit has {words}\."
     ):
         check_thrust(TRUTH.replaced(changed), model.data)
 

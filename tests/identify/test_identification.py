@@ -612,7 +612,7 @@ def test_forces_at_one_command_are_no_curve(tmp_path: Path) -> None:
     write_csv(tmp_path / "steady_heave.csv", "command [1],velocity [m/s]", [(0.2, 0.1), (0.5, 0.3), (0.8, 0.4)])
     write_csv(tmp_path / "thrust_top.csv", "command [1],force [N]", [(0.3, 0.6), (-0.3, -0.6), (0.0, 0.0)])
     write_rov(tmp_path)
-    with pytest.raises(DataFileError, match=r"thrust_top\*.csv: two commands at least must count"):
+    with pytest.raises(DataFileError, match=r"thrust_top\*.csv: at least two commands must count"):
         identify(load_tank_tests(tmp_path))
 
 
@@ -622,4 +622,4 @@ def test_saturation_is_the_likely_cause_from_a_fifth_of_the_time_on(full: float,
     recording = Recording("log.csv", HEAVE, "depth", np.arange(100.0), command, np.zeros(100))
     still = replace(recording, command=np.full(100, 0.998))
     cause = module._likely_cause([still, recording], k)
-    assert cause.startswith(f"Thrusters are at full command for {full:.0%}") == at_full
+    assert cause.startswith(f"The thrusters are at full command for {full:.0%}") == at_full

@@ -51,7 +51,7 @@ def left_out(found: Identification) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("text", "kind", "words"),
     [
-        (STILL, "constant motion", "no recording of heave: the depth never changes"),
+        (STILL, "constant motion", "the recording of heave is left out: the depth never changes"),
         pytest.param(
             SLOW,
             "impossible velocity",
@@ -119,7 +119,7 @@ def failing(fit: Fit, fails: Callable[[Sequence[Recording]], bool], error: Excep
         ),
         pytest.param(
             MotionError("the motion cannot be computed"),
-            "the motion cannot be computed. Check units and signs",
+            "the motion cannot be computed. Check the units and signs",
             marks=pytest.mark.long,
         ),
     ],
@@ -133,7 +133,11 @@ def test_a_recording_that_no_vehicle_fits_is_left_out(
     monkeypatch.setattr(module, "fit_recordings", failing(fit_recordings, with_second, error))
     found = identify(load_tank_tests(folder(tmp_path)))
     assert files(found) == ["log_heave_0.csv"]
-    (line,) = (line for line in found.warnings if line.startswith("log_heave_1.csv: no recording of heave, because"))
+    (line,) = (
+        line
+        for line in found.warnings
+        if line.startswith("log_heave_1.csv: the recording of heave is left out, because")
+    )
     assert reason in line
     assert found.vehicle.rov["a_d_w"] == pytest.approx(VIDEORAY["a_d_w"] / VIDEORAY["alpha_w"], rel=0.1)
 
@@ -150,9 +154,9 @@ def test_recordings_that_no_vehicle_fits_have_each_their_own_reason(
     monkeypatch.setattr(module, "fit_recordings", fit_or_fail)
     second = (folder(tmp_path) / "log_heave_1.csv").read_text(encoding="utf-8")
     found = identify(load_tank_tests(folder(tmp_path, log_heave_2=f"{second}\n")))
-    told = [line for line in found.warnings if "no recording of heave" in line]
+    told = [line for line in found.warnings if "the recording of heave is left out" in line]
     assert [line.partition(". ")[0] for line in told] == [
-        f"log_heave_{n}.csv: no recording of heave, because {n} moves so" for n in (1, 2)
+        f"log_heave_{n}.csv: the recording of heave is left out, because {n} moves so" for n in (1, 2)
     ]
     assert files(found) == ["log_heave_0.csv"]
 
@@ -164,7 +168,7 @@ def test_where_nothing_fits_the_folder_is_refused(tmp_path: Path, monkeypatch: p
     with pytest.raises(DataFileError) as refusal:
         identify(load_tank_tests(path))
     files = "log_heave_0.csv, log_heave_1.csv"
-    assert str(refusal.value) == f"{path}: {files}: the motion cannot be computed. Check units and signs"
+    assert str(refusal.value) == f"{path}: {files}: the motion cannot be computed. Check the units and signs"
 
 
 def test_axes_that_fit_alone_only_are_fitted_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -183,7 +187,9 @@ def test_axes_that_fit_alone_only_are_fitted_apart(tmp_path: Path, monkeypatch: 
     assert line.startswith("surge and yaw: no vehicle fits the recordings of all these axes together")
 
 
-@pytest.mark.parametrize(("full", "cause"), [(0.1, "Check units and signs"), (0.5, "Thrusters are at full command")])
+@pytest.mark.parametrize(
+    ("full", "cause"), [(0.1, "Check the units and signs"), (0.5, "The thrusters are at full command")]
+)
 def test_the_likely_cause_is_told(full: float, cause: str) -> None:
     command = np.where(np.arange(100) < 100 * full, 1.0, 0.3)
     recording = Recording("log.csv", HEAVE, "depth", np.arange(100.0), command, np.zeros(100))

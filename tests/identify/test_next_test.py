@@ -274,7 +274,7 @@ def test_the_printout_says_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixt
     none = "To measure next: no step within the limits would narrow an interval by a tenth"
     for shown, expected in (
         (useful, "To measure next: heave: a dive (narrows a_d_w by 75%)."),
-        (replace(useful, interval=None, width=inf), "To measure next: heave: a dive (tells a_d_w)."),
+        (replace(useful, interval=None, width=inf), "To measure next: heave: a dive (determines a_d_w)."),
         (known, "Enough is known of heave."),
         (useless, f"{none}; the widest is that of {test.coefficient}. In heave: {REPEATED}."),
     ):

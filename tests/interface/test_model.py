@@ -170,7 +170,7 @@ def test_a_vehicle_that_rolls_starts_at_its_angles_or_at_its_quaternion(six: Veh
 @pytest.mark.parametrize(
     ("start", "expected"),
     [
-        ({"eta": 0.5, "theta_0": 0.1, "phi_0": 0.2}, r"start\['phi_0'\]: the attitude is given as a quaternion, too"),
+        ({"eta": 0.5, "theta_0": 0.1, "phi_0": 0.2}, r"start\['phi_0'\]: the attitude is also given as a quaternion"),
         ({"eta": 0.0}, "start: the quaternion eta, epsilon_1, epsilon_2, epsilon_3 is 0"),
         ({"psi": 1.0}, r"start\['psi'\]: the vehicle has no such state, .*; did you mean psi_0"),
     ],
@@ -278,7 +278,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     ),
     "unequal numbers": (
         lambda v: v.simulate_many(TIMES, {"u_l": [[1], [0.5]]}, coefficients={"a_d_u": [1, 2, 3]}),
-        "a_d_u: has values for 3 vehicles, and u_l for 2",
+        "a_d_u: has values for 3 vehicles, but u_l has values for 2",
     ),
     "none at all": (lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": []}), "a_d_u: has values for 0 vehicles"),
     "one out of bounds": (
@@ -292,7 +292,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     ),
     "too large": (
         lambda v: v.simulate_many(np.arange(1e6), coefficients={"a_d_u": np.full(1_000_000, 1.0)}),
-        "time, record: the result takes 8.8e.04 GB, more than there is",
+        "time, record: the result needs 8.8e.04 GB, which is more than the available memory",
     ),
 }
 

@@ -212,7 +212,7 @@ def test_measured_and_fitted_values_stand_side_by_side(of_recordings: Identifica
         assert row[1:4] == with_interval(measured[name], measured.interval(name))
         assert row[5] == with_interval(of_recordings.vehicle.rov[name], of_recordings.vehicle.intervals[name])[0]
         assert row[-1] in ("agree", "they differ")
-    assert "a thruster pushes less in motion than held at a scale" in text_of(pages[id(of_recordings)])
+    assert "A thruster may also push less in motion than when it is held" in text_of(pages[id(of_recordings)])
 
 
 def test_the_opening_screen_shows_an_unseen_recording_with_its_band(
@@ -253,7 +253,7 @@ def test_every_kind_of_finding_is_a_fact_a_doubt_or_a_warning() -> None:
     assert {*_SENTENCES} >= FACTS | DOUBTS
     assert not FACTS & DOUBTS
     groups = by_heading([Finding("constant motion", "surge", file="A b.csv", names={"quantity": "depth"})])
-    assert groups["Facts"] == ("A b.csv: no recording of surge: the depth never changes",)
+    assert groups["Facts"] == ("A b.csv: the recording of surge is left out: the depth never changes",)
     assert sentence("a b.csv: 3 pulses of 0 or 65535 us, -55%") == "a b.csv: 3 pulses of 0 or 65535 µs, −55 %"
 
 
@@ -311,7 +311,10 @@ def test_other_effects_are_listed_kept_or_not(of_recordings: Identification) -> 
     assert ["Delay from the commands to the motion", file, "0.001000", "", "", "s", "left at 0"] in rows(page)
     assert "The fitted delay of 0.21 s is shaded." in text_of(page)
     folded = [fold.text_content() for fold in html.fromstring(page).iter("details")]
-    assert any("Sought in single recordings too, and left at zero: 1" in fold and file in fold for fold in folded)
+    assert any(
+        "Effects that were looked for in single recordings, and left at zero: 1" in fold and file in fold
+        for fold in folded
+    )
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -355,7 +358,10 @@ def test_the_printout_is_short_and_says_the_same(
     assert first.endswith(" halves of log_heave_a&b $1.csv")
     assert "What else acts: delay from the commands to the motion (heave 0.210 s)." in words
     assert any(line.startswith("To measure next: heave: a dive (narrows a_d_w by 75%).") for line in words)
-    order = [out.index(part) for part in ("Prediction of", "Identified coefficients", "What else acts", "To measure")]
+    order = [
+        out.index(part)
+        for part in ("RMS errors of predictions", "Identified coefficients", "What else acts", "To measure")
+    ]
     assert order == sorted(order)
     assert len(words) < 24
 

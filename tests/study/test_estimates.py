@@ -121,7 +121,10 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
     narrow = has | {"b_d_u": replace(has["b_d_u"], minimum=6.0, maximum=7.0)}
     all_set = {"a_d_u": 9.0, "b_d_u": 5.0}
     for words, (_, estimates) in (
-        ("a grid needs values or a range, and what is estimated has none", _estimates(made, sampler="grid", runs=None)),
+        (
+            "a grid needs values or a range, but estimated coefficients have distributions",
+            _estimates(made, sampler="grid", runs=None),
+        ),
         ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
         ("the b_d_u of this vehicle must be within 6 ... 7 N.s/m in the FMU", _estimates(made, narrow)),
         ("nothing varies, for [set] gives all that has an interval there", _estimates(made, set=all_set)),

@@ -216,7 +216,10 @@ down = "a - u / 1000"
         pages[runs] = html.parse(results / "study.html")
     few, many = (pages[runs].xpath("string(//body)") for runs in (12, 800))
     cells = "//h2[@id='sensitivity']/following::table[1]//td[@class='number same' or @class='number first same']"
-    for text in ("An index whose interval is as wide as itself (grey) tells nothing", "So few blocks tell nothing"):
+    for text in (
+        "An index whose interval is as wide as itself (grey) tells nothing",
+        "With so few blocks, the indices",
+    ):
         assert text in few
         assert text not in many
     assert pages[12].xpath(cells)
@@ -235,7 +238,7 @@ def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_do
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
     printed = capsys.readouterr()
     assert f"600 runs, {failed} failed, {600 - failed} incomplete" in printed.out.replace("\n", " ")
-    assert printed.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
+    assert printed.err == f"rov-fmu: {done}: no run is complete with all its figures\n"
 
 
 def test_another_page_of_this_name_is_not_overwritten(
@@ -244,7 +247,7 @@ def test_another_page_of_this_name_is_not_overwritten(
     own = tmp_path / "study.html"
     own.write_text("<p>My studies</p>")
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    reason = "is no page of this tool and would be overwritten: choose another folder"
+    reason = "is not a page of this tool, and would be overwritten. Choose another folder"
     assert capsys.readouterr().err == f"rov-fmu: {own}: {reason}\n"
     assert [*tmp_path.iterdir()] == [own]
     assert own.read_text() == "<p>My studies</p>"

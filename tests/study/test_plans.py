@@ -26,8 +26,8 @@ WHOLE = {
     "": "stop_time: this key is missing",
     "fmu = 1": "fmu = 1: must be text in quotes",
     'stop = 3.0\nfmu = "videoray.fmu"': "stop: there is no such key; did you mean step?",
-    PLAN: "must have [keep] or [figures], or nothing remains of a run",
-    HEAD + 'sampler = "grid"\n' + TAIL: "runs = 4: a grid has as many as it has points; leave this out",
+    PLAN: "must have [keep] or [figures]. Otherwise nothing of a run is stored",
+    HEAD + 'sampler = "grid"\n' + TAIL: "runs = 4: a grid has one run for each point: leave this key out",
     HEAD + TAIL: 'vary: nothing varies: write [vary], or sampler = "grid" for the one run',
     GRID + VARY + TAIL: "vary.alpha_u = {'uniform': (1.0, 1.2)}: a grid needs values or a range",
     f"{GRID}[vary]\n{COUNTED}{TAIL}": "vary: a grid must have at most 100000000 points, and not 1e+09",
@@ -51,7 +51,7 @@ VARIED = {
     "alpha_u.values = [1.0, 1e9]": "vary.alpha_u = 1000000000.0: must be within 0 ... 1000",
     "m_rov.normal = { mean = -1.0, sd = 1.0 }": "vary.m_rov = -1.0: must be within 0.001 ... 1000000 kg",
     "alpha_u = { uniform = [1.0, 2.0], values = [1.0] }": "vary.alpha_u: must have one of normal, lognormal, uniform,",
-    "F_l.uniform = [1.0, 2.0]": "vary.F_l: the FMU computes it, and it cannot be set",
+    "F_l.uniform = [1.0, 2.0]": "vary.F_l: it cannot be set, because the FMU computes it",
 }
 """Entries of [vary]."""
 TABLES = {
@@ -71,7 +71,7 @@ TABLES = {
         "inputs.u_l = [0.45, 0.0]: a jump, as from 0.5 here, must be at a communication point"
     ),
     '[keep]\noutputs = ["q"]': "keep.outputs: the FMU has no variable 'q' that is a number",
-    '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each once",
+    '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each variable once",
     '[keep]\noutputs = ["u"]\nevery = 2.0': "keep.every = 2.0: must not be longer than a run",
     '[keep]\noutputs = ["u"]\nevery = 0.25': "keep.every = 0.25: must be a multiple of step = 0.1",
     '[keep]\noutputs = ["u"]\nat = [0.5, 1.1]': "keep.at = [0.5, 1.1]: must be times from the start to the end",

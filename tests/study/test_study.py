@@ -238,7 +238,7 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     others = {
         "holds runs of another plan (figures changed)": {"fmu": foreign(), "more": 'other = "y[0]"'},
         "holds runs of another FMU": {"fmu": foreign(1)},
-        "holds runs up to number 39, and the plan has 12 alone": {"fmu": foreign(), "runs": 12},
+        "has runs up to number 39, but the plan has only 12 runs": {"fmu": foreign(), "runs": 12},
     }
     for reason, changed in others.items():
         assert main(["study", str(_plan(tmp_path, **changed)), "-o", str(results)]) == 2  # type: ignore[arg-type]
@@ -337,7 +337,7 @@ def _workers(pid: int) -> list[psutil.Process]:
 
 
 GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
-NO_FILE = "workers cannot be started of <stdin>, which is no file; "
+NO_FILE = "workers cannot be started, because <stdin> is not a file; "
 
 
 def test_workers_of_a_script_that_is_no_file_are_not_started(

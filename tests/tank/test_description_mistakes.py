@@ -47,7 +47,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         'base = "bluerov2"\n' + VECTORED,
         {},
-        " | ".join(f"/rov.toml: {name}: must not stand beside base" for name in ("body", "curves", "thruster")),
+        " | ".join(f"/rov.toml: {name}: is not allowed together with base" for name in ("body", "curves", "thruster")),
     ),
     (
         f"{HEAD}[curves.t200]\n",

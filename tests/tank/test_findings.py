@@ -16,7 +16,7 @@ def test_findings_about_files_share_the_files_and_the_range_of_numbers() -> None
     found = [outliers("heave", A, 0.12), Finding("not coupled"), outliers("heave", B, 0.09)]
     assert sentences(found) == (
         f"heave: 9% ... 12% of the samples of {A} and {B} are outliers and count less",
-        "surge, sway and yaw are not coupled, which needs all three",
+        "surge, sway and yaw are not coupled, because coupling needs all three axes",
     )
 
 
@@ -56,16 +56,19 @@ def test_counts_have_a_singular_and_a_plural() -> None:
         f"{A} and {B}: 1 ... 3 rows out of order sorted",
     )
     lost = Finding("unknown velocity", file=A, numbers={"count": 2})
-    assert sentences([lost]) == (f"{A}: 2 velocities left out, which the filter says it does not know",)
+    assert sentences([lost]) == (f"{A}: 2 velocities left out, because the filter marks them as unknown",)
 
 
 def test_effects_name_their_interval_and_what_they_act_on() -> None:
     load = Finding("load", "heave", names={"unit": "N", "of": "heave"}, numbers={"value": 2.0, "low": 1.0, "high": 3.0})
     assert sentences([load]) == (
-        "heave: a constant load of 2.0 N (1.0 to 3.0) acts in heave (net weight, tether), and is in the model",
+        "heave: a constant load of 2.0 N (1.0 to 3.0) acts in heave (net weight or tether). The model contains this "
+        "load",
     )
     current = Finding("current", "surge", file=C, names={"unit": "m/s"}, numbers={"value": 0.1})
-    assert sentences([current]) == (f"surge: the water moved at 0.1 m/s in {C}, which is taken out",)
+    assert sentences([current]) == (
+        f"surge: in {C}, the water moved at 0.1 m/s along the axis. The fit removes this current",
+    )
 
 
 def test_what_a_recording_adds_is_not_taken_for_the_whole() -> None:

@@ -43,8 +43,8 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None, tmp_path: Path
     log = read_log(path, PAPER)
     start = "29.9" if value is None else "30"
     assert sentences(log.findings) == (
-        f"pool.csv: depth and heading do not change from {start} s on (to the end at 59.9 s): was the log or the "
-        "sensor cut off? What they say from then on is left out",
+        f"pool.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
+        "log or the sensor stop? Their later values are left out",
     )
     assert {heading(finding) for finding in log.findings} == {"Warnings"}
     assert [recording.axis.name for recording in log.recordings] == ["heave", "yaw"]

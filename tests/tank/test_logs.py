@@ -76,7 +76,9 @@ def test_two_logs_in_one_file_are_refused(tmp_path: Path) -> None:
     rows = [f"{n % 30},30,{n}" for n in range(60)]
     with pytest.raises(DataFileError, match=r"line 32, column 'time \[s\]' = 0: the clock goes back by 29 s"):
         read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    with pytest.raises(DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back, and stays back"):
+    with pytest.raises(
+        DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back and does not return"
+    ):
         read(tmp_path, "time [s],command [%],depth [cm]", [f"{59 - n},30,{n}" for n in range(60)], HEAVE)
 
 
@@ -117,7 +119,7 @@ def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
         ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
         ([f"{n},30,-" for n in range(N)], "0 samples of depth"),
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
-        ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command beyond 1 %: fractions"),
+        ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
     ],
 )
 def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, tmp_path: Path) -> None:
@@ -231,7 +233,11 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
 # ---- What is refused -------------------------------------------------------------------------------------------------
 
 REFUSED = {
-    "no commands": ("time [s],depth [m]", "0,1", "line 1: no column of commands: u_l, u_r, u_t, each in"),
+    "no commands": (
+        "time [s],depth [m]",
+        "0,1",
+        "line 1: there is no column of commands. Possible columns: u_l, u_r, u_t, each in",
+    ),
     "a pulse under another name": (
         "time [s],PWM (us),depth [m]",
         "0,1500,1",
@@ -276,8 +282,8 @@ def test_nothing_of_use_is_a_line_for_each_axis(tmp_path: Path) -> None:
         read(tmp_path, "time [s],u_t [1],depth [m],heading [deg]", rows)
     path = tmp_path / "log.csv"
     assert str(error.value).splitlines() == [
-        f"{path}: no recording of heave: what the thrusters do along it never changes",
-        f"{path}: no recording of yaw: the heading never changes",
+        f"{path}: the recording of heave is left out: the thrust along it never changes",
+        f"{path}: the recording of yaw is left out: the heading never changes",
     ]
 
 

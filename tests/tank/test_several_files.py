@@ -95,10 +95,11 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
     late = 2.0 if declared else 0.0
     assert yaw.values[there] == pytest.approx(2.0 + 0.3 * (yaw.time[there] - late), abs=1e-5)
     (line,) = (line for line in sentences(tests.findings, SENTENCES) if "clock" in line)
-    aligned = "" if declared else ", and they share no time: its first sample is taken as that of the first command,"
     assert line == (
-        f"heading.csv: its clock is not that of the commands{aligned or ':'}"
-        f"{'' if declared else ' and'} how far it is off is to be fitted, within 5 s"
+        "heading.csv: it has another clock than the commands. The fit finds the difference, up to 5 s"
+        if declared
+        else "heading.csv: it has another clock than the commands, and their times do not overlap. Its first sample is "
+        "moved to the first command. The fit finds the remaining difference, up to 5 s"
     )
 
 
@@ -108,7 +109,7 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
         ('files = ["commands.csv", "dept.csv"]', "rov.toml: dives.may.files = 'dept.csv': there is no such file"),
         (
             'files = ["heading.csv", "depth.csv"]',
-            "heading.csv: one file of its dive must have the commands, and not no",
+            "heading.csv: exactly one file of the dive must have the commands. The files with commands are: none",
         ),
         (f'{FILES}\nother_clock = ["depht.csv"]', "rov.toml: dives.may.other_clock = 'depht.csv': must be one of"),
         ('files = ["commands.csv"]', "rov.toml: dives.may.files = ['commands.csv']: must be two or more files"),

@@ -231,9 +231,9 @@ BAD: list[tuple[str, str, str]] = [
     ("steady_surge.csv", STEADY + "20,fast\n", "line 2 | 'velocity [m/s]' = 'fast' | number"),
     ("steady_surge.csv", STEADY + "20,0.3\n-20,0.3\n", "line 3 | [m/s]' = 0.3 | sign"),
     ("steady_surge.csv", STEADY + "20,0\n", "line 2 | 'velocity [m/s]' = 0 | sign"),
-    ("steady_surge.csv", STEADY + "0,0.1\n", "line 2 | 'command [%]' = 0 | zero"),
+    ("steady_surge.csv", STEADY + "0,0.1\n", "line 2 | 'command [%]' = 0 | must not be 0, because nothing moves then"),
     ("steady_surge.csv", STEADY + "120,0.3\n", "line 2 | [%]' = '120' | at most 100"),
-    ("steady_surge.csv", STEADY + "0.2,0.3\n", "'command [%]' | fractions under [%]"),
+    ("steady_surge.csv", STEADY + "0.2,0.3\n", "'command [%]' | Are they fractions? Then write [1]"),
     ("steady_surge.csv", "command [1],velocity [m/s]\n20,0.3\n", "line 2 | 'command [1]' = '20' | at most 1"),
     ("steady_surge.csv", "command [%],velocity\n20,0.3\n", "line 1 | column 2 = 'velocity' | [m/s]"),
     ("steady_surge.csv", "command [%],velocity [m/s],command [1]\n", "line 1 | column 3 | [1]' | twice"),
@@ -242,7 +242,7 @@ BAD: list[tuple[str, str, str]] = [
     ("steady_surge.csv", STEADY + '20,"0.3\n', "line 2"),
     ("steady_yaw.csv", STEADY + "20,1\n", "line 1 | column 2 | 'velocity [rad/s]' or 'velocity [deg/s]'"),
     ("time_constant_yaw.csv", TAU + "20,-3\n", "line 2 | 'time constant [s]' = -3 | above 0"),
-    ("time_constant_yaw.csv", TAU + "0,3\n", "line 2 | 'command [%]' = 0 | zero"),
+    ("time_constant_yaw.csv", TAU + "0,3\n", "line 2 | 'command [%]' = 0 | must not be 0, because nothing moves then"),
     ("thrust_rear.csv", "command [%],force [N]\n50,9\n-50,6\n", "line 3 | 'force [N]' = 6 | sign of the command"),
     ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0,30,0\n", "line 4 | 'time [s]' = 0: | goes back"),
     ("log_heave.csv", LOG + "0,30,0\n0.1,30,\n0.2,30,\n", "1 samples of depth | 20"),
@@ -292,7 +292,7 @@ def test_every_mistake_of_a_rov_file_is_told(folder: Path) -> None:
 
 def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     refused(tmp_path / "nowhere", ("no such folder",), capsys)
-    refused(tmp_path, ("rov.toml", "No such file"), capsys)
+    refused(tmp_path, ("rov.toml", "there is no such file"), capsys)
     shutil.copy(TESTS / "rov.toml", tmp_path)
     refused(tmp_path, ("no tests",), capsys)
 
@@ -300,7 +300,7 @@ def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize(
     ("rows", "reason"),
     [
-        ([f"{n / 10},0,{n / 10}" for n in range(50)], "command never changes"),
+        ([f"{n / 10},0,{n / 10}" for n in range(50)], "the command is always 0"),
         ([f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)], "depth never changes"),
         ([f"{n / 10},{30 * (n > 9)},{-0.02 * max(n - 9, 0):.2f}" for n in range(100)], "against the command"),
     ],

@@ -16,8 +16,8 @@ class Advance(Effect):
     kind = "advance"
     words = "loss of thrust by the speed of advance"
     sentence = (
-        "the thrust of {of} decreases by {value} {unit}{interval} with the speed of advance at full command, and "
-        "that is in the model"
+        "the thrust of {of} decreases by {value} {unit}{interval} with the speed of advance at full command. The "
+        "model contains this"
     )
     order = 5
 

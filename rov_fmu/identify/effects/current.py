@@ -51,7 +51,7 @@ class CurrentNorth(Current):
 
     kind = "current north"
     words = "current to the north"
-    sentence = "the water moved north at {value} {unit}{interval} in {of}, which is taken out"
+    sentence = "in {of}, the water moved north at {value} {unit}{interval}. The fit removes this current"
 
     @classmethod
     def candidates(cls, setting: Setting) -> Iterator[Effect]:
@@ -78,7 +78,7 @@ class CurrentEast(CurrentNorth):
 
     kind = "current east"
     words = "current to the east"
-    sentence = "the water moved east at {value} {unit}{interval} in {of}, which is taken out"
+    sentence = "in {of}, the water moved east at {value} {unit}{interval}. The fit removes this current"
 
     @property
     def input(self) -> str:

@@ -12,7 +12,7 @@ class DeadBand(Effect):
 
     kind = "dead band"
     words = "dead band of the command"
-    sentence = "thrust of {of} begins at a command of {value}{interval}, and that is in the model"
+    sentence = "the thrust of {of} begins at a command of {value}{interval}. The model contains this dead band"
     begin = 0.02
     limits = -0.2, 0.3  # a value below 0 means no dead band; a search that ends at a bound is slow
     deviation = 0.1

@@ -13,12 +13,11 @@ class Delay(Effect):
     words = "delay from the commands to the motion"
     sentence = (
         "the motion of {of} follows the commands {value} s late{interval}. The vehicle file has no "
-        "delay; `T_d` in [commands] of the vehicle file adds a delay to the FMU, which is the same for "
-        "all axes"
+        "delay. `T_d` in [commands] of the vehicle file adds one to the FMU, which is the same for all axes"
     )
     sentence_of_file = (
-        "the motion in {of} follows the commands {value} s later{interval} than in the other recordings; this is not "
-        "in the model"
+        "the motion in {of} follows the commands {value} s later{interval} than in the other recordings. The model "
+        "does not contain this difference"
     )
     limits = -5.0, 5.0
     order = 8

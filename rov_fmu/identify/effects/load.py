@@ -18,7 +18,9 @@ class Load(Effect):
 
     kind = "load"
     words = "constant load"
-    sentence = "a constant load of {value} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
+    sentence = (
+        "a constant load of {value} {unit}{interval} acts in {of} (net weight or tether). The model contains this load"
+    )
     sentence_of_file = (
         "in {of}, the constant load differs by {value} {unit}{interval} from the other recordings "
         "(ballast, tether or current). The model does not contain this difference"

@@ -27,8 +27,8 @@ class ReverseThrust(_Ratio):
     """The ratio of the thrust of a curve in reverse to its thrust ahead."""
 
     kind = "reverse thrust"
-    words = "thrust in reverse, by that forward"
-    sentence = "{of} thrust in reverse is {value} times the thrust ahead{interval}. The model contains this"
+    words = "ratio of the thrust in reverse to the thrust ahead"
+    sentence = "the thrust of {of} in reverse is {value} times the thrust ahead{interval}. The model contains this"
     order = 3
 
     @classmethod
@@ -47,8 +47,8 @@ class ReverseDrag(_Ratio):
     """The drag of an axis in reverse."""
 
     kind = "reverse drag"
-    words = "ratio of the thrust in reverse to the thrust ahead"
-    sentence = "drag of {of} in reverse is {value} times that ahead{interval}, and is in the model"
+    words = "ratio of the drag in reverse to the drag ahead"
+    sentence = "the drag of {of} in reverse is {value} times the drag ahead{interval}. The model contains this"
     order = 1
 
     @classmethod

@@ -217,6 +217,6 @@ def test_the_weight_of_a_tilted_vehicle_acts_along_its_axes() -> None:
     assert turned["der(theta)"] == pytest.approx(np.zeros((1, 3)), abs=1e-12)
     assert "psi" not in turned
     of_two = {name: np.repeat(values, 2, axis=0) for name, values in motion.items()}
-    assert {name: v.shape for name, v in attitude.turned(np.array([1.0, 2.0, 3.0]), of_two, 0.1).items()} == {
-        name: (2, 3) for name in ("phi", "theta", "der(phi)", "der(theta)", "z", "der(z)")
-    }
+    assert {
+        name: v.shape for name, v in attitude.turned(np.array([1.0, 2.0, 3.0]), of_two, 0.1).items()
+    } == dict.fromkeys(("phi", "theta", "der(phi)", "der(theta)", "z", "der(z)"), (2, 3))

@@ -12,7 +12,7 @@ from rov_fmu.tank.findings import Finding
 
 _NUMBER = r"(-?[\d.]+(?:[eE][+-]?\d+)?)"
 _INTERVAL = re.compile(
-    rf"{_NUMBER}(?: \.\.\. {_NUMBER})? ?[^\s(]*(?: late| times that ahead)? \({_NUMBER} to {_NUMBER}\)"
+    rf"{_NUMBER}(?: \.\.\. {_NUMBER})? ?[^\s(]*(?: late| times the (?:thrust|drag) ahead)? \({_NUMBER} to {_NUMBER}\)"
 )
 _NAMES = {"beta": "beta_u", "mass": "m_rov", "curve": "rear", "unit": "N", "of": "surge", "a_d": "a_d_u"}
 _VALUES = st.floats(1e-3, 1e3)

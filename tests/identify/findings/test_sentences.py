@@ -25,14 +25,14 @@ def wrong_scale(factor: float, unit: str, others: str = "") -> str:
     [
         (1000.0, "m", "1000 times what the thrust, the size and the other files predict: is it in mm?"),
         (100.0, "m/s", "is it in cm?"),
-        (10.0, "m", "is it in dm, or the scale of the sensor wrong?"),
+        (10.0, "m", "is it in dm, or is the scale of the sensor wrong?"),
         (0.1, "m", "0.1 times what the thrust, the size and the other files predict: is the unit or the scale of the"),
-        (0.01, "m", "are metres taken for cm?"),
-        (0.001, "m", "are metres taken for mm?"),
+        (0.01, "m", "are metres labelled as cm?"),
+        (0.001, "m", "are metres labelled as mm?"),
         (pi / 180.0, "rad", "is about 0.01745 times"),
-        (pi / 180.0, "rad", "are radians taken for degrees?"),
-        (180.0 / pi, "rad/s", "are degrees taken for radians?"),
-        (10.0, "rad", "is it in tenths of a degree, or the scale of the sensor wrong?"),
+        (pi / 180.0, "rad", "are radians labelled as degrees?"),
+        (180.0 / pi, "rad/s", "are degrees labelled as radians?"),
+        (10.0, "rad", "is it in tenths of a degree, or is the scale of the sensor wrong?"),
         (100.0, "rad", "is it in hundredths of a degree?"),
         (0.1, "rad", "is the unit or the scale of the sensor wrong?"),
     ],
@@ -111,9 +111,7 @@ def test_a_disagreement_has_one_factor_or_a_range(high: float, factors: str) -> 
     assert factors in sentence(Finding("disagreement", "heave", names={"coefficients": "a_d_w"}, numbers=numbers))
 
 
-@pytest.mark.parametrize(
-    ("start", "when"), [(0.4, "log.csv from the start on:"), (12.4, "log.csv after the first 12 s:")]
-)
+@pytest.mark.parametrize(("start", "when"), [(0.4, "log.csv from the start:"), (12.4, "log.csv after the first 12 s:")])
 def test_what_is_unexplained_begins_at_a_time(start: float, when: str) -> None:
     names, numbers = {"cause": "drift"}, {"start": start}
     assert when in sentence(Finding("unexplained", "heave", file="log.csv", names=names, numbers=numbers))
@@ -128,6 +126,6 @@ def test_an_effect_has_its_interval_and_that_of_a_file_its_own_words() -> None:
     assert "a constant load of 1.235 N acts in heave (net weight" in sentence(load(1.23456))
     assert "a constant load of 1.23 N (1.10 to 1.40) acts in heave" in sentence(load(1.234, low=1.1, high=1.4))
     apart = sentence(load(1.234, "a.csv", low=1.1, high=1.4), load(2.5, "b.csv", low=2.1, high=2.9))
-    assert "in a.csv and b.csv a constant load acts that differs by 1.2 ... 2.5 N (1.1 to 2.9) from" in apart
+    assert "in a.csv and b.csv, the constant load differs by 1.2 ... 2.5 N (1.1 to 2.9) from" in apart
     current = Finding("current", "surge", file="a.csv", names={"unit": "m/s"}, numbers={"value": 0.1})
-    assert "the water moved at 0.1 m/s in a.csv" in sentence(current), "it has no other words for a file"
+    assert "in a.csv, the water moved at 0.1 m/s" in sentence(current), "it has no other words for a file"

@@ -54,11 +54,11 @@ def test_a_constant_command_and_any_possible_speed_can_be_used(speed: float) -> 
         (
             sinking(0.99e-5),
             "impossible velocity",
-            "depth tells of a velocity of 9.9e-06 m/s: must be 1e-05 at least and",
+            "depth gives a velocity of 9.9e-06 m/s: must be 1e-05 at least and",
         ),
         (sinking(1.01e3), "impossible velocity", "1.01e+03 m/s: must be 1e-05 at least and 1000 at most"),
         (sinking(0.0), "constant motion", "log.csv: depth never changes: nothing is identifiable"),
-        (sinking(0.1, 0.0), "constant push", "log.csv: command never changes: nothing is identifiable"),
+        (sinking(0.1, 0.0), "constant push", "log.csv: the command is always 0, so nothing can be identified"),
     ],
 )
 def test_a_recording_without_content_is_refused(recording: Recording, kind: str, line: str) -> None:

@@ -144,7 +144,7 @@ def test_the_sentence_names_recordings_time_and_remedy() -> None:
         for file, start in zip(FILES, (3.2, 41.0), strict=True)
     ]
     (at_once,) = sentences([replace(found[0], numbers={"start": 0.2})])
-    assert at_once.startswith("heave: the model does not explain log_1.csv from the start on: ")
+    assert at_once.startswith("heave: the model does not explain log_1.csv from the start: ")
     (sentence,) = sentences(found)
     when = "after the first 3 ... 41 s"
     assert sentence.startswith(f"heave: the model does not explain log_1.csv and log_2.csv {when}: ")

@@ -142,9 +142,8 @@ def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path
     ros = Ros(2)
     path = ros.write(tmp_path, dive(ros, commands=array))
     log = read_log(path, BLUEROV2)
-    assert (
-        f"{path.name}: 100 messages of /thrusters have no time in a header, so the time of their arrival is used"
-        in (told(log))
+    assert f"{path.name}: 100 messages of /thrusters without a time in the header: the time of arrival is used" in (
+        told(log)
     )
     (heave,) = (recording for recording in log.recordings if recording.axis.name == "heave")
     (step,) = np.flatnonzero(np.diff(heave.thrusters["5"]))
@@ -208,7 +207,7 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
         messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=np.array(commands[n])))]
         messages += [("/alt", time, ros.vector("Vector3", [0.0, 0.0, -100.0 * motion.DEPTH[n]]))]
     path = ros.write(tmp_path, messages)
-    with pytest.raises(DataFileError, match="no commands of thrusters are recognised"):
+    with pytest.raises(DataFileError, match="no commands of thrusters were found"):
         read_log(path, BLUEROV2)
     table = {f"/out.data[{n}]": f"u_{n + 1} [%]" for n in range(6)} | {"/alt.z": "-depth [cm]"}
     names, mistakes = names_of(BLUEROV2, {}, table)

@@ -326,7 +326,7 @@ def test_a_damaged_dataflash_log_is_read_around_the_damage(
     [
         ("a.tlog", b"", "the file is empty"),
         ("a.bin", b"", "the file is empty"),
-        ("a.bin", b"time [s],command [%]\n" * 50, "no DataFlash log"),
+        ("a.bin", b"time [s],command [%]\n" * 50, "is not a DataFlash log"),
         ("a.bin", b"\xa3\x95\x80" + b"\xff" * 2000, "no outputs of servos|cannot be read"),
         ("a.tlog", b"time [s],command [%]\n" * 50, "no outputs of servos"),
         ("a.tlog", bytes(range(256)) * 20, "no outputs of servos"),
