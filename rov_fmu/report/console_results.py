@@ -160,8 +160,7 @@ def _of_recordings(found: Sequence[Unseen]) -> Table:
     """Return the table of the errors of predictions of recordings that the model was not fitted to."""
     numbers = ("error", "no change", "noise")
     title = (
-        "Errors (RMS) of predictions of unseen data, compared with a prediction of no change and with "
-        "the sensor's noise"
+        "RMS errors of predictions of unseen data, compared with a prediction of no change and with the sensor's noise"
     )
     result = table(title, "", numbers, ("of",))
     result.box, result.padding = None, _GAP

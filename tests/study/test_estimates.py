@@ -126,8 +126,8 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
             _estimates(made, sampler="grid", runs=None),
         ),
         ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
-        ("the b_d_u of this vehicle must be within 6 ... 7 N.s/m in the FMU", _estimates(made, narrow)),
-        ("nothing varies, for [set] gives all that has an interval there", _estimates(made, set=all_set)),
+        ("b_d_u of this vehicle does not fit the FMU: it must be within 6 ... 7 N.s/m", _estimates(made, narrow)),
+        ("nothing varies, because [set] gives every coefficient that has an interval", _estimates(made, set=all_set)),
     ):
         (line,) = estimates.check()
         assert line.startswith(f"vary_from = 'its.toml': {words}")

@@ -77,4 +77,4 @@ def test_what_a_recording_adds_is_not_taken_for_the_whole() -> None:
     of_file = Finding("delay", "surge", file="a.csv", names={"unit": "s"}, numbers={"value": 0.05})
     whole, more = sentences([of_axis, of_file])
     assert whole.startswith("surge: the motion of surge follows the commands 0.2 s late.")
-    assert more.startswith("surge: the motion in a.csv follows the commands 0.05 s later than in the other recordings;")
+    assert more.startswith("surge: the motion in a.csv follows the commands 0.05 s later than in the other recordings.")
