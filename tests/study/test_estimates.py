@@ -133,7 +133,7 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
         assert line.startswith(f"vary_from = 'its.toml': {words}")
     (line,) = _estimates(made, sampler="saltelli")[1].check()
     assert line == (
-        "sampler = 'saltelli': Sobol indices tell apart what is independent, and all that varies is correlated"
+        "sampler = 'saltelli': Sobol indices need independent variables, but all varied variables are correlated"
     )
 
 

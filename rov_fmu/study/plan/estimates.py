@@ -61,7 +61,7 @@ class Estimates:
             elif reason := self._has[name].wrong(value):
                 yield key_line(_KEY, f"{name} of this vehicle does not fit the FMU: it {reason}", plan.vary_from)
         if plan.sampler == "saltelli" and len(self.names) > len(groups) + len(plan.vary) == 1:
-            reason = "Sobol indices need independent variables, but all that vary are correlated"
+            reason = "Sobol indices need independent variables, but all varied variables are correlated"
             yield key_line("sampler", reason, plan.sampler)
 
     def warnings(self) -> Iterator[str]:
