@@ -118,8 +118,10 @@ class Flight:
 
     # ---- The motion ----
 
-    def outputs(self, rov: Rov, values: Values, delays: Sequence[tuple[float, ...]]) -> tuple[list[Array], list[Array]]:
-        """Return the values (V x n) and the velocities through the water of each recording.
+    def outputs(
+        self, rov: Rov, values: Values, delays: Sequence[tuple[float, ...]], *, through_water: bool = False
+    ) -> list[Array]:
+        """Return what the sensor of each recording measures, V x n each, or the velocities through the water instead.
 
         `values` has V sets of numbers. Each set has a delay of the commands for each recording (s). All sets are
         simulated at the same times, chosen for the first delays. This is possible because the motion, as a function of
@@ -138,13 +140,18 @@ class Flight:
             at |= self.attitude.turned(nodes, at, delays[0][0])
         motion = SimulatedMotion(nodes, at, np.append(np.isin(nodes[1:], switches), False))
         sizes = [(len(delays), len(d.time)) for d in self.members]
-        found, velocities = [np.empty(size) for size in sizes], [np.empty(size) for size in sizes]
+        found = [np.empty(size) for size in sizes]
         for n, d in enumerate(self.members):
             for delay, which in _alike([delay[n] for delay in delays]).items():
-                part, some = motion.part(which), {name: numbers[which] for name, numbers in values.items()}
-                found[n][which] = self._sensed(d, part, some, d.time - delay)
-                velocities[n][which] = part.sampled(d.axis.velocity, d.time - delay)
-        return found, velocities
+                part, some = motion, values
+                if len(which) < len(delays):
+                    part, some = motion.part(which), {name: numbers[which] for name, numbers in values.items()}
+                sample = d.time - delay
+                if through_water:
+                    found[n][which] = part.sampled(d.axis.velocity, sample)
+                else:
+                    found[n][which] = self._sensed(d, part, some, sample)
+        return found
 
     def _nodes(self, delays: Sequence[float]) -> Array:
         """Return the times of the simulation: the switches, and either the samples or steps of 0.05 s, whichever are

@@ -177,15 +177,15 @@ class Simulator:
         """Simulate every recording. Raises MotionError."""
         outputs: list[Output | None] = [None] * len(self.data)
         for place in self.flights:
-            values, velocities = self._simulated(place, x[None, :])
+            values, velocities = (self._simulated(place, x[None, :], through_water=k) for k in (False, True))
             for n, value, velocity in zip(place.members, values, velocities, strict=True):
                 if not np.isfinite(value).all():
                     raise MotionError("the motion cannot be computed with these coefficients")
                 outputs[n] = Output(value[0], velocity[0])
         return [output for output in outputs if output]
 
-    def _simulated(self, place: FlightPlace, X: Array) -> tuple[list[Array], list[Array]]:
-        """Return the values and velocities of the recordings of a flight for V sets of parameters."""
+    def _simulated(self, place: FlightPlace, X: Array, *, through_water: bool = False) -> list[Array]:
+        """Return the outputs of the recordings of a flight for V sets of parameters."""
         values: dict[str, Array] = {}
         for n in place.shared:
             if n < len(self.names):
@@ -205,11 +205,11 @@ class Simulator:
             else:
                 values |= extra.coefficients({**self._vehicle.coefficients, **values}, numbers)
         times = [tuple(row) for row in delays.tolist()]
-        return place.flight.outputs(self._vehicle, values, times)
+        return place.flight.outputs(self._vehicle, values, times, through_water=through_water)
 
     def of_flight(self, place: FlightPlace, X: Array) -> Array:
         """Return the residuals of the samples of a flight for V sets of parameters, V x samples."""
-        values, _ = self._simulated(place, X)
+        values = self._simulated(place, X)
         parts = []
         for n, value in zip(place.members, values, strict=True):
             r = (value - self.data[n].values) / self.sigma[n]
