@@ -44,25 +44,29 @@ def _inseparable_drag(values: Mapping[str, Any]) -> str:
             coefficients.append(f"{values[key]} {reason}")
     together = f" (correlation {values['correlation']:.2f})" if "correlation" in values else ""
     return (
-        f"{values['axes']}: quadratic and linear drag are hardly identifiable apart: {', '.join(coefficients)}"
-        f"{together}; identifiable is their sum at the velocities tested"
+        f"{values['axes']}: the tests hardly separate quadratic from linear drag: {', '.join(coefficients)}"
+        f"{together}. Only their sum at the tested velocities is identifiable"
     )
 
 
 def _drag_at_zero(values: Mapping[str, Any]) -> str:
     unbounded = f" (by (11)-(13) alone {values['unbounded']:.3g})" if "unbounded" in values else ""
     return (
-        f"{values['axes']}: {values['coefficient']} is at its bound of 0, the fit without bounds is "
-        f"negative{unbounded}, which it cannot be"
+        f"{values['axes']}: {values['coefficient']} is at its bound of 0. Without the bound the fit would be "
+        f"negative{unbounded}, which is impossible"
     )
 
 
 def _asymmetry(values: Mapping[str, Any]) -> str:
     whose = f"{values['curve']} thrust" if values["curve"] else values["axes"]
-    by_model = f"by {values['modelled']:+.0%}" if "modelled" in values else "not"
+    by_model = (
+        f"In the model it differs by {values['modelled']:+.0%}"
+        if "modelled" in values
+        else "The model has no such difference"
+    )
     return (
         f"{whose}: at {values['command']:.0%}, {values['quantity']} in reverse differs by {values['measured']:+.0%} "
-        f"from that ahead, and {by_model} in the model; {values['window']} in [windows] can leave out one direction"
+        f"from that ahead. {by_model}. To leave out one direction, set {values['window']} in [windows]"
     )
 
 
@@ -71,7 +75,7 @@ def _disagreement(values: Mapping[str, Any]) -> str:
     factors = low if low == high else f"{low} to {high}"
     return (
         f"{values['axes']}: the recordings disagree on {values['coefficients']} by more than their residuals explain, "
-        f"so the model misses something; intervals are {factors} times as wide for it"
+        f"so the model lacks something. The intervals are made {factors} times as wide"
     )
 
 
@@ -153,8 +157,8 @@ _CAUSES = {
     ),
     "pitch": "the residuals follow the pitch. If pitch and roll are logged, `attitude = true` in [fit] takes "
     "them into account. Otherwise the vehicle needs the axis pitch",
-    "roll": "the residuals follow the roll. `attitude = true` in [fit] takes it into account, as far as roll and "
-    "pitch are logged; else a vehicle with the axis roll would explain it",
+    "roll": "the residuals follow the roll. If pitch and roll are logged, `attitude = true` in [fit] takes "
+    "them into account. Otherwise the vehicle needs the axis roll",
     "depth": "the residuals follow the depth, as when the buoyancy changes with the pressure, or a tether pulls",
     "distance": "the residuals follow the logged distance, as when a tether pulls",
     "tether": "a force grows with the distance from the start, as when a tether pulls",
@@ -188,13 +192,14 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "c_0_{curve} in [known]"
     ),
     "backward thrust in reverse": (
-        "{curve} thrust: the curve in reverse points backward below {command:.0%}; a dead band would explain it: "
-        "measure forces at weaker commands, or state it as c_0_{curve} in [known]"
+        "{curve} thrust: below a command of {command:.0%} in reverse, the curve gives thrust in the wrong "
+        "direction. A dead band would explain this: measure forces at weaker commands, or give "
+        "c_0_{curve} in [known]"
     ),
     "asymmetry": _asymmetry,
     # Drag and beta from points
     "assumed beta": (
-        "{axes}: {inertia}/{beta} is not identifiable from V_ss alone; {beta} = 1 is assumed, and every Tau follows "
+        "{axes}: {inertia}/{beta} is not identifiable from V_ss alone. {beta} = 1 is assumed, and every Tau follows "
         "from it. A time constant or a recording of a step from rest makes it identifiable"
     ),
     "no push": (
@@ -221,12 +226,12 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     "inseparable drag": _inseparable_drag,
     "drag at zero": _drag_at_zero,
     "leave-one-out error": (
-        "{axes}: the leave-one-thrust-out error of {quantity} is {predicted:.1%} (RMS), the residual of the fit "
-        "{fitted:.1%}: single thrusts carry much of it"
+        "{axes}: the leave-one-thrust-out error of {quantity} is {predicted:.1%} (RMS), but the residual of the fit "
+        "is only {fitted:.1%}. Single points determine much of the fit"
     ),
     "tables against recordings": (
-        "{axes}: {quantity} of the tables is {error:.0%} (RMS) off what the recordings give. The vehicle has the "
-        "coefficients of the recordings: a table has no delay, load or current apart from the drag"
+        "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from that of the recordings. The vehicle has "
+        "the coefficients of the recordings, because tables do not distinguish delay, load and current from drag"
     ),
     # Recordings
     "correlated residuals": (
@@ -259,18 +264,18 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: no vehicle fits the recordings of all these axes together, so each axis is fitted alone: {reason}"
     ),
     "poor prediction": (
-        "{axes}: a fit to {others} predicts the velocity of a recording to {predicted:.2g} {unit} (RMS), a model "
-        "without any change to {unchanged:.2g} {unit}, and the sensor's noise is {noise:.1g} {unit}: do not trust this "
-        "axis"
+        "{axes}: do not trust this axis. A fit to {others} predicts the velocity of a recording with an error of "
+        "{predicted:.2g} {unit} (RMS). The error of predicting no change is {unchanged:.2g} {unit}, and the sensor's "
+        "noise is {noise:.1g} {unit}"
     ),
     "failed prediction": (
-        "{axes}: the motion of {files} cannot be computed with a fit to the others, so its prediction is left out: "
-        "check its units and signs, and whether a thruster was saturated or a tether was taut"
+        "{axes}: the motion of {files} cannot be computed with a fit to the others, so its prediction is left out. "
+        "Check its units and signs, and whether a thruster was saturated or a tether was taut"
     ),
     "recordings against forces": (
-        "{axes}: the recordings ask for another {curve} thrust than its forces: {joint:.3g} N and not {alone:.3g} N at "
-        "a command of {command:.0%}. A thruster may push less in motion than when it is held, or the scale or the "
-        "battery may differ. The vehicle has the curve that fits both best"
+        "{axes}: the recordings need another {curve} thrust than the measured forces: {joint:.3g} N instead of "
+        "{alone:.3g} N at a command of {command:.0%}. A thruster may push less in motion than when it is held, or the "
+        "scale or the battery may differ. The vehicle has the curve that fits both best"
     ),
     # Effects
     "switches between rows": (

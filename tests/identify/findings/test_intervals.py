@@ -62,6 +62,6 @@ def test_no_interval_in_a_sentence_excludes_its_value_or_hides_its_width(
 def test_the_ends_of_a_drag_that_is_hardly_known_are_told_apart(low: float, width: float) -> None:
     numbers = {"a_d low": low, "a_d high": low + width}
     (written,) = sentences([Finding("inseparable drag", "surge", names={"a_d": "a_d_u"}, numbers=numbers)])
-    ends = re.search(rf"from {_NUMBER} to {_NUMBER}", written)
+    ends = re.search(rf"from {_NUMBER} to {_NUMBER}\. Only", written)
     assert ends, written
     assert 0.5 * width <= float(ends[2]) - float(ends[1]) <= 1.5 * width, written

@@ -206,7 +206,7 @@ def test_forces_that_the_recording_contradicts_are_told(*, wrong: bool) -> None:
     if wrong:
         (line,) = sentences(found)
         told = re.fullmatch(
-            r"heave: .* another top thrust than its forces: (.*) N and not (.*) N at .* of (.*)%\. .*", line
+            r"heave: .* another top thrust than the measured forces: (.*) N instead of (.*) N at .* of (.*)%\. .*", line
         )
         assert told, line
         joint, alone, command = map(float, told.groups())
