@@ -241,7 +241,7 @@ def test_holds_depth_and_heading_in_a_current() -> None:
     assert connection.traffic.frames == len(autopilot.history) == 12 * 400
 
 
-@pytest.mark.parametrize("offset", [0.0, 1.05])
+@pytest.mark.parametrize("offset", [pytest.param(0.0, marks=pytest.mark.long), 1.05])
 def test_holds_its_place_in_a_current(offset: float) -> None:
     """ArduSub's position hold, which faces the current or lies across it: depth to 5 cm, heading to 2 degrees."""
     heading = atan2(-0.1, -0.2) + offset

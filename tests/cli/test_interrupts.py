@@ -208,7 +208,8 @@ def test_a_worker_that_dask_restarts_prints_nothing(videoray_fmu: Path, tmp_path
         assert study.terminate() == LINE_OF_A_STUDY
 
 
-@pytest.mark.parametrize("name", ["fly", pytest.param("build", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["fly", "build"])
 def test_a_compiler_ends_with_its_command(name: str, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     output = tmp_path / "out" / ("x.fmu" if name == "build" else "x.html")
@@ -219,7 +220,8 @@ def test_a_compiler_ends_with_its_command(name: str, tmp_path: Path) -> None:
     assert not [*(tmp_path / "out").iterdir()]
 
 
-@pytest.mark.parametrize("later", [0.0, pytest.param(0.2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("later", [0.0, 0.2])
 def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videoray_fmu: Path, tmp_path: Path) -> None:
     with command(["-m", "rov_fmu", "prove", str(videoray_fmu)], tmp_path) as proof:
         proof.wait_until(proof.workers)

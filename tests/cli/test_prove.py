@@ -189,7 +189,7 @@ WHY: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     ("case", "version"),
     [
         ("out of bounds", "videoray_fmu"),
-        ("a wrong token", "videoray3_fmu"),
+        pytest.param("a wrong token", "videoray3_fmu", marks=pytest.mark.long),
         pytest.param("out of bounds", "videoray3_fmu", marks=pytest.mark.long),
         pytest.param("a wrong token", "videoray_fmu", marks=pytest.mark.long),
     ],

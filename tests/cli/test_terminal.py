@@ -180,6 +180,7 @@ def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Pat
     assert len(shown.lines) <= 24
 
 
+@pytest.mark.long
 def test_colours_are_left_out_where_they_are_not_wanted(folder: Path) -> None:
     """The words are the same with and without them."""
     arguments = ["build", "bare.toml", "--platform", "host"]

@@ -55,7 +55,9 @@ def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], s
     return np.array(rows).T
 
 
-@pytest.mark.parametrize("name", ["videoray", pytest.param("heavy", marks=pytest.mark.long), "everything", "six"])
+@pytest.mark.parametrize(
+    "name", ["everything", *(pytest.param(name, marks=pytest.mark.long) for name in ("videoray", "heavy", "six"))]
+)
 def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureRequest) -> None:
     rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING).rov, "six": SIX}[name]
     folder = request.getfixturevalue(f"{name}_dir")

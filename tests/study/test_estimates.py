@@ -172,6 +172,7 @@ same = "0*a_d_u"
     return Done(plan, Results(folder / "results"), without_progress(printed.getvalue()).splitlines())
 
 
+@pytest.mark.long
 def test_sobol_indices_are_those_of_groups_in_closed_form(done: Done) -> None:
     """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
 

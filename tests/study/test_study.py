@@ -183,6 +183,7 @@ def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_p
 
 
 @posix
+@pytest.mark.long
 def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continues(
     foreign: Foreign, tmp_path: Path
 ) -> None:

@@ -82,7 +82,7 @@ TILTED = {
     "logged tilt": Case(None, ("z",), Disturbance(tilt=TILT), logged=True, cause="pitch"),
 }
 """A fit to these takes long."""
-BY_DEFAULT = ("load, delay, reverse, colour", "two sensors", "logged sag", "tether")
+BY_DEFAULT = ("load, delay, reverse, colour", "two sensors", "tether")
 """The cases of the default tests, which run one seed."""
 
 

@@ -68,6 +68,7 @@ def texts(picture: bytes) -> list[str]:
     return [str(comment.text).strip() for comment in etree.fromstring(picture).iter(etree.Comment)]
 
 
+@pytest.mark.long
 def test_every_figure_has_its_caption_beside_it_and_the_folder_is_created(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
