@@ -13,6 +13,7 @@ from hypothesis import settings
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import compile_all
+from rov_fmu.engine.simulation import usable_cores
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -24,6 +25,11 @@ _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
 defaultCallbacks.logger = _LOGGER
 """The logger of instances without one. FMPy 0.3 forwards messages to the logger that it was given last in the process,
 even after that logger is gone, and would then crash."""
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one worker more than there are cores, because some tests wait for processes."""
+    return usable_cores() + 1
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -269,6 +269,7 @@ def test_the_dead_band_makes_the_heading_swing_when_adrift() -> None:
     assert turned.min() == pytest.approx(-4.7, abs=0.3)
 
 
+@pytest.mark.long
 def test_lost_and_repeated_packets_do_not_move_the_time() -> None:
     chance = random.Random(3)
     with served(setup_of(z=1.0)) as (connection, port):

@@ -124,8 +124,8 @@ def _long(*arguments: str) -> object:
 _TUNE = ("tune", "videoray", "--axis", "heave", "--command", "0.3", "--v-ss", "0.2")
 COMMANDS = [
     (),
-    ("tables",),
-    (*_TUNE, "-o", "tuned.toml"),
+    _long("tables"),
+    _long(*_TUNE, "-o", "tuned.toml"),
     ("build", "mistake.toml"),
     _long("build", "videorey"),
     _long("build", "bare.toml", "--platform", "host", "--osp"),
@@ -168,7 +168,8 @@ def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(
         assert words - words_in_a_pipe(arguments, folder) <= {"the", "widest", "of", *at_the_end.split("…")[1:]}
 
 
-@pytest.mark.parametrize("columns", [80, pytest.param(120, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("columns", [80, 120])
 def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Path) -> None:
     shown = on_a_terminal(["identify", "tests", "--report", "found.html"], columns, folder)
     assert shown.code == 0

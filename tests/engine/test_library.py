@@ -124,6 +124,7 @@ print(rov_fmu.load({str(BARE)!r}).simulate([0, 1, 2], {{}}, start={{"w": 1.0}})[
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux uses XDG_CACHE_HOME")
+@pytest.mark.long
 def test_two_processes_at_once_do_not_clash(cache: Cache, tmp_path: Path) -> None:
     load_library(ROV)
     (compiled,) = cache.files()

@@ -119,6 +119,7 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
         pytest.param(None, "", marks=pytest.mark.long),
     ],
 )
+@pytest.mark.long
 def test_platforms_that_are_lost_are_named(
     before: Sequence[str] | None, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

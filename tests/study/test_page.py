@@ -76,6 +76,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert study_page(results) == text, "the page is the same for the same results"
 
 
+@pytest.mark.long
 def test_another_title_changes_the_page_and_not_the_results(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str
 ) -> None:

@@ -190,7 +190,7 @@ def test_the_only_recording_that_is_unlike_the_others_is_named(sagging: Sequence
         assert "odd one" not in {cause for _, cause in told}
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.5e-6, False), (2e-6, True)])
+@pytest.mark.parametrize(("share", "told"), [pytest.param(0.5e-6, False, marks=pytest.mark.long), (2e-6, True)])
 def test_residuals_of_rounding_need_no_explanation(share: float, told: bool) -> None:
     (fit,) = fit_recordings(
         [
