@@ -122,7 +122,6 @@ def test_the_thrust_curve_is_that_of_the_model_and_inverted(curve: tuple[float, 
     assert Thruster(0.0, 0.0).command(1.0) == 0.0
 
 
-@pytest.mark.long
 def test_sticks_go_to_the_thrusters(start: Start) -> None:
     autopilot = start("Autopilot", surge=0.4, heave=-0.3)
     autopilot.step(10)
