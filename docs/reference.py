@@ -1,26 +1,38 @@
-"""Tables and equations in the pages that follow from the code; `python -m docs.reference` writes them anew.
+"""Tables, equations, commands and drawings in the pages; `python -m docs.reference` writes them anew.
 
-They stand in the pages, so that these can be read in a checkout, each between its name and an end, in comments.
+They follow from the code, and stand in the pages so that these can be read in a checkout, each between its name and an
+end, in comments. The drawings are files of their own.
 """
 
 import re
+from html import escape
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 
+import click
+
+from docs import compared
+from rov_fmu.cli import _commands
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.model.layout import AXES
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Text
+from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.templates import number
 from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
+from rov_fmu.tank import catalogue
 from rov_fmu.vehicle.json_schema import json_schema
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Table = list[tuple[str, ...]]
-PAGES = [Path(__file__).with_name(name) for name in ("model.md", "vehicle-file.md", "variables.md", "studies.md")]
+_NAMES = ("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md", "identify.md")
+PAGES = [Path(__file__).with_name(name) for name in _NAMES]
+DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
+"""The vehicles with a drawing. The refit of the VideoRay has the same thrusters."""
 
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
@@ -36,9 +48,40 @@ def tables() -> dict[str, Table]:
     }
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
     found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
+    found |= {"columns": _columns(), "messages": _messages()}
     plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
     found |= {name: _plan_table(of) for name, of in plans.items()}
     return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
+
+
+def _columns() -> Table:
+    """Return the columns of measurements that a CSV log may have."""
+    rows: Table = [("column", "also, with a unit", "units"), ("---",) * 3]
+    for name, quantity in catalogue.QUANTITIES.items():
+        also, units = (", ".join(f"`{word}`" for word in words) for words in (quantity.also, quantity.units))
+        rows.append((f"`{name}`", also, units))
+    return rows
+
+
+def _messages() -> Table:
+    """Return the messages that are recognised, by what they measure."""
+    words = {catalogue.EULER: "roll, pitch, heading", catalogue.QUATERNION: "roll, pitch, heading"}
+    words |= {catalogue.POSITION: "depth, distance", catalogue.VELOCITY: "velocities", catalogue.RATES: "rates of turn"}
+    found: dict[str, dict[str, None]] = {"commands of thrusters": {}}
+    for output in catalogue.OUTPUTS:
+        found["commands of thrusters"][f"`{_plain(output.kind)}`"] = None
+    for message in catalogue.MESSAGES:
+        field = f".{message.fields[0]}" if message.gives in catalogue.QUANTITIES else ""
+        found.setdefault(words.get(message.gives, message.gives), {})[f"`{_plain(message.kind)}{field}`"] = None
+    rows = ((name, ", ".join(messages)) for name, messages in found.items())
+    return [("measured", "messages, preferred ones first"), ("---",) * 2, *rows]
+
+
+def _plain(pattern: str) -> str:
+    """Return a regular expression for the type of a message as people write it."""
+    plain = re.sub(r"\(\w+\)\?|\[\w+\]\?", "", pattern.replace("\\d+", "").replace(".*", ""))
+    plain = re.sub(r"\[(\w)\w*\]", r"\1", plain)
+    return re.sub(r"\((\w+)\|\w+\)", r"\1", plain)
 
 
 def markdown(table: Table) -> str:
@@ -47,17 +90,50 @@ def markdown(table: Table) -> str:
 
 
 def filled(page: str) -> str:
-    """The text of a page with its tables and equations as they are to be."""
+    """The text of a page with what is generated in it as it is to be."""
     found = tables()
 
     def text(match: re.Match[str]) -> str:
-        return f"{match[1]}\n\n{markdown(found[match[2]])}\n\n"
+        kind, name = match[2], match[3]
+        if kind == "commands":
+            content = _command_reference()
+        elif kind == "drawings":
+            content = _gallery()
+        elif kind == "equations":
+            content = f"```text\n{_equations(name)}\n```"
+        else:
+            content = markdown(found[name] if name in found else compared.tables()[name])
+        return f"{match[1]}\n\n{content}\n\n"
 
-    def block(match: re.Match[str]) -> str:
-        return f"{match[1]}\n\n```text\n{_equations(match[2])}\n```\n\n"
+    return re.sub(
+        r"(<!-- (commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL
+    )
 
-    page = re.sub(r"(<!-- equations: (\w+) -->)\n.*?(?=<!-- end -->)", block, page, flags=re.DOTALL)
-    return re.sub(r"(<!-- table: (\w+) -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL)
+
+def drawings() -> dict[Path, str]:
+    """The drawings of the vehicles, those of the FMU's diagram, by their paths."""
+    return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one.rov) for name, one in DRAWN.items()}
+
+
+def _gallery() -> str:
+    """The drawings, as the page of the vehicles has them."""
+    one = "**{0}**\n\n![Thrusters and axes of the {0}](drawings/{1}.svg)"
+    return "\n\n".join(one.format(vehicle.name, name) for name, vehicle in DRAWN.items())
+
+
+def _command_reference() -> str:
+    """Every command with its arguments and options, in the words of --help."""
+    root, found = click.Context(_commands, info_name="rov-fmu"), []
+    for name, command in _commands.commands.items():
+        with click.Context(command, root, name) as context:
+            usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
+            options = [one for one in command.params if isinstance(one, click.Option)]
+            records = [record for one in options if (record := one.get_help_record(context))]
+        rows = [(f"`{_escaped(option)}`", _escaped(escape(what, quote=False))) for option, what in records]
+        words = escape(cleandoc(command.help or ""), quote=False)
+        table = [markdown([("option", "what"), ("---",) * 2, *rows])] if rows else []
+        found.append("\n\n".join([f"### rov-fmu {name}", f"`{usage}`", words, *table]))
+    return "\n\n".join(found)
 
 
 def _equations(name: str) -> str:
@@ -112,7 +188,12 @@ def _resolved(entry: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _words(entry: dict[str, Any]) -> str:
-    return str(entry.get("description", "")).replace("\n", " ").replace("|", r"\|")
+    return _escaped(str(entry.get("description", "")))
+
+
+def _escaped(text: str) -> str:
+    """A text that fits into a cell of a table."""
+    return " ".join(text.split("\n")).replace("|", r"\|")
 
 
 def _allowed(entry: dict[str, Any]) -> str:
@@ -131,3 +212,5 @@ def _allowed(entry: dict[str, Any]) -> str:
 if __name__ == "__main__":
     for path in PAGES:
         path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
+    for path, drawing in drawings().items():
+        path.write_text(drawing, encoding="utf-8")

@@ -6,7 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError, compile_all, host_platform
+from rov_fmu.engine.compile import (
+    INTERFACES,
+    OTHER_NAMES,
+    PLATFORMS,
+    BuildError,
+    OptionError,
+    compile_all,
+    host_platform,
+)
 from rov_fmu.fmu.archive import archive, native_content, python_content
 from rov_fmu.fmu.model_description import NATIVE
 from rov_fmu.fmu.module import web_module
@@ -51,6 +59,7 @@ def build(
     platforms: str | Sequence[str] | None = None,
     backend: str = "native",
     fmi: int = 2,
+    interface: str | None = None,
     osp: bool = False,
     inputs: Sequence[Path] = (),
     on_content: Callable[[], None] = lambda: None,
@@ -60,11 +69,12 @@ def build(
 
     `output` is the file to write, by default <identifier>.fmu or <identifier>.fmi3.fmu in the current folder.
     `platforms` names one or several of PLATFORMS, or `host` for this machine; by default it is all. `backend` is
-    `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the version
-    of FMI, 2 or 3. `osp` also writes <identifier>_OspModelDescription.xml to the folder of the FMU. `pythonfmu` and
-    `osp` need FMI 2.0. `inputs` are further files that must not be overwritten, like those that the vehicle names.
-    `on_content` is called once the content is made and the compilers begin, and `on_compiled` with the name of each
-    platform that has been compiled.
+    `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the version of
+    FMI, 2 or 3. `interface` names what the FMU offers: `cs` for Co-Simulation, `me` for Model Exchange, or `both`,
+    which is the default; the FMU in pure Python has only `cs`. `osp` also writes <identifier>_OspModelDescription.xml
+    to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `inputs` are further files that must not be
+    overwritten, like those that the vehicle names. `on_content` is called once the content is made and the compilers
+    begin, and `on_compiled` with the name of each platform that has been compiled.
 
     Raises InputError if `vehicle` is not a vehicle or its coefficients are invalid; OptionError if another argument
     is; BuildError if the build fails; FileError if a file of the vehicle cannot be read, or if `output` does not end
@@ -80,6 +90,13 @@ def build(
         raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, NATIVE))}")
     if fmi == 3 and not native:
         raise OptionError("--fmi 3: PythonFMU makes FMI 2.0 alone")
+    if interface is not None and interface not in INTERFACES:
+        raise OptionError(f"there is no interface {shown(interface)}, only {', '.join(INTERFACES)}")
+    if not native and interface not in (None, "cs"):
+        raise OptionError(f"--interface {interface}: PythonFMU makes Co-Simulation (cs) alone")
+    if osp and interface == "me":
+        raise OptionError("--interface me: libcosim and the OSP tools, which --osp is for, run Co-Simulation alone")
+    interface = interface or ("both" if native else "cs")
     if fmi == 3 and osp:
         raise OptionError("--fmi 3: libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone")
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{'.fmi3' if fmi == 3 else ''}.fmu")
@@ -93,8 +110,9 @@ def build(
         raise FileError(f"{output}: the name must end with .fmu")
     chosen = chosen_platforms(platforms, fmi) if native else []
     results = reference_results(vehicle)
-    pages = {**documentation(vehicle, native=native, fmi=fmi, module=web_module(vehicle.layout)), **results}
-    content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
+    module = web_module(vehicle.layout)
+    pages = {**documentation(vehicle, native=native, fmi=fmi, interface=interface, module=module), **results}
+    content = native_content(vehicle, pages, fmi, interface) if native else python_content(vehicle, pages)
     on_content()
     start = perf_counter()
     seconds: dict[str, float] = {}

@@ -19,9 +19,18 @@ import click
 from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
-from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.engine.compile import INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.io.file_kinds import PAGE, check_written
-from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, listed, on_terminal, shown
+from rov_fmu.io.messages import (
+    FileError,
+    InputError,
+    ProofError,
+    StudyError,
+    did_you_mean,
+    listed,
+    print_message,
+    shown,
+)
 from rov_fmu.io.output import check_targets, write_whole
 from rov_fmu.model.layout import AXES
 from rov_fmu.process import exit_code
@@ -178,6 +187,11 @@ def _commands(context: click.Context) -> None:
     help="Version of FMI: 2.0 or 3.0.",
 )
 @click.option(
+    "--interface",
+    type=_Choice([*INTERFACES], {"co-simulation": "cs", "model-exchange": "me"}),
+    help="What the FMU offers: Co-Simulation, Model Exchange or both. The default is both, or cs for pure Python.",
+)
+@click.option(
     "--platform",
     "platforms",
     multiple=True,
@@ -190,7 +204,15 @@ def _commands(context: click.Context) -> None:
     is_flag=True,
     help="Also write <identifier>_OspModelDescription.xml beside the FMU (OSP-IS 1.0.1; FMI 2.0 only).",
 )
-def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms: tuple[str, ...], osp: bool) -> None:
+def _build(
+    vehicle: Path,
+    output: Path | None,
+    backend: str,
+    fmi: int,
+    interface: str | None,
+    platforms: tuple[str, ...],
+    osp: bool,
+) -> None:
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
@@ -208,6 +230,7 @@ def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms
             platforms=chosen,
             backend=backend,
             fmi=fmi,
+            interface=interface,
             osp=osp,
             inputs=[vehicle],
             on_content=begin,
@@ -251,14 +274,15 @@ def _print_built(built: "Built", seconds: float) -> None:
     "--input",
     "commands",
     type=_FILE,
-    metavar="COMMANDS.csv",
-    help="Inputs over time. The first column is the time (s), the others have the names of inputs and their values "
-    "(0.3 is a command of 30 %); each row is held up to the next one.",
+    metavar="FILE",
+    help="Inputs over time. In a table without units (.csv), the first column is the time (s), and the others have the "
+    "names of inputs and their values (0.3 is a command of 30 %). Any log that identify reads gives its commands. Each "
+    "row is held up to the next one.",
 )
 @click.option(
     "--stop",
     type=_seconds("1e-6"),
-    help="Time at the end, s. The default is the last time of COMMANDS.csv, or 10.",
+    help="Time at the end, s. The default is the last time of --input FILE, or 10.",
 )
 @click.option(
     "--step",
@@ -325,7 +349,7 @@ def _warnings_printed() -> Iterator[None]:
 
 
 def _warn(message: str) -> None:
-    click.echo(on_terminal(f"rov-fmu: warning: {message}"), err=True)
+    print_message(f"rov-fmu: warning: {message}")
 
 
 # ---- fly -------------------------------------------------------------------------------------------------------------
@@ -378,14 +402,13 @@ def _short_names(paths: Sequence[Path]) -> list[str]:
 def _open(path: Path, option: str) -> None:
     """Print the path of a file, and open it in a browser. `option` is the option with which the user can choose the
     place of the file."""
-    click.echo(path)
+    from rov_fmu.report.console import console
+
+    console().print(str(path), soft_wrap=True)
     if not webbrowser.open(path.as_uri()):
-        click.echo(
-            on_terminal(
-                "rov-fmu: no browser could be opened. Open this file in a browser, here or on another machine. "
-                f"It needs no other files. Use {option} to write it to another place"
-            ),
-            err=True,
+        print_message(
+            "rov-fmu: no browser could be opened. Open this file in a browser, here or on another machine. "
+            f"It needs no other files. Use {option} to write it to another place"
         )
 
 
@@ -421,7 +444,14 @@ def _open(path: Path, option: str) -> None:
     show_default=True,
     help="Depth of the bottom, m, to which a range is measured.",
 )
-@click.option("--log", type=_FILE, metavar="LOG.csv", help="Log to write, which identify reads.")
+@click.option(
+    "--log",
+    type=_FILE,
+    metavar="LOG.csv",
+    help="Log to write, which identify reads. If the autopilot is restarted, the next log is LOG_2.csv, or the next "
+    "free name. A run writes at most 20 logs, and at most 1,000,000 rows in all.",
+)
+@click.option("--force", is_flag=True, help="Replace logs that exist, also those with a number in their name.")
 @click.option(
     "--log-rate",
     type=_number("a number from 1 to 100 (Hz)", 1.0, 100.0),
@@ -432,7 +462,8 @@ def _open(path: Path, option: str) -> None:
 @click.option(
     "--duration",
     type=_seconds("0.001"),
-    help="End after this time of the simulation, s. Without it, end with Ctrl-C.",
+    help="End this time after the start, s. It is the time of the simulation; without packets it is real time. "
+    "Without this option, end with Ctrl-C.",
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all of them.")
 @click.option(
@@ -497,7 +528,14 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     type=_number("a number above 0", nextafter(0.0, 1.0)),
     help="Tolerance to use instead of that of each experiment.",
 )
-def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
+@click.option(
+    "--time-limit",
+    type=_number("a number of seconds above 0, at most 1e6", nextafter(0.0, 1.0), 1e6),
+    metavar="SECONDS",
+    default=60.0,
+    help="Time that the FMU may take for each experiment. The default is 60 s.",
+)
+def _prove(fmu: Path, interface: str | None, tolerance: float | None, time_limit: float) -> None:
     """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do."""
     _refuse_vehicle(fmu, f"must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
     from rov_fmu.fmu.proof import prove
@@ -505,7 +543,7 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     from rov_fmu.report.progress import parts
 
     with parts() as shown:
-        findings = prove(fmu, interface, tolerance, shown.begin("running the experiments"))
+        findings = prove(fmu, interface, tolerance, time_limit, shown.begin("running the experiments"))
     print_proof(findings)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
@@ -576,22 +614,34 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     "--inspect",
     "inspects",
     is_flag=True,
-    help="Only list what the log FOLDER, or each log in it, contains, and write a draft of rov.toml beside it.",
+    help="Only list what the log FOLDER, or each log in it, contains, and write a draft of rov.toml if there is none.",
 )
-def _identify(folder: Path, output: Path | None, report: Path | None, force: bool, inspects: bool) -> None:
-    """Identify a vehicle from a FOLDER with its tank tests or dive logs and its rov.toml."""
-    if inspects:
-        if output or report or force:
-            raise click.UsageError(
-                "identify: --inspect writes only a draft of rov.toml: leave -o, --report, --force out"
-            )
-        _inspect(folder)
-        return
+@click.option(
+    "--draft",
+    "drafts",
+    is_flag=True,
+    help="Write a draft of rov.toml as --inspect does. It is an error if there is one already.",
+)
+def _identify(
+    folder: Path, output: Path | None, report: Path | None, force: bool, inspects: bool, drafts: bool
+) -> None:
+    """Identify a vehicle from a FOLDER with its tank tests or dive logs and its rov.toml.
+
+    Without a rov.toml, the command lists what the logs contain, and --draft writes a draft of it.
+    """
     from rov_fmu.interface.identify_command import identify_folder
+    from rov_fmu.interface.inspect_command import lacks_description
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
     from rov_fmu.report.console_results import axes_with_warnings, print_identification
     from rov_fmu.report.progress import parts
 
+    writes = output or report or force
+    if (inspects or drafts) and writes:
+        option = "--draft" if drafts else "--inspect"
+        raise click.UsageError(f"identify: {option} writes only a draft of rov.toml: leave -o, --report, --force out")
+    if inspects or drafts or (not writes and lacks_description(folder)):
+        _inspect(folder, inspects=inspects, drafts=drafts)
+        return
     with parts() as shown:
         identification, replaced = identify_folder(folder, output, report, force=force, begin=shown.begin)
     for line in replaced:
@@ -605,22 +655,30 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
     print_end([path for path in (output, report) if path], following)
 
 
-def _inspect(path: Path) -> None:
-    """List what logs contain, and write a draft of rov.toml."""
-    from rov_fmu.interface.inspect_command import inspect_logs, write_draft
+def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
+    """List what logs contain, and write a draft of rov.toml if it is asked for."""
+    from rov_fmu.interface.inspect_command import check_no_description, inspect_logs, write_draft
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
     from rov_fmu.report.console_log import print_inspection
 
-    found, draft, text = inspect_logs(path)
-    for inspection in found:
+    inspected = inspect_logs(path)
+    draft = inspected.draft
+    if drafts:
+        check_no_description(draft)
+    for inspection in inspected.logs:
         print_inspection(inspection)
+    for line in inspected.warnings:
+        _warn(line)
     following = shell_words("rov-fmu", "identify", draft.parent)
     if draft.exists():
         paragraph(console(), f"There is a {draft} already, so no draft was written.")
         print_end([], following)
-    else:
-        write_draft(draft, text)
+    elif inspects or drafts:
+        write_draft(draft, inspected.text)
         print_end([draft], f"edit this draft, then {following}")
+    else:
+        paragraph(console(), f"There is no {draft}, which gives the vehicle's name and everything that no test tells.")
+        print_end([], f"{following} --draft writes a draft of it")
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 _INTERRUPTED = "interrupted, no file is half-written"
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _POLL = 0.5
 """The longest wait of the main thread in seconds; on Windows, a signal does not end a wait."""
 
@@ -47,7 +48,7 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
         reason = f"{'cannot be written: ' if written else ''}{one_line(error.strerror or str(error))}"
         return _print_error(program, f"{about}: {reason}", codes[OSError])
     except tuple(codes) as error:
-        text = error.format_message() if isinstance(error, ClickException) else str(error)
+        text = one_line(error.format_message()) if isinstance(error, ClickException) else str(error)
         return _print_error(program, text, next(code for kind, code in codes.items() if isinstance(error, kind)))
     return 0
 
@@ -56,7 +57,8 @@ def run_process(program: str, main: Callable[[], int]) -> int:
     """Run a command line in a thread, while the main thread waits for its end, Ctrl-C or SIGTERM.
 
     Python would raise KeyboardInterrupt at any place in the main thread, and ignore it in some, such as a finalizer. So
-    a signal raises nothing here: the main thread cleans up and ends the process.
+    a signal raises nothing here: the main thread cleans up and ends the process. A signal that comes when the command
+    is done changes nothing: the exit code is that of the command.
     """
     events: SimpleQueue[int | BaseException | signal.Signals] = SimpleQueue()
 
@@ -66,7 +68,7 @@ def run_process(program: str, main: Callable[[], int]) -> int:
         except BaseException as error:  # the main thread raises it again
             events.put(error)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # a shell may ignore signals for a background job
             signal.signal(number, lambda number, _: events.put(signal.Signals(number)))
     for stream in (sys.stdout, sys.stderr):
@@ -80,10 +82,12 @@ def run_process(program: str, main: Callable[[], int]) -> int:
             continue
         if isinstance(event, signal.Signals):
             _end_interrupted(program)
-        elif isinstance(event, BaseException):
+        for number in _SIGNALS:  # everything is done, and Python would end with the signal while it frees its modules
+            signal.signal(number, signal.SIG_IGN)
+        if isinstance(event, BaseException):
             raise event
-        else:
-            return event
+        assert isinstance(event, int)
+        return event
 
 
 def _end_interrupted(program: str) -> None:
@@ -127,11 +131,11 @@ def _kill_children() -> None:
 def _print_error(program: str, message: str, code: int) -> int:
     """Print the lines of a message to stderr, and return the exit code."""
     from rov_fmu.io.interrupts import UNINTERRUPTED
-    from rov_fmu.io.messages import on_terminal
+    from rov_fmu.io.messages import print_message
 
     with UNINTERRUPTED:
         for line in message.splitlines():
-            print(on_terminal(f"{program}: {line}"), file=sys.stderr)
+            print_message(f"{program}: {line}")
     return code
 
 

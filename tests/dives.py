@@ -5,12 +5,13 @@ from math import radians
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording, recordings_of
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.signals import Commands, Signal, recordings_of
+from rov_fmu.tank.log import Commands
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.tank.logs import channel, commands, log
 from verification.references.pool import Array, swim
 
 LAG = 0.15
@@ -34,7 +35,7 @@ class Dive:
 
     def recorded(self, noise: float = 1.0, seed: int = 0, quantity: str = "velocity") -> tuple[Recording, ...]:
         """Return recordings of velocities or distances over ground; `noise` is a multiple of NOISE."""
-        random, time = np.random.default_rng(seed), self.commands.time
+        random, time = np.random.default_rng(seed), self.commands.rows
         psi, (north, east) = self.motion["psi"], CURRENT
         c, s = np.cos(psi), np.sin(psi)
         ground = {
@@ -46,13 +47,17 @@ class Dive:
             ground = {axis: np.concatenate([[0.0], np.cumsum(step)]) for axis, step in steps.items()}
         clean = [(axis, quantity, values) for axis, values in ground.items()]
         clean += [(HEAVE, "depth", self.motion["z"]), (YAW, "heading", psi)]
-        signals = [
-            Signal(axis, measured, time, values + noise * NOISE[measured] * random.standard_normal(len(time)))
+        channels = [
+            channel(
+                f"{axis.name} {measured}" if measured in ("velocity", "distance") else measured,
+                time,
+                values + noise * NOISE[measured] * random.standard_normal(len(time)),
+            )
             for axis, measured, values in clean
         ]
-        recordings, findings = recordings_of("dive.tlog", TRUTH.layout, self.commands, signals)
+        recordings, findings = recordings_of(log(self.commands, *channels, file="dive.tlog"), TRUTH.layout)
         assert not findings
-        return recordings
+        return tuple(recordings)
 
 
 def dive(seconds: float, seed: int = 0) -> Dive:
@@ -65,7 +70,7 @@ def dive(seconds: float, seed: int = 0) -> Dive:
         signs = [np.sign(round(TRUTH.effect(t, axis), 6)) for axis in AXES]
         pushes = (sign * stick for sign, stick in zip(signs, sticks, strict=True))
         thrusters[t.name] = np.clip(sum(pushes, np.zeros(n)), -1.0, 1.0)
-    return Dive(Commands(time, thrusters), swim(TRUTH, time, thrusters, current=CURRENT))
+    return Dive(commands(time, thrusters), swim(TRUTH, time, thrusters, current=CURRENT))
 
 
 def _stick(random: np.random.Generator, n: int, most: float, hold: float) -> Array:

@@ -4,10 +4,10 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
+from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
 from rov_fmu.model.layout import YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import ROV_FILE
-from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 
 HEAD = """
 [vehicle]

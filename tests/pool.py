@@ -7,9 +7,9 @@ from math import radians
 import numpy as np
 from scipy.signal import lfilter
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.model.layout import AXIS, CURVE, Axis, coefficient_name
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.recording import Recording
 from verification.references.pool import Array, swim
 
 Plan = Sequence[tuple[float, float]]

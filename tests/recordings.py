@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
 from verification.references.closed_form import axis_of
 
 NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}

@@ -1,10 +1,19 @@
 """python -m verification.mutation: change single operators and constants at random, and see whether the tests notice.
 
 The mutants are those of cosmic-ray (Python) and universalmutator (C), which `pip install "rov-fmu[mutation]"` installs.
+
+`mutants.csv` keeps 200 mutants of the whole product of 8d6b1e9, with those that the tests kill. `--kept` applies them
+to the code of today and runs the quickest of their tests first. It writes each verdict at once, so that it can be ended
+and called again. `--results` writes the verdicts of a later state to another file, and lists those that are killed no
+longer.
+
+Two parts of the product are not mutated: the scripts of the page, because the tests that would notice need a browser,
+and the engine's and the page's frames around the C of the step, which no FMU contains.
 """
 
 import ast
 import contextlib
+import csv
 import fnmatch
 import io
 import os
@@ -16,16 +25,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from functools import cache, partial
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
+from xml.etree import ElementTree
 
 import click
 
@@ -33,16 +43,20 @@ from rov_fmu.engine.compile import C_FLAGS, UNITY_FILE, WARNINGS, compiler, fmi_
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.new_tests import copy_checkout, environment
 
 ROOT = Path(__file__).parents[1]
 LEAST = 0.85
 """The share of the mutants that the tests must kill."""
 _LONGEST = 120
 """The longest time (s) of one test; one that takes longer has noticed its mutant."""
-FILES = (
-    *(f"rov_fmu/{folder}/**/*.py" for folder in ("model", "engine", "vehicle", "identify", "fmu")),
-    "fmu_src/c/*.c",
-)
+FILES = ("rov_fmu/**/*.py", "fmu_src/c/*.c")
+KEPT = ROOT / "verification" / "mutants.csv"
+_COLUMNS = ("file", "line", "above", "before", "below", "after", "verdict", "seconds", "test")
+"""The columns of the kept mutants: a file, a line of it with its neighbours, and the line in its place. Then follow the
+verdict (killed, survived, or empty), the seconds until then, and the test that failed."""
+_LIMIT = 150
+"""The longest time (s) for the tests of a kept mutant. One that no test has noticed by then has survived."""
 TESTS = {
     "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/calls",
     "fmu_src/c/s*.c": "model/test_c_step.py fmu/calls/test_values.py fmu/calls model/test_exactness.py engine",
@@ -60,6 +74,17 @@ TESTS = {
     "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
+    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_left_out.py",
+    "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
+    "rov_fmu/report/page/*": "report/test_equations.py report/test_fmu_page.py report",
+    "rov_fmu/report/*": "report/test_report_parts.py report/test_report.py report",
+    "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_samples.py study",
+    "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
+    "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
+    "rov_fmu/bridges/*": "bridges",
+    "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
+    "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
+    "rov_fmu/*": "cli/test_start.py cli/test_messages.py cli",
 }
 """The default tests of each file, in the folder tests/, besides those that import it. The first pattern counts."""
 # Their mutants need arguments, change a decorator, or raise a TypeError wherever they run. `is` still becomes `is not`.
@@ -88,9 +113,8 @@ def tests_of(file: str) -> list[str]:
     """Return the files and folders of tests for a file: those that import it, then those of the table."""
     *packages, name = Path(file).with_suffix("").parts
     is_imported = re.compile(rf"{re.escape('.'.join(packages))}(\.{name} import| import (.*, )?{name}\b)")
-    tests = sorted(
-        (ROOT / "tests" / packages[1]).rglob("test_*.py"), key=lambda path: (path.stem != f"test_{name}", path)
-    )
+    folder = ROOT / "tests" / (packages[1] if packages[1:] else "cli")
+    tests = sorted(folder.rglob("test_*.py"), key=lambda path: (path.stem != f"test_{name}", path))
     importing = [path.relative_to(ROOT).as_posix() for path in tests if is_imported.search(path.read_text("utf-8"))]
     names = next(names for pattern, names in TESTS.items() if fnmatch.fnmatch(file, pattern))
     return list(dict.fromkeys([*importing, *(f"tests/{name}" for name in names.split())]))
@@ -198,6 +222,12 @@ def _is_valid_c(file: str, before: str, after: str) -> bool:
     return bool(compiled) and compiled != _object(Path(file).name, before)
 
 
+def with_line(text: str, line: int, new: str) -> str:
+    """Return a text with another line in the place of one."""
+    lines = text.splitlines(keepends=True)
+    return "".join([*lines[: line - 1], f"{new}\n", *lines[line:]])
+
+
 def draw(seed: int) -> Iterator[Mutant]:
     """Yield mutants of lines drawn at random, each line at most once."""
     generator = random.Random(seed)
@@ -208,21 +238,11 @@ def draw(seed: int) -> Iterator[Mutant]:
             before, after = (ROOT / file).read_text(encoding="utf-8"), generator.choice(choices)()
             if _is_valid_python(before, after) if file.endswith(".py") else _is_valid_c(file, before, after):
                 old, new = before.splitlines()[line - 1], after.splitlines()[line - 1]
-                yield Mutant(file, line, old.strip(), new.strip(), after)
+                if with_line(before, line, new) == after:
+                    yield Mutant(file, line, old, new, after)
 
 
 # ---- Tests -----------------------------------------------------------------------------------------------------------
-
-
-def _copy(folder: Path) -> Path:
-    """Copy the files of the checkout that git does not ignore."""
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
-    for name in names:
-        if (ROOT / name).is_file():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, folder / name)
-    return folder
 
 
 def _pass(tests: Sequence[str], folder: Path, processes: int = 0, longest: float | None = None) -> bool:
@@ -230,7 +250,12 @@ def _pass(tests: Sequence[str], folder: Path, processes: int = 0, longest: float
     limit = ["-o", f"faulthandler_timeout={_LONGEST}", "-o", "faulthandler_exit_on_timeout=true"]
     command = [sys.executable, "-m", "pytest", "-n", str(processes), "-x", "-p", "no:cacheprovider", *limit, *tests]
     process = subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        command,
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
     try:
         return process.wait(longest) == 0
@@ -246,7 +271,7 @@ def survivors(mutants: Sequence[Mutant], jobs: int) -> list[Mutant]:
     with tempfile.TemporaryDirectory(prefix="mutation-") as temporary, ThreadPoolExecutor(jobs) as pool:
         copies: SimpleQueue[Path] = SimpleQueue()
         for n in range(jobs):
-            copies.put(_copy(Path(temporary, str(n))))
+            copies.put(copy_checkout(Path(temporary, str(n))))
         tests, began = sorted({test for mutant in mutants for test in tests_of(mutant.file)}), time.monotonic()
         if not _pass(tests, Path(temporary, "0"), jobs):
             raise click.ClickException(f"the tests fail without a mutant: pytest {' '.join(tests)}")
@@ -270,21 +295,196 @@ def survivors(mutants: Sequence[Mutant], jobs: int) -> list[Mutant]:
         return left
 
 
+# ---- The kept mutants ------------------------------------------------------------------------------------------------
+
+Row = dict[str, str]
+
+
+def read_rows(path: Path) -> list[Row]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _write_rows(path: Path, rows: Sequence[Row]) -> None:
+    draft = path.with_suffix(".draft")
+    with draft.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    draft.replace(path)
+
+
+def kept(mutant: Mutant) -> Row:
+    """Return the row of a mutant without a verdict."""
+    lines = ["", *(ROOT / mutant.file).read_text(encoding="utf-8").splitlines(), ""]
+    above, below = lines[mutant.line - 1], lines[mutant.line + 1]
+    own = (mutant.file, str(mutant.line), above, mutant.before, below, mutant.after)
+    return dict.fromkeys(_COLUMNS, "") | dict(zip(_COLUMNS, own, strict=False))
+
+
+def applied(row: Row) -> Mutant | None:
+    """Apply a kept mutant to the code of today. Return None if its line is not there, or in several places.
+
+    The line is looked for with its neighbours in its file, then alone in its file, then with its neighbours anywhere.
+    """
+    texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in files()}
+
+    def places(file: str, with_neighbours: bool) -> list[tuple[str, int]]:
+        lines = ["", *texts.get(file, "").splitlines(), ""]
+        wanted = [row["above"], row["before"], row["below"]]
+        return [
+            (file, n)
+            for n in range(1, len(lines) - 1)
+            if lines[n] == wanted[1] and (not with_neighbours or lines[n - 1 : n + 2] == wanted)
+        ]
+
+    for found in (
+        places(row["file"], True),
+        places(row["file"], False),
+        [place for file in texts for place in places(file, True)],
+    ):
+        if len(found) == 1:
+            file, line = found[0]
+            return Mutant(file, line, row["before"], row["after"], with_line(texts[file], line, row["after"]))
+    return None
+
+
+def _baseline(tests: Sequence[str], folder: Path, jobs: int) -> dict[str, float]:
+    """Run tests without a mutant. Return the time of each file of tests in which all pass."""
+    report = folder / "report.xml"
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-n",
+        str(jobs),
+        "-p",
+        "no:cacheprovider",
+        f"--junitxml={report}",
+        *tests,
+    ]
+    subprocess.run(command, cwd=folder, env=environment(folder), stdout=subprocess.DEVNULL, check=False)
+    if not report.exists():
+        raise click.ClickException(f"the tests cannot be run without a mutant: pytest {' '.join(tests)}")
+    seconds: dict[str, float] = defaultdict(float)
+    failed = set()
+    for case in ElementTree.parse(report).iter("testcase"):
+        module = [*takewhile(lambda part: part.islower(), case.get("classname", "").split("."))]
+        file = f"{'/'.join(module)}.py"
+        seconds[file] += float(case.get("time", 0.0))
+        if case.find("failure") is not None or case.find("error") is not None:
+            failed.add(file)
+    for file in sorted(failed):
+        click.echo(f"left out, because a test fails without a mutant: {file}")
+    return {file: took for file, took in seconds.items() if file not in failed}
+
+
+def _quickest_first(file: str, seconds: Mapping[str, float]) -> list[str]:
+    """Return the files of tests for a file that are in `seconds`: of each entry of its list, the quickest first."""
+    entries = [ROOT / test for test in tests_of(file)]
+    own = [e for e in entries if e.is_file()]
+    groups = [own, *([*e.rglob("test_*.py")] for e in entries if e.is_dir())]
+    names = ([path.relative_to(ROOT).as_posix() for path in group] for group in groups)
+    ordered = (name for group in names for name in sorted({*group} & {*seconds}, key=lambda name: seconds[name]))
+    return list(dict.fromkeys(ordered))
+
+
+_BEGUN = re.compile(r"^(tests/\S+::.+?) (PASSED|SKIPPED|XFAIL|FAILED|ERROR|$)", re.M)
+
+
+def _verdict(mutant: Mutant, folder: Path, seconds: Mapping[str, float]) -> tuple[str, str]:
+    """Run the tests of a mutant in a copy of the checkout until one fails; return the verdict and the failing test."""
+    tests = _quickest_first(mutant.file, seconds)
+    limit = ["-o", "faulthandler_timeout=60", "-o", "faulthandler_exit_on_timeout=true"]
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-vv", "-p", "no:cacheprovider", *limit, *tests]
+    with (folder / "output").open("w+", encoding="utf-8") as output:
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=environment(folder) | {"COLUMNS": "500"},
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            code: int | None = process.wait(_LIMIT)
+        except subprocess.TimeoutExpired:
+            code = None
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    begun = _BEGUN.findall((folder / "output").read_text(encoding="utf-8", errors="replace"))
+    if code == 0 or (code is None and begun):
+        return "survived", ""
+    return "killed", begun[-1][0] if begun else "the import"
+
+
+def run_kept(results: Path, reference: Sequence[Row], jobs: int = 1) -> list[Row]:
+    """Give every kept mutant without a verdict its verdict in a file of results, and return all rows."""
+    new = [row | dict.fromkeys(("verdict", "seconds", "test"), "") for row in reference]
+    rows = read_rows(results) if results.exists() else new
+    left = [row for row in rows if not row["verdict"]]
+    mutants = {id(row): applied(row) for row in left}
+    with tempfile.TemporaryDirectory(prefix="mutation-") as temporary:
+        folder = copy_checkout(Path(temporary, "copy"))
+        tests = sorted({test for mutant in mutants.values() if mutant for test in tests_of(mutant.file)})
+        seconds = _baseline(tests, folder, jobs) if tests else {}
+        for n, row in enumerate(left, 1):
+            began, mutant = time.monotonic(), mutants[id(row)]
+            if mutant is None:
+                row["verdict"] = "no longer applies"
+            else:
+                (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
+                row["verdict"], row["test"] = _verdict(mutant, folder, seconds)
+                shutil.copy2(ROOT / mutant.file, folder / mutant.file)
+                row["seconds"] = f"{time.monotonic() - began:.0f}"
+            _write_rows(results, rows)
+            click.echo(
+                f"{n}/{len(left)} {row['verdict']} {row['seconds']} s: {row['file']}:{row['line']} {row['test']}"
+            )
+    return rows
+
+
+def _compare(rows: Sequence[Row], reference: Sequence[Row]) -> bool:
+    """Print the verdicts, and those that have changed. Return True if all that were killed still are."""
+    for verdict, number in Counter(row["verdict"] for row in rows).items():
+        click.echo(f"{number} of {len(rows)}: {verdict}")
+    lost = [now for was, now in zip(reference, rows, strict=True) if (was["verdict"], now["verdict"]) == _LOST]
+    for row in lost:
+        click.echo(f"was killed: {row['file']}:{row['line']}\n    - {row['before']}\n    + {row['after']}")
+    return not lost
+
+
+_LOST = ("killed", "survived")
+
+
 @click.command()
 @click.option("--sample", type=click.IntRange(1), default=60, show_default=True, help="The number of mutants.")
 @click.option("--seed", type=int, help="The seed of the sample (default: year and ISO week, e.g. 202607).")
 @click.option(
     "--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, help="Tests at once (default: processors)."
 )
-def main(sample: int, seed: int | None, jobs: int) -> None:
-    """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants."""
+@click.option("--keep", is_flag=True, help="Write the sample to verification/mutants.csv, and run nothing.")
+@click.option("--kept", "is_kept", is_flag=True, help="Run the kept mutants that have no verdict yet.")
+@click.option("--results", type=click.Path(path_type=Path), default=KEPT, help="Where --kept writes its verdicts.")
+def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, results: Path) -> None:
+    """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants.
+
+    With --kept, exit with 1 when a mutant survives that was killed before. The mutants run one at a time.
+    """
+    if is_kept:
+        reference = read_rows(KEPT)
+        sys.exit(0 if _compare(run_kept(results, reference, jobs), reference) else 1)
     year, week, _ = datetime.now(timezone.utc).isocalendar()
     seed = 100 * year + week if seed is None else seed
     click.echo(f"{sample} mutants with seed {seed}")
     mutants = list(islice(draw(seed), sample))
+    if keep:
+        _write_rows(KEPT, sorted((kept(mutant) for mutant in mutants), key=lambda row: (row["file"], int(row["line"]))))
+        return
     left = survivors(mutants, jobs)
     for mutant in left:
-        click.echo(f"{mutant.file}:{mutant.line}\n    - {mutant.before}\n    + {mutant.after}")
+        click.echo(f"{mutant.file}:{mutant.line}\n    - {mutant.before.strip()}\n    + {mutant.after.strip()}")
     killed = 1.0 - len(left) / len(mutants)
     click.echo(f"{100.0 * killed:.0f} % of the mutants are killed; at least {100.0 * LEAST:.0f} % must be")
     sys.exit(0 if killed >= LEAST else 1)

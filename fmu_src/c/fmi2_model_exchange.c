@@ -3,7 +3,7 @@
 FMI2_Export fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
     OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2EnterEventMode, MAY_MEET_EVENTS);
-    return (fmi2Status)enter(f, EVENT);
+    return (fmi2Status)enter_events(f);
 }
 
 FMI2_Export fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo)
@@ -20,7 +20,7 @@ FMI2_Export fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi
 FMI2_Export fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 {
     OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2EnterContinuousTimeMode, MAY_UPDATE);
-    return (fmi2Status)enter(f, CONTINUOUS);
+    return (fmi2Status)leave_events(f);
 }
 
 FMI2_Export fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
@@ -29,9 +29,11 @@ FMI2_Export fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean 
     OPEN(fmi2CompletedIntegratorStep, MAY_INTEGRATE);
     (void)noSetFMUStatePriorToCurrentPoint;
     GIVEN(enterEventMode != NULL && terminateSimulation != NULL, "enterEventMode or terminateSimulation");
-    const outcome completed = complete_step(f);
+    bool event;
+    const outcome completed = complete_step(f, &event);
     if (completed == DONE) {
-        *enterEventMode = *terminateSimulation = fmi2False;
+        *enterEventMode = event ? fmi2True : fmi2False;
+        *terminateSimulation = fmi2False;
     }
     return (fmi2Status)completed;
 }

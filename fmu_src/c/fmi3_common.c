@@ -132,7 +132,8 @@ FMI3_Export fmi3Status fmi3EnterEventMode(fmi3Instance instance)
     if (f->now.mode == STEP && !f->host.uses_events) {
         return (fmi3Status)refuse_events(f);
     }
-    return (fmi3Status)enter(f, EVENT);
+    warn_in(f, EVENT, EVENT_ENTERED_AGAIN);
+    return (fmi3Status)enter_events(f);
 }
 
 FMI3_Export fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)

@@ -3,7 +3,7 @@
 FMI3_Export fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
     OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3EnterContinuousTimeMode, MAY_UPDATE);
-    return (fmi3Status)enter(f, CONTINUOUS);
+    return (fmi3Status)leave_events(f);
 }
 
 FMI3_Export fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
@@ -12,9 +12,11 @@ FMI3_Export fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Bo
     OPEN(fmi3CompletedIntegratorStep, MAY_INTEGRATE);
     (void)noSetFMUStatePriorToCurrentPoint;
     GIVEN(enterEventMode != NULL && terminateSimulation != NULL, "enterEventMode or terminateSimulation");
-    const outcome completed = complete_step(f);
+    bool event;
+    const outcome completed = complete_step(f, &event);
     if (completed == DONE) {
-        *enterEventMode = *terminateSimulation = false;
+        *enterEventMode = event;
+        *terminateSimulation = false;
     }
     return (fmi3Status)completed;
 }
@@ -68,6 +70,7 @@ FMI3_Export fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, 
         OPEN_FOR(TYPE_MODEL_EXCHANGE, function, MAY_COUNT);              \
         GIVEN(name != NULL, #name);                                      \
         *name = number;                                                  \
+        warn_in(f, CONTINUOUS, COUNTED_LATE);                            \
         return fmi3OK;                                                   \
     }
 

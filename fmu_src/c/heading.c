@@ -1,10 +1,20 @@
-/* The heading of a vehicle with an attitude, which is followed through every piece of a step, so that it counts turns. */
+/* The attitude of a vehicle that rolls or pitches, followed through every piece of a step. Two things depend on the whole
+ * motion: how often the heading has turned, and which of its two signs the quaternion has.
+ *
+ * Where the nose passes the vertical, the heading jumps by half a turn, to the one side or the other. Rounding must not
+ * choose the side, so turns are counted for a direction that points 1e-6 rad beside the nose. */
 
 #define TWO_PI 6.283185307179586
 
+/* The direction in the body frame: ahead, to starboard, down. It lies in no plane in which a vehicle is likely to turn. */
+static const double BESIDE_NOSE[3] = {1.0, 1e-6, 0.618e-6};
+
+enum { MOST_PARTS = 4096 }; /* of a piece, between which the heading is computed */
+
 static double series_change(const series *s, int i, double t);
 
-typedef double angle_at(const void *motion, double t);
+/* Compute the rotation matrix among the states of the table at time t of a motion. */
+typedef void rotation_at(const void *motion, double t, double y[N_SERIES]);
 
 /* Return the angle that differs from an angle by whole turns and is the nearest to another one. */
 static double unwrapped(double angle, double near)
@@ -12,70 +22,94 @@ static double unwrapped(double angle, double near)
     return angle + TWO_PI * floor((near - angle) / TWO_PI + 0.5);
 }
 
-/* Follow an angle from t to `end`, and return its unwrapped end. In between, the vehicle must turn by at most 1 rad about any
- * axis. The heading itself turns faster where the nose points nearly upward or downward, so the time is halved until the
- * heading changes by at most 1 rad. */
-static double followed(angle_at *at, const void *motion, double t, double end, double angle, int depth)
+/* Compute the horizontal part, north and east, of the direction beside the nose. Each row has three entries of the rotation matrix. */
+static void beside_nose(const double row_1[3], const double row_2[3], double horizontal[2])
 {
-    const double after = unwrapped(at(motion, end), angle), middle = 0.5 * (t + end);
-    if (!(fabs(after - angle) > 1.0) || depth == 0) { /* also when it overflows */
-        return after;
+    horizontal[0] = horizontal[1] = 0.0;
+    for (int i = 2; i >= 0; i--) {
+        horizontal[0] += BESIDE_NOSE[i] * row_1[i];
+        horizontal[1] += BESIDE_NOSE[i] * row_2[i];
     }
-    angle = followed(at, motion, t, middle, angle, depth - 1);
-    return followed(at, motion, middle, end, angle, depth - 1);
 }
 
-/* Follow an angle from 0 to `end`, while the vehicle turns by at most `turn`. */
-static double followed_in_parts(angle_at *at, const void *motion, double end, double turn, double angle)
+/* Follow the attitude from time 0 to `end`. Per unit of time, the vehicle turns by at most `turn`, and the direction beside the
+ * nose by at most `swing`. In each part of this time, the direction moves by less than its distance from the vertical, so that
+ * its heading is that of the same turn; and the vehicle turns by less than half a turn, so that its quaternion has the sign
+ * that is nearer to the one before. */
+static void attitude_follow(rotation_at *at, const void *motion, double end, double turn, double swing, double state[N_STATES],
+                            double *heading)
 {
-    const int parts = (int)fmin(fmax(ceil(turn), 1.0), 10000.0);
-    for (int i = 0; i < parts; i++) {
-        angle = followed(at, motion, end * i / parts, end * (i + 1) / parts, angle, 40);
+    const double shortest = end / (double)MOST_PARTS;
+    double y[N_SERIES], horizontal[2], t = 0.0;
+    at(motion, t, y);
+    for (int n = 1; t < end; n++) {
+        beside_nose(&y[Y_R_11], &y[Y_R_21], horizontal);
+        const double distance = sqrt(horizontal[0] * horizontal[0] + horizontal[1] * horizontal[1]);
+        const double part = fmin(0.9 * distance / swing, 2.0 / turn);
+        t = n < MOST_PARTS ? fmin(t + fmax(part, shortest), end) : end;
+        at(motion, t, y);
+        model_attitude(y, state);
+        beside_nose(&y[Y_R_11], &y[Y_R_21], horizontal);
+        *heading = unwrapped(atan2(horizontal[1], horizontal[0]), *heading);
     }
-    return angle;
 }
 
-static double heading_in_piece(const void *motion, double t)
+static void rotation_in_piece(const void *motion, double t, double y[N_SERIES])
 {
     const series *const s = (const series *)motion;
-    return atan2(s->c[0][Y_R_21] + series_change(s, Y_R_21, t), s->c[0][Y_R_11] + series_change(s, Y_R_11, t));
-}
-
-/* Follow the heading through a piece of a step. */
-static double heading_after_piece(const series *s, double length, double heading)
-{
-    double turn = 0.0; /* an upper bound of the sum of the integrals of the angular velocities */
-    for (int i = FIRST_ROTATION; i < N_MONITORED; i++) {
-        double power = length * s->unit;
-        for (int n = 0; n <= s->order; n++, power *= length) {
-            turn += fabs(s->c[n][i]) * power;
-        }
+    for (int i = 0; i < N_ROTATION; i++) {
+        y[ROTATION[i]] = s->c[0][ROTATION[i]] + series_change(s, ROTATION[i], t);
     }
-    return followed_in_parts(heading_in_piece, s, length, turn, heading);
 }
 
-/* A rotation with constant velocities. At the angle a, the first column of R is y + sin(a) along + (1 - cos(a)) across. */
+/* Follow the attitude through a piece of a step. */
+static void attitude_after_piece(const series *s, double length, double state[N_STATES], double *heading)
+{
+    double turn = 0.0, swing = 0.0;
+    for (int i = FIRST_ROTATION; i < N_MONITORED; i++) {
+        double size = 0.0; /* an upper bound of the angular velocity */
+        for (int n = s->order; n >= 0; n--) {
+            size = size * length + fabs(s->c[n][i]);
+        }
+        turn += size * s->unit;
+        swing += (i == ROLL ? 2.0 * BESIDE_NOSE[1] : 1.0) * size * s->unit;
+    }
+    attitude_follow(rotation_in_piece, s, length, turn, swing, state, heading);
+}
+
+/* A rotation with constant velocities. At the angle a, the rotation matrix is start + sin(a) along + (1 - cos(a)) across. */
 typedef struct {
-    double y[2], along[2], across[2]; /* of R_11 and R_21 */
+    double start[N_SERIES], along[N_SERIES], across[N_SERIES];
 } circle;
 
-static double heading_on_circle(const void *motion, double angle)
+static void rotation_on_circle(const void *motion, double angle, double y[N_SERIES])
 {
     const circle *const c = (const circle *)motion;
-    const double half = sin(0.5 * angle), s = sin(angle);
-    double R[2];
-    for (int i = 0; i < 2; i++) {
-        R[i] = c->y[i] + s * c->along[i] + 2.0 * half * half * c->across[i];
+    const double half = sin(0.5 * angle), whole = sin(angle);
+    for (int i = 0; i < N_SERIES; i++) {
+        y[i] = c->start[i] + whole * c->along[i] + 2.0 * half * half * c->across[i];
     }
-    return atan2(R[1], R[0]);
 }
 
-/* Follow the heading through a rotation with constant velocities. Every whole turn changes it by the same
- * angle. */
-static double heading_after_circle(const circle *c, double angle, double heading)
+/* Follow the attitude through a rotation with constant velocities. Every whole turn changes the heading by the same angle, and
+ * the sign of the quaternion. */
+static void attitude_after_circle(const circle *c, double angle, double state[N_STATES], double *heading)
 {
-    const double turns = floor(angle / TWO_PI);
-    const double one = followed_in_parts(heading_on_circle, c, TWO_PI, TWO_PI, heading);
-    heading += turns * (one - heading);
-    return followed_in_parts(heading_on_circle, c, angle - turns * TWO_PI, TWO_PI, heading);
+    const double turns = floor(angle / TWO_PI), before = *heading;
+    double swing = 0.0, once[N_STATES];
+    for (int row = 0; row < 3; row++) {
+        double rate = 0.0;
+        for (int i = 0; i < 3; i++) {
+            rate += BESIDE_NOSE[i] * c->along[ROTATION[3 * row + i]];
+        }
+        swing += rate * rate;
+    }
+    swing = sqrt(swing);
+    memcpy(once, state, sizeof once);
+    attitude_follow(rotation_on_circle, c, TWO_PI, 1.0, swing, once, heading);
+    *heading = before + turns * (*heading - before);
+    if (turns != 2.0 * floor(0.5 * turns)) { /* an odd number */
+        memcpy(state, once, sizeof once);
+    }
+    attitude_follow(rotation_on_circle, c, angle - turns * TWO_PI, 1.0, swing, state, heading);
 }

@@ -9,6 +9,14 @@ static outcome enter(fmu *f, lifecycle mode)
     return DONE;
 }
 
+/* Warn once of a call that was done in a mode in which the standard does not allow it. */
+static void warn_in(fmu *f, lifecycle mode, int what)
+{
+    if (f->now.mode == mode) {
+        WARN_ONCE(f, what, "done, although the standard does not allow this call in %s; logged once.", mode_name(mode));
+    }
+}
+
 /* Refuse the call unless `exist` is true. `names` are the arguments in the message. */
 static outcome check_not_null(fmu *f, bool exist, const char *names)
 {
@@ -53,6 +61,10 @@ static fmu *instantiate(const char *function, const host *callbacks, const char 
     if (token == NULL || strcmp(token, MODEL_TOKEN) != 0) {
         REJECT(callbacks, shown, function, logging_on, "the " TOKEN_NAME " %s is not that of this binary, %s.",
                token == NULL ? "NULL" : token, MODEL_TOKEN);
+    }
+    if (!(type == TYPE_MODEL_EXCHANGE ? HAS_MODEL_EXCHANGE : HAS_CO_SIMULATION)) {
+        REJECT(callbacks, shown, function, logging_on, "this FMU is for %s only.",
+               HAS_CO_SIMULATION ? "Co-Simulation" : "Model Exchange");
     }
     fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(shown) + 1);
     if (f == NULL) {
@@ -100,7 +112,11 @@ static outcome set_up(fmu *f, double start_time, bool stop_defined, double stop)
 
 static outcome initialize(fmu *f)
 {
-    REQUIRE(f->now.experiment_defined, "fmi2SetupExperiment comes first.");
+    if (!f->now.experiment_defined) {
+        WARN_ONCE(f, NOT_SET_UP, "done without fmi2SetupExperiment, which the standard requires; the simulation begins at t = 0 "
+                  "and has no stopTime. Logged once.");
+        f->now.experiment_defined = true;
+    }
     return enter(f, INITIALIZATION);
 }
 
@@ -112,9 +128,7 @@ static outcome run(fmu *f)
 
 static outcome terminate(fmu *f)
 {
-    if (f->now.mode == INITIALIZATION) {
-        WARN_ONCE(f, ENDED_EARLY, "done, although the standard does not allow this call in Initialization Mode.");
-    }
+    warn_in(f, INITIALIZATION, ENDED_EARLY);
     return enter(f, TERMINATED);
 }
 
@@ -163,28 +177,8 @@ static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
     for (size_t i = 0; i < n; i++) {
         value[i] = *variable(f, place_of(vr[i]));
     }
-    if (f->now.mode == INSTANTIATED) {
-        WARN_ONCE(f, READ_EARLY, "done, although the standard does not allow this call before initialization; logged once.");
-    }
+    warn_in(f, INSTANTIATED, READ_EARLY);
     return DONE;
-}
-
-/* Return true when a variable of this kind may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections
- * 2.4.7.4 and 4.2.1). Two more calls are allowed because importers make them: inputs before initialization, and
- * parameters between the steps of an integrator. */
-static bool may_set(const fmu *f, variable_kind kind)
-{
-    switch (f->now.mode) {
-    case INSTANTIATED:
-    case INITIALIZATION: return kind != CALCULATED && kind != CALCULATED_STATE && kind != MEMORY;
-    case EVENT: return kind == INPUT || kind == TUNABLE || ((kind == STATE || kind == CALCULATED_STATE) && EVENTS_SET_STATES);
-    case STEP: return kind == INPUT || kind == TUNABLE;
-    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == CALCULATED_STATE || kind == TUNABLE;
-    case INTERMEDIATE: return kind == INPUT;
-    case TERMINATED:
-    case FAILED: break;
-    }
-    return false;
 }
 
 /* Return true when a variable is a command that changes only in events, because it acts after a dead time. */
@@ -193,11 +187,71 @@ static bool is_discrete(unsigned place)
     return HAS_DEAD_TIME && place < N_COMMANDS;
 }
 
+/* Return true when a variable may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and
+ * 4.2.1). More calls are allowed because importers make them: inputs before initialization, and between the steps of an
+ * integrator parameters and commands that are discrete. */
+static bool may_set(const fmu *f, unsigned place)
+{
+    const variable_kind kind = VARIABLES[place].kind;
+    switch (f->now.mode) {
+    case INSTANTIATED: return kind != CALCULATED && kind != MEMORY;
+    case INITIALIZATION: return kind != CALCULATED && kind != CALCULATED_STATE && kind != MEMORY;
+    case EVENT: return kind == INPUT || kind == TUNABLE || ((kind == STATE || kind == CALCULATED_STATE) && EVENTS_SET_STATES);
+    case STEP: return kind == INPUT || kind == TUNABLE;
+    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == CALCULATED_STATE || kind == TUNABLE;
+    case INTERMEDIATE: return kind == INPUT && !is_discrete(place);
+    case TERMINATED:
+    case FAILED: break;
+    }
+    return false;
+}
+
+/* Return true when a value is the one that a variable has already. Importers set parameters and start values again. */
+static bool is_repeated(const fmu *f, unsigned place, double value)
+{
+    const variable_kind kind = VARIABLES[place].kind;
+    return kind != CALCULATED && kind != MEMORY && value == f->now.values[place];
+}
+
 /* Return true when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts
  * itself: section 2.4.7.4 asks for it, and section 4.2.1 does not. */
 static bool is_for_event_mode(const fmu *f)
 {
     return f->now.mode == CONTINUOUS || (f->now.mode == STEP && has_event_mode(&f->host));
+}
+
+/* Compute the attitude at the start. It replaces a quaternion that is among the values that were set. */
+static void replace_guess(fmu *f, const unsigned vr[], size_t n, const double value[])
+{
+    model_begin(f->now.values, &f->now.heading);
+    for (size_t i = 0; i < n; i++) {
+        const unsigned place = place_of(vr[i]);
+        if (VARIABLES[place].kind == CALCULATED_STATE && value[i] != f->now.values[place]) {
+            WARN_ONCE(f, GUESSED, "%s = %.15g is replaced by %.15g, because phi_0, theta_0 and psi_0 determine the attitude at "
+                      "the start. Logged once.", VARIABLES[place].name, value[i], f->now.values[place]);
+        }
+    }
+}
+
+/* Return true when a command is a pulse width of 0: there is no signal. A command that is a fraction may be 0. */
+static bool is_no_signal(unsigned place, double value)
+{
+    return place < N_COMMANDS && value == 0.0 && VARIABLES[place].minimum > 0.0;
+}
+
+/* Warn about a voltage for each curve whose tables do not reach it. */
+static void check_voltage(fmu *f, double voltage)
+{
+#if N_VOLTAGE_RANGES
+    for (int i = 0; i < N_VOLTAGE_RANGES; i++) {
+        const double low = VOLTAGE_RANGES[i].minimum, high = VOLTAGE_RANGES[i].maximum;
+        if (voltage < low || voltage > high) {
+            WARN_ONCE(f, VOLTAGE_BEYOND + i, "voltage = %.15g saturates at %g for the thrust curve %s; logged once.", voltage,
+                      voltage < low ? low : high, VOLTAGE_RANGES[i].curves);
+        }
+    }
+#endif
+    (void)f, (void)voltage;
 }
 
 static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double value[])
@@ -210,8 +264,8 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
                 HAS_TIME && place == TIME ? " to be set" : "");
         const variable_info *const info = &VARIABLES[place];
         const double old = f->now.values[place];
-        REQUIRE(may_set(f, info->kind) && !(is_discrete(place) && (f->now.mode & (CONTINUOUS | INTERMEDIATE)) != 0),
-                "%s must not be set in %s.", info->name, mode_name(f->now.mode));
+        REQUIRE(may_set(f, place) || is_repeated(f, place, value[i]), "%s must not be set in %s.", info->name,
+                mode_name(f->now.mode));
         if (!isfinite(value[i])) {
             DISCARD(f, "%s = %g is not a finite number; it stays %.15g.", info->name, value[i], old);
         }
@@ -226,8 +280,21 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
     for (size_t i = 0; i < n; i++) {
         const unsigned place = place_of(vr[i]);
         const variable_info *const info = &VARIABLES[place];
+        if (!may_set(f, place)) {
+            WARN_ONCE(f, SET_AGAIN, "%s must not be set in %s, but it has this value already; logged once.", info->name,
+                      mode_name(f->now.mode));
+            continue;
+        }
         f->now.values[place] = value[i];
-        if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
+        if (is_discrete(place) && f->now.mode == CONTINUOUS) {
+            WARN_ONCE(f, COMMANDED_BETWEEN_EVENTS, "%s is set, although the standard requires Event Mode for this; it is sent "
+                      "when the integrator completes its step. Logged once.", info->name);
+        }
+        if (is_no_signal(place, value[i])) {
+            WARN_ONCE(f, NO_SIGNAL, "%s = 0 means that there is no signal: it acts as neutral; logged once.", info->name);
+        } else if (place == VOLTAGE) {
+            check_voltage(f, value[i]);
+        } else if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
             WARN_ONCE(f, place, "%s = %.15g saturates at %g; logged once.", info->name, value[i],
                       value[i] < info->minimum ? info->minimum : info->maximum);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
@@ -237,9 +304,9 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
     }
     if (coefficient) {
         model_prepare(f->now.values, &f->numbers);
-        if (f->now.mode == INSTANTIATED || f->now.mode == INITIALIZATION) {
-            model_begin(f->now.values, &f->now.heading);
-        }
+    }
+    if (f->now.mode == INSTANTIATED || f->now.mode == INITIALIZATION) {
+        replace_guess(f, vr, n, value);
     }
     return DONE;
 }
@@ -269,18 +336,56 @@ static outcome set_states(fmu *f, const double x[], size_t n)
     return DONE;
 }
 
-/* Count the turns of the heading at the end of an integrator's step. */
-static outcome complete_step(fmu *f)
+/* Send the present commands, if they differ from those sent before. *sends becomes true if they do. */
+static outcome send_commands(fmu *f, bool *sends)
 {
+    *sends = false;
+#if HAS_DEAD_TIME
+    *sends = delay_differs(&f->now.line, f->now.values);
+    REQUIRE(delay_send(&f->now.line, f->now.values),
+            "too many changes of commands wait for the dead time at t = %g.", f->now.time);
+#endif
+    (void)f;
+    return DONE;
+}
+
+/* Count the turns of the heading at the end of an integrator's step, and send the commands that were set since the last one.
+ * *event becomes true when an event has to follow: commands were sent, and the importer does not know yet when they arrive, or
+ * it has passed the time at which others arrive. */
+static outcome complete_step(fmu *f, bool *event)
+{
+    double heading = f->now.heading;
     if (HAS_ATTITUDE) {
-        calculate(f);
-        const double heading = model_heading(f->now.values);
+        heading = model_heading(f->now.values, heading);
         if (!isfinite(heading)) {
             DISCARD(f, "psi is not a finite number; the heading stays %.15g.", f->now.heading);
         }
-        f->now.heading = heading;
     }
+    TRY(send_commands(f, event));
+#if HAS_DEAD_TIME
+    *event = *event || (f->now.line.waiting > 0 && delay_acts(f->now.line.remaining[0], f->now.time));
+#endif
+    f->now.heading = heading;
     return DONE;
+}
+
+/* Enter Event Mode. The commands that a solver has tried since the last completed step leave no trace. */
+static outcome enter_events(fmu *f)
+{
+#if HAS_DEAD_TIME
+    if (f->now.mode == CONTINUOUS) {
+        memcpy(f->now.values, delay_sent(&f->now.line, f->now.values), N_COMMANDS * sizeof f->now.values[0]);
+    }
+#endif
+    return enter(f, EVENT);
+}
+
+/* Leave Event Mode for Continuous-Time Mode. The commands that were set in the last event count as sent in it. */
+static outcome leave_events(fmu *f)
+{
+    bool sends;
+    TRY(send_commands(f, &sends));
+    return enter(f, CONTINUOUS);
 }
 
 static outcome check_state_array(fmu *f, const double to[], size_t n)
@@ -333,11 +438,11 @@ static outcome update_discrete(fmu *f, bool *has_next, double *next)
 #if HAS_DEAD_TIME
     if (f->now.type == TYPE_MODEL_EXCHANGE) {
         delay_line *const line = &f->now.line;
-        REQUIRE(delay_send(line, f->now.values, f->now.time),
-                "too many changes of commands wait for the dead time at t = %g.", f->now.time);
+        bool sends;
+        TRY(send_commands(f, &sends));
         delay_receive(line, f->now.values, f->now.time);
         *has_next = line->waiting > 0;
-        *next = *has_next ? line->time[0] : 0.0;
+        *next = *has_next ? fmin(f->now.time + line->remaining[0], DBL_MAX) : 0.0;
     }
 #endif
     (void)f;
@@ -349,7 +454,11 @@ static outcome update_discrete(fmu *f, bool *has_next, double *next)
 static outcome set_time(fmu *f, double time)
 {
     REQUIRE(isfinite(time), "time = %g is not a finite number.", time);
+#if HAS_DEAD_TIME
+    delay_pass(&f->now.line, fmin(fmax(time - f->now.time, -1e300), 1e300)); /* the difference may overflow */
+#endif
     f->now.time = time;
+    warn_in(f, EVENT, TIME_SET_IN_EVENT);
     return DONE;
 }
 
@@ -470,14 +579,10 @@ static outcome check_step(fmu *f, double t, double h)
     return DONE;
 }
 
-/* Warn when a step from t does not begin at `time`, the time of the FMU. The changes that wait for the dead time are shifted by
- * the difference. */
+/* Warn when a step from t does not begin at `time`, the time of the FMU. */
 static void follow_jump(fmu *f, double time, double t, double h)
 {
     if (fabs(t - time) > time_tolerance(time, h)) {
-#if HAS_DEAD_TIME
-        delay_move(&f->now.line, t - time);
-#endif
         WARN_ONCE(f, TIME_JUMPED, "the step from t = %.15g does not begin at t = %.15g, the time of the FMU; "
                   "it begins at the state of the FMU. Logged once.", t, time);
     }
@@ -492,8 +597,8 @@ static outcome advance(fmu *f, double t, double h, int *cuts)
     *cuts += pieces - 1;
     if (pieces == 0 || *cuts >= MOST_PIECES) {
         f->now.mode = FAILED;
-        FAIL(f, "the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; the state from before is kept.",
-             h, t, (int)MOST_PIECES);
+        FAIL(f, "the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; take shorter steps. The state from "
+             "before is kept.", h, t, (int)MOST_PIECES);
     }
     if (!all_finite(next, N_STATES)) {
         f->now.mode = FAILED;

@@ -73,8 +73,24 @@ typedef struct {
 } fmu_state;
 
 /* The warnings that an instance gives once. The first ones are about inputs that saturate, each at the place of the input. The
- * others are about calls that the standard does not allow but importers make. */
-enum { READ_EARLY = FIRST_STATE, TUNED_BETWEEN_EVENTS, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
+ * next ones are about harmless calls that the standard does not allow but importers make, about an attitude that is only a
+ * guess, about a pulse of 0, and about a voltage beyond the range of curves, one for each range. */
+enum {
+    NOT_SET_UP = FIRST_STATE,
+    READ_EARLY,
+    GUESSED,
+    SET_AGAIN,
+    TUNED_BETWEEN_EVENTS,
+    COMMANDED_BETWEEN_EVENTS,
+    TIME_SET_IN_EVENT,
+    EVENT_ENTERED_AGAIN,
+    COUNTED_LATE,
+    ENDED_EARLY,
+    TIME_JUMPED,
+    NO_SIGNAL,
+    VOLTAGE_BEYOND,
+    N_WARNINGS = VOLTAGE_BEYOND + N_VOLTAGE_RANGES
+};
 
 typedef struct {
     host host;            /* the callbacks of the importer */

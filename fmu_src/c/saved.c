@@ -4,7 +4,7 @@
  * values, the changes of commands that wait for the dead time, checksum. Each number has its least
  * significant byte first. */
 #if HAS_DEAD_TIME
-enum { N_DELAY_WORDS = 1 + MOST_WAITING * (1 + N_COMMANDS) };
+enum { N_DELAY_WORDS = 1 + MOST_WAITING * (2 + N_COMMANDS) };
 #else
 enum { N_DELAY_WORDS = 0 };
 #endif
@@ -63,7 +63,8 @@ static void put_line(unsigned char **to, const delay_line *line)
 #if HAS_DEAD_TIME
     put_word(to, (uint64_t)line->waiting);
     for (int n = 0; n < MOST_WAITING; n++) {
-        put_double(to, n < line->waiting ? line->time[n] : 0.0);
+        put_double(to, n < line->waiting ? line->remaining[n] : 0.0);
+        put_double(to, n < line->waiting ? line->lost[n] : 0.0);
         for (int i = 0; i < N_COMMANDS; i++) {
             put_double(to, n < line->waiting ? line->commands[n][i] : 0.0);
         }
@@ -74,7 +75,7 @@ static void put_line(unsigned char **to, const delay_line *line)
 }
 
 /* Deserialize the changes of commands that wait for the dead time. Return false unless their number is allowed, all numbers are
- * finite, and the times rise. */
+ * finite, and the times do not fall. */
 static bool get_line(const unsigned char **from, delay_line *line)
 {
     bool valid = true;
@@ -83,8 +84,10 @@ static bool get_line(const unsigned char **from, delay_line *line)
     line->waiting = waiting <= MOST_WAITING ? (int)waiting : 0;
     valid = waiting <= MOST_WAITING;
     for (int n = 0; n < MOST_WAITING; n++) {
-        line->time[n] = get_double(from);
-        valid = valid && isfinite(line->time[n]) && (n == 0 || n >= line->waiting || line->time[n] > line->time[n - 1]);
+        line->remaining[n] = get_double(from);
+        line->lost[n] = get_double(from);
+        valid = valid && isfinite(line->remaining[n]) && isfinite(line->lost[n])
+                && (n == 0 || n >= line->waiting || line->remaining[n] >= line->remaining[n - 1]);
         for (int i = 0; i < N_COMMANDS; i++) {
             line->commands[n][i] = get_double(from);
             valid = valid && isfinite(line->commands[n][i]);

@@ -3,7 +3,9 @@
  * Names in all files of the motion: at are the variables of the vehicle, n the numbers that follow from the parameters, q the
  * numbers that are held during a piece, y the states of the table, m the motion, s the series. */
 
-enum { MOST_PIECES = 10000 }; /* of a step */
+#ifndef MOST_PIECES
+#define MOST_PIECES 1000000 /* of a step. A vehicle that swings without linear drag never settles, and each swing takes a few pieces. */
+#endif
 
 typedef struct {
     const model_numbers *n;
@@ -263,12 +265,12 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 }
 
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
-static bool motion_coasts(motion *m, double rest, double *heading)
+static bool motion_coasts(motion *m, double rest, double state[N_STATES], double *heading)
 {
     if (m->settled != (UINT64_C(1) << N_DYNAMIC) - 1U) {
         return false;
     }
-    model_coast(m->n, &m->q, rest, m->y, m->displacement, heading);
+    model_coast(m->n, &m->q, rest, m->y, m->displacement, state, heading);
     return true;
 }
 
@@ -276,7 +278,7 @@ static bool motion_coasts(motion *m, double rest, double *heading)
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
 static int motion_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
 {
-    const double *const state = at + FIRST_STATE;
+    double state[N_STATES]; /* those at the start, except for the quaternion, which is followed */
     double done = 0.0, lost = 0.0; /* the length of all pieces so far, and its rounding error */
     double rest = h;               /* the time that remains */
     double unit = h;               /* the longest unit of time for the next series */
@@ -286,6 +288,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
     series s;
     memset(&m, 0, sizeof m);
     m.n = n;
+    memcpy(state, at + FIRST_STATE, sizeof state);
     model_start(at, n, &m.q, m.y, m.scale);
     while (++pieces <= MOST_PIECES && unit > 0.0) {
         for (int i = 0; i < N_USED; i++) {
@@ -300,7 +303,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         if (!motion_grow_short(&m, &s)) {
             if (pieces == 1) { /* the step is long, and some states may have settled before it */
                 motion_settle(&m, rest);
-                if (motion_coasts(&m, rest, heading)) {
+                if (motion_coasts(&m, rest, state, heading)) {
                     break;
                 }
                 if (m.settled != 0U) {
@@ -320,7 +323,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
             reversed = series_cut(&s, &length);
         }
         if (HAS_ATTITUDE) {
-            *heading = heading_after_piece(&s, length, *heading);
+            attitude_after_piece(&s, length, state, heading);
         }
         if (length == 1.0) { /* with a constant, the compiler leaves out the multiplications */
             motion_move(&m, &s, 1.0, change);
@@ -345,7 +348,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         if (motion_is_slow(&m, &s, change)) {
             motion_settle(&m, rest);
         }
-        if (motion_coasts(&m, rest, heading)) {
+        if (motion_coasts(&m, rest, state, heading)) {
             break;
         }
     }

@@ -30,7 +30,7 @@ static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
 
 /* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
  * differ by whole turns, the one nearest to psi_0 is taken. */
-static void begin(double at[], const model_numbers *numbers, double *heading)
+static void begin(double at[], double *heading)
 {
     double state[N_STATES];
     const bool is_given = HAS_ATTITUDE && model_has_direction(at + FIRST_STATE);
@@ -38,8 +38,7 @@ static void begin(double at[], const model_numbers *numbers, double *heading)
     model_begin(at, heading);
     if (is_given) {
         memcpy(at + FIRST_STATE, state, sizeof state);
-        model_calculate(at, numbers, *heading);
-        *heading = model_heading(at);
+        *heading = model_heading(at, *heading);
     }
 }
 
@@ -69,7 +68,7 @@ void simulate(const table given[N_VARIABLES], const double *time, const int *rec
             at[i] = number(&given[i], vehicle, 0);
         }
         model_prepare(at, &numbers);
-        begin(at, &numbers, &heading);
+        begin(at, &heading);
         failed[vehicle] = times;
         for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
             for (int i = 0; i < N_INPUTS; i++) {

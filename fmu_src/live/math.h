@@ -14,7 +14,6 @@ IMPORTED(pow) double pow(double x, double y);
 
 #define INFINITY __builtin_inf()
 #define isfinite(x) __builtin_isfinite(x)
-#define ceil(x) __builtin_ceil(x)
 #define floor(x) __builtin_floor(x)
 #define fabs(x) __builtin_fabs(x)
 #define sqrt(x) __builtin_sqrt(x)

@@ -4,8 +4,22 @@
 /**
  * An axis: the names of its velocity, load and position, their units, the commands that drive it with their signs, and the letters
  * of the keys that drive it in its positive and in its negative direction. `shares` are the commands by which the keys drive it.
- * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string,
+ * `quantities` are those of its motion that a recording may have.
+ * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string, quantities: Quantity[],
  *   signs: Record<string, number>, shares: Record<string, number>, keys: string}} Axis
+ */
+/**
+ * A quantity of rov_fmu/tank/catalogue.py: the names of its column, that in a recording of one axis, and those that need a known unit;
+ * how many of each unit make one SI unit; what is subtracted then; and the largest number.
+ * @typedef {{name: string, short: string, also: string[], units: Record<string, number>, offset: number, isPosition: boolean, largest: number}} Quantity
+ */
+/**
+ * The rules by which tables are read, from rov_fmu/tank/readers/tables.py: the pattern of a number; the units of times and commands, and
+ * how many of each make 1 s or full command; the pulses; other names of headers; units of commands with the largest number that shows a
+ * slip and what is wrong then; the largest share of rows out of order; and what shows that a clock began anew.
+ * @typedef {{number: string, times: Record<string, number>, fractions: Record<string, number>,
+ *   pulses: {units: string[], neutral: number, span: number, none: number[]}, renamed: Record<string, string>,
+ *   slips: [string[], number, string][], mostUnordered: number, leastAfter: number, again: number}} Rules
  */
 /**
  * A thruster: the variable of its force, its label, its place and direction in the body frame, its strongest force in N.
@@ -19,7 +33,7 @@
  * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
  * Commands are fractions in the page; `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
  * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
- *   pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
+ *   csv: Rules, pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
  *   tunable: string[], tests: StepTest[], size: number}} Vehicle
  */
 /**

@@ -2,16 +2,6 @@
 
 const MOST_BYTES = 20e6;
 const MOST_ROWS = 200000;
-const MOST_BACK = 0.2; // of the rows: with more of them out of order the time begins anew
-const MOST_POSITION = 1e7; // m, rad
-const MOST_VELOCITY = 1e3; // m/s, rad/s
-/** The factors from units to SI, by the quantity of a column. @type {Record<string, Record<string, number>>} */
-const FACTORS = {
-  s: { s: 1, ms: 0.001 },
-  command: { "%": 0.01, 1: 1 },
-  m: { m: 1, cm: 0.01, mm: 0.001 },
-  rad: { rad: 1, deg: Math.PI / 180 },
-};
 
 /** The end of a message about a missing column. */
 const RENAMING = "if another header stands for it, rename that one: this page does not read [columns] of rov.toml";
@@ -36,13 +26,16 @@ function readRecording(text, name, vehicle) {
     .filter((line) => line.trim() !== "");
   if (lines.length < 3) throw new Unreadable("it has less than two rows below its header");
   if (lines.length > MOST_ROWS) throw new Unreadable(`it has more than ${MOST_ROWS} rows`);
-  const separator = [";", "\t", ","].find((mark) => lines[0].includes(mark));
-  if (separator === undefined) throw new Unreadable("its first line is no header of columns");
-  const headers = lines[0].split(separator).map((cell) => cell.trim().replace(/^"(.*)"$/, "$1"));
+  const marks = [",", ";", "\t"];
+  const separator = marks.reduce((best, mark) => (count(lines[0], mark) > count(lines[0], best) ? mark : best));
+  const headers = cellsOf(lines[0], separator);
+  if (headers.length < 2) throw new Unreadable("its first line is no header of columns");
+  const rules = vehicle.csv;
+  const pattern = new RegExp(`^(?:${rules.number})$`);
   /** @param {string} cell */
   const number = (cell) => {
-    const plain = cell.trim().replace(/^"(.*)"$/, "$1");
-    return plain === "" ? Number.NaN : Number(separator === "," ? plain : plain.replace(",", "."));
+    const plain = separator === "," ? cell : cell.replace(",", ".");
+    return pattern.test(plain) ? Number(plain) : Number.NaN;
   };
   const columns = headers.map((header) => columnOf(header, name, vehicle));
   const time = columns.findIndex((column) => column?.what === "time");
@@ -52,46 +45,50 @@ function readRecording(text, name, vehicle) {
     throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”; ${RENAMING}`);
   }
   const measuring = columns.flatMap((column, n) => (column?.what === "signal" ? [n] : []));
-  const rows = lines
+  const below = lines
     .slice(1)
-    .map((line) => line.split(separator))
-    .filter((cells) => cells.slice(headers.length).every((cell) => cell.trim() === ""))
-    .map((cells) => columns.map((column, n) => (column ? column.convert(number(cells[n] ?? "")) : Number.NaN)))
-    .filter((row) => Number.isFinite(row[time]) && commanding.every((n) => Number.isFinite(row[n])));
-  if (rows.length < 2) throw new Unreadable("no two of its rows have a time and a command");
-  let latest = Number.NEGATIVE_INFINITY;
-  let back = 0;
-  for (const row of rows) {
-    if (row[time] < latest) back += 1;
-    else latest = row[time];
+    .map((line) => cellsOf(line, separator))
+    .filter((cells) => cells.slice(headers.length).every((cell) => cell === ""));
+  for (const [units, most, mistake] of rules.slips) {
+    const own = commanding.filter((n) => units.map(folded).includes(columns[n]?.unit ?? ""));
+    const largest = below.reduce((sum, cells) => {
+      const sizes = own.map((n) => Math.abs(number(cells[n] ?? "")));
+      return Math.max(sum, ...sizes.filter(Number.isFinite));
+    }, 0);
+    if (largest > 0 && largest <= most) throw new Unreadable(mistake);
   }
-  if (back > MOST_BACK * rows.length) {
+  const usable = below
+    .map((cells) =>
+      columns.map((column, n) => (column ? inUnits(column, number(cells[n] ?? ""), cells[n]) : Number.NaN)),
+    )
+    .filter((row) => Number.isFinite(row[time]) && commanding.every((n) => Number.isFinite(row[n])));
+  if (usable.length < 2) throw new Unreadable("no two of its rows have a time and a command");
+  const { starts, back } = restarts(
+    usable.map((row) => row[time]),
+    rules,
+  );
+  if (back > rules.mostUnordered * usable.length) {
     throw new Unreadable("its time goes back, and stays back, as with two logs in one file");
   }
-  const percent = commanding.filter((n) => /\[\s*%\s*\]$/.test(headers[n]));
-  const most = rows.reduce((sum, row) => Math.max(sum, ...percent.map((n) => Math.abs(row[n]))), 0);
-  if (most > 0 && most <= 0.01) {
-    throw new Unreadable("no command passes 1 %: if these are fractions, their unit is [1]");
-  }
+  const rows = usable.slice(0, starts[1]);
   rows.sort((one, other) => one[time] - other[time]);
   const start = rows[0][time];
   if (rows[rows.length - 1][time] - start > 1e5) throw new Unreadable("it lasts longer than a day");
   const signals = measuring.map((n) => {
-    const { axis, isPosition } = /** @type {Column} */ (columns[n]);
+    const { axis, isPosition, largest, rank } = /** @type {Column} */ (columns[n]);
     const values = rows.map((row) => row[n]);
-    if (values.some((value) => Math.abs(value) > (isPosition ? MOST_POSITION : MOST_VELOCITY))) {
+    if (values.some((value) => Math.abs(value) > largest)) {
       throw new Unreadable(`“${headers[n].slice(0, 40)}” has numbers that no vehicle reaches`);
     }
     return {
       axis,
       isPosition,
+      rank,
       values: vehicle.axes[axis].position === "psi" && isPosition ? unwrapped(values) : values,
     };
   });
-  const used = signals.filter(
-    ({ axis, isPosition, values }) =>
-      values.some(Number.isFinite) && (isPosition || !signals.some((other) => other.axis === axis && other.isPosition)),
-  );
+  const known = signals.filter(({ values }) => values.some(Number.isFinite));
+  const used = known.filter(({ axis, rank }) => !known.some((other) => other.axis === axis && other.rank < rank));
   if (used.length === 0) {
     throw new Unreadable(
       `it has no motion of an axis of this vehicle, such as “${vehicle.axes[0].name} velocity [${vehicle.axes[0].unit}]”; ${RENAMING}`,
@@ -116,18 +113,83 @@ function readRecording(text, name, vehicle) {
   };
 }
 
-/** @typedef {{what: "time" | "command" | "signal", axis: number, isPosition: boolean, drives: Record<string, number>,
- *   convert: (x: number) => number}} Column */
+/** @param {string} text @param {string} mark */
+function count(text, mark) {
+  return text.split(mark).length;
+}
+
+/** Returns the cells of a line without their quotation marks. @param {string} line @param {string} separator */
+function cellsOf(line, separator) {
+  const cells = [""];
+  let quoted = false;
+  for (const character of line) {
+    if (character === '"') quoted = !quoted;
+    else if (character === separator && !quoted) cells.push("");
+    else cells[cells.length - 1] += character;
+  }
+  return cells.map((cell) => cell.trim());
+}
+
+/** Returns a number in SI units, from the number or the text of a cell. Only times may be texts. @param {Column} column @param {number} number
+ * @param {string} cell */
+function inUnits(column, number, cell) {
+  return Number.isNaN(number) && column.what === "time" ? seconds(cell ?? "") : column.convert(number);
+}
+
+/** Returns the time since 1970 of a text by ISO 8601, s, or NaN; UTC if it names no offset. @param {string} text */
+function seconds(text) {
+  const parts = /^(\d{4}-\d\d-\d\d)[t ](\d\d:\d\d)(?::(\d\d(?:[.,]\d+)?))?(?:z|([+-]\d\d):?(\d\d))?$/i.exec(text);
+  if (!parts) return Number.NaN;
+  const [, date, minute, second = "0", hours = "+00", minutes = "00"] = parts;
+  return Date.parse(`${date}T${minute}${hours}:${minutes}`) / 1000 + Number(second.replace(",", "."));
+}
+
+/** Returns the rows at which the clock begins: the first, and those from which times go on that are earlier than those before; and the
+ * number of rows that only arrived late. It must equal `restart_rows` of rov_fmu/tank/clocks.py, which says why, and what `_add_pieces`
+ * of rov_fmu/tank/readers/tables.py counts. @param {number[]} times @param {Rules} rules */
+function restarts(times, rules) {
+  const starts = [0];
+  let back = 0;
+  let [first, latest] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  let n = 0;
+  while (n < times.length) {
+    let end = n + 1;
+    if (times[n] < latest) {
+      while (end < times.length && times[end] < latest && times[end] >= times[end - 1]) end += 1;
+      const last = times[end - 1];
+      const before = end - n >= rules.leastAfter ? times.slice(starts[starts.length - 1], n) : [];
+      const again = before.filter((time) => time >= times[n] && time <= last).length;
+      if (before.length > 0 && (again >= rules.again * (end - n) || last < first)) {
+        starts.push(n);
+        [first, latest] = [times[n], last];
+      } else {
+        back += end - n;
+      }
+    }
+    first = Math.min(first, times[n]);
+    latest = Math.max(latest, times[end - 1]);
+    n = end;
+  }
+  return { starts, back };
+}
+
+/** @typedef {{what: "time" | "command" | "signal", unit: string, axis: number, isPosition: boolean, rank: number, largest: number,
+ *   drives: Record<string, number>, convert: (x: number) => number}} Column */
 
 /** Returns the kind of a column by its header, or null for a column that is not used.
  * @param {string} header @param {string} file @param {Vehicle} vehicle @returns {Column | null} */
 function columnOf(header, file, vehicle) {
-  const parts = /^(.*?)\s*\[(.*)\]$/.exec(header);
+  const plain = vehicle.csv.renamed[header] ?? header;
+  if (plain.startsWith("-")) {
+    const column = columnOf(plain.slice(1), file, vehicle);
+    return column && { ...column, convert: (x) => -column.convert(x) };
+  }
+  const parts = /^(.*?)\s*\[(.*)\]$/.exec(plain);
   if (!parts) return null;
-  const [title, unit] = [parts[1].trim().toLowerCase().replace(/\s+/g, " "), parts[2].trim().toLowerCase()];
-  const none = { axis: -1, isPosition: false, drives: {} };
+  const [title, unit] = [parts[1].trim().toLowerCase().replace(/\s+/g, " "), folded(parts[2].trim())];
+  const none = { unit: unit.split(/\s/)[0], axis: -1, isPosition: false, rank: 0, largest: Infinity, drives: {} };
   if (title === "time") {
-    const convert = converter(header, FACTORS.s, unit, false);
+    const convert = converter(header, vehicle.csv.times, unit, false);
     return convert && { ...none, what: "time", convert };
   }
   const { axes, commands } = vehicle;
@@ -144,40 +206,46 @@ function columnOf(header, file, vehicle) {
     }
     const drives = command === undefined ? axes[alone].signs : { [command]: 1 };
     const isShort = command !== undefined && title !== command.toLowerCase();
-    const convert = pulses(unit) ?? converter(header, FACTORS.command, unit, isShort);
+    const convert = special(unit, vehicle.csv) ?? converter(header, vehicle.csv.fractions, unit, isShort);
     return convert && { ...none, what: "command", drives, convert };
   }
-  for (const [axis, { name, velocity, position, positionUnit }] of axes.entries()) {
-    const own = axis === alone;
-    const words = { z: "depth", phi: "roll angle", theta: "pitch angle", psi: "heading" }[position ?? ""];
-    const isPosition = [position, words, `${name} distance`].includes(title) || (own && title === "distance");
-    const isVelocity = [velocity, `${name} velocity`].includes(title) || (own && title === "velocity");
-    if (!isPosition && !isVelocity) continue;
-    const length = isPosition ? unit : unit.replace(/\/s$/, "");
-    const factors = isPosition || length !== unit ? FACTORS[positionUnit] : {};
-    const convert = converter(header, factors, length, title === position || title === velocity);
-    return convert && { what: "signal", axis, isPosition, drives: {}, convert };
+  for (const [axis, { quantities }] of axes.entries()) {
+    for (const [rank, { name, short, also, units, offset, isPosition, largest }] of quantities.entries()) {
+      const isFull = title === name || (axis === alone && title === short);
+      if (!isFull && !also.includes(title)) continue;
+      const convert = converter(header, units, unit, !isFull);
+      if (convert)
+        return { ...none, what: "signal", axis, isPosition, rank, largest, convert: (x) => convert(x) - offset };
+    }
   }
   return null;
 }
 
+/** Returns a unit without differences of case, and with one of the two letters mu. @param {string} unit */
+function folded(unit) {
+  return unit.toLowerCase().replace("\u00b5", "\u03bc");
+}
+
 /** Returns the conversion to SI. It is null for a short name with a foreign unit, such as “v [V]”, which is another quantity.
- * @param {string} header @param {Record<string, number>} factors @param {string} unit @param {boolean} isShort
+ * @param {string} header @param {Record<string, number>} units @param {string} unit @param {boolean} isShort
  * @returns {((x: number) => number) | null} */
-function converter(header, factors, unit, isShort) {
-  if (!Object.hasOwn(factors, unit)) {
+function converter(header, units, unit, isShort) {
+  const known = Object.keys(units).find((name) => folded(name) === unit);
+  if (known === undefined) {
     if (isShort) return null;
     throw new Unreadable(`“${header.slice(0, 40)}” has no unit that this column can have`);
   }
-  return (x) => x * factors[unit];
+  return (x) => x / units[known];
 }
 
-/** Returns the conversion from the pulse of a speed controller, or null for another unit. @param {string} unit */
-function pulses(unit) {
-  const parts = /^[u\u00b5\u03bc]s(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
-  if (!parts) return null;
-  const [neutral, span] = [Number(parts[1] ?? 1500), Number(parts[2] ?? 400)];
-  return (/** @type {number} */ x) => (x === 0 || x === 65535 ? 0 : (x - neutral) / span);
+/** Returns the conversion from the pulse of a speed controller, or from a force with its full command, or null for another unit.
+ * @param {string} unit @param {Rules} rules */
+function special(unit, { pulses }) {
+  const [word, ...numbers] = unit.split(/\s+/);
+  const [first, second] = numbers.length ? numbers.map(Number) : [pulses.neutral, pulses.span];
+  if (["n", "n.m"].includes(word) && numbers.length === 1 && first > 0) return (/** @type {number} */ x) => x / first;
+  if (!pulses.units.map(folded).includes(word) || !(first > 0) || !second) return null;
+  return (/** @type {number} */ x) => (pulses.none.includes(x) ? 0 : (x - first) / second);
 }
 
 /** @param {number} command */

@@ -151,6 +151,9 @@ def _impossible(rov: Rov) -> Iterator[str]:
     for name in (form.axis.coefficient("beta") for form in rov.layout.axes):
         if rov[name] == 0.0:
             yield f"{name} = 0: must be more than 0 for Gazebo, because m/{name} is a mass"
+    thrusters = {thruster.name for thruster in rov.layout.thrusters}
+    for name in (t.name for t in rov.layout.thrusters if f"{t.name}_joint" in thrusters):
+        yield f"thruster.{name}_joint: choose another name for Gazebo, where the joint of {name} has this name"
     if _volume(rov) <= 0.0:
         weight = rov["m_rov"] * _gravity(rov)
         least = "must be less than the weight for Gazebo, because the Buoyancy plugin only pushes upwards"

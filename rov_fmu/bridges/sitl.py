@@ -1,18 +1,19 @@
 """A vehicle as the physics of ArduPilot's simulator: each servo packet moves it on by one frame, and gets a reply."""
 
+import os
 from array import array
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import StringIO
 from math import cos, inf, pi, sin
 from pathlib import Path
 from socket import socket
-from time import thread_time
+from time import monotonic, thread_time
 from typing import Any
 
 from rov_fmu.bridges.sitl_frames import Servos
-from rov_fmu.bridges.sitl_protocol import Kind, Sequence, ServoPacket, reply, servo_packet
+from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.engine.stepper import Stepper
 from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.messages import InputError
@@ -28,6 +29,13 @@ _LEAST_RATE = 20
 _LONGEST_RANGE = 100.0
 """The range of the sensor that measures the distance to the bottom, m."""
 _DATAGRAM = 65536
+_SILENCE = 5.0
+"""The real time without a step after which the autopilot counts as silent, s. It repeats a packet after 1 s."""
+MOST_LOGS = 20
+"""The largest number of logs of one run."""
+MOST_ROWS = 1_000_000
+"""The largest number of rows in the logs of one run, which take about 150 MB."""
+_FULL = f"a run has {MOST_LOGS} logs with {MOST_ROWS:,} rows in all at most: the rest is not logged"
 _usual_fraction = pulses()
 _MOTION = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 _RATES = ("u", "v", "w", "x", "y", "z")
@@ -59,6 +67,8 @@ class Setup:
     """The log to write (CSV). Later flights add a number to its name."""
     log_interval: float = 0.1
     """The time between two rows of the log, s."""
+    force: bool = False
+    """True if logs may replace files that exist."""
 
 
 class Log:
@@ -67,9 +77,10 @@ class Log:
     A row holds the motion at its time, and the mean commands up to the next row.
     """
 
-    def __init__(self, path: Path, setup: Setup) -> None:
+    def __init__(self, setup: Setup, most_rows: int) -> None:
+        """Begin a log, whose rows end after the first `most_rows`."""
         layout = setup.rov.layout
-        self._path, self._interval = path, setup.log_interval
+        self._interval, self._most_rows = setup.log_interval, most_rows
         self._motion = [title for title, axis in _LOGGED.items() if layout.has(axis)]
         self._titles = ["time [s]", *(f"{name} [1]" for name in layout.commands), *self._motion]
         self._rows = array("d")
@@ -83,25 +94,30 @@ class Log:
         self._since += h
         if self._row and self._since < self._interval - 0.5 * h:
             return
-        if self._row:
+        if self._row and self.rows < self._most_rows:
             self._rows.extend([self._row[0], *(total / self._since for total in self._sums), *self._row[1:]])
         self._row = [time, *(motion[title] for title in self._motion)]
         self._sums, self._since = [0.0] * len(fractions), 0.0
 
-    def write(self) -> None:
+    @property
+    def rows(self) -> int:
+        """The number of complete rows."""
+        return len(self._rows) // len(self._titles)
+
+    def write(self, path: Path) -> None:
         """Write all complete rows. Raises WriteError."""
         text, width = StringIO(), len(self._titles)
         print(*self._titles, sep=",", file=text)
         for first in range(0, len(self._rows), width):
             print(*(f"{value:.9g}" for value in self._rows[first : first + width]), sep=",", file=text)
-        write_whole(Output(self._path, text.getvalue().encode()))
+        write_whole(Output(path, text.getvalue().encode()))
 
 
 class Flight:
     """One flight: a vehicle that follows the servo packets of an autopilot."""
 
-    def __init__(self, setup: Setup, number: int = 1) -> None:
-        """Begin at time 0 s. `number` counts the flights from 1. Raises BuildError when there is no engine."""
+    def __init__(self, setup: Setup, most_rows: int) -> None:
+        """Begin at time 0 s, with a log of at most so many rows. Raises BuildError when there is no engine."""
         self._setup, layout = setup, setup.rov.layout
         self._names = [name for name in _MOTION if name in layout.state or name in layout.angles]
         self._names += [f"der({name})" for name in _RATES if name in layout.state]
@@ -114,10 +130,7 @@ class Flight:
             for thruster, curve in layout.curve_of.items()
             if curve.name in currents
         ]
-        path = setup.log
-        if path and number > 1:
-            path = path.with_stem(f"{path.stem}_{number}")
-        self.log = Log(path, setup) if path else None
+        self.log = Log(setup, most_rows) if setup.log and most_rows else None
 
     @property
     def time(self) -> float:
@@ -139,7 +152,7 @@ class Flight:
         try:
             at = dict(zip(self._names, self._stepper.step(commands, h), strict=True))
         except OverflowError as error:
-            raise InputError(f"VEHICLE: {error}: it overflows, or changes too fast") from error
+            raise InputError(f"VEHICLE: {error}: it overflows") from error
         values, motion = self._measured(at)
         if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
             values["battery"] = battery
@@ -207,57 +220,132 @@ class Traffic:
     repeated: int = 0
     """The number of packets that got the last reply again."""
     ignored: int = 0
-    """The number of datagrams that were no servo packets, or came late."""
+    """The number of datagrams that were no servo packets, came late, or came from another sender."""
     restarts: int = 0
     own_time: float = 0.0
     """The processor time from the arrivals of servo packets to the ends of their replies, s."""
 
 
 class Connection:
-    """The flights of a vehicle with an autopilot, which may be started again."""
+    """The flights of a vehicle with one autopilot, which may be started again."""
 
-    def __init__(self, setup: Setup) -> None:
-        """Begin the first flight. Raises BuildError when there is no engine."""
-        self._setup = setup
+    def __init__(
+        self, setup: Setup, hint: Callable[[str], None] = lambda _: None, clock: Callable[[], float] = monotonic
+    ) -> None:
+        """Begin the first flight. Raises BuildError when there is no engine.
+
+        `hint` is called with words for the user, at most once about each matter. `clock` is the real time, s.
+        """
+        self._setup, self._hint, self._clock = setup, hint, clock
+        self._hinted: set[str] = set()
         self._answer = b""
+        self._sender: Address | None = None
+        self._last_step = clock()
+        self._passed = 0.0
+        """The time of the flights that have ended, and of the silences between them, s."""
         self.order = Sequence()
         self.traffic = Traffic()
-        self.flight = Flight(setup)
+        self.logs: list[Path] = []
+        """The logs that are written."""
+        self._number = 0
+        """The number in the name of the last log."""
+        self._rows = 0
+        self.flight = self._begin()
 
-    def answer(self, data: bytes, sender: tuple[Any, ...]) -> bytes:
+    def _begin(self) -> Flight:
+        """Return a new flight. It has no log if the run has as many logs or rows as it may have."""
+        rows = MOST_ROWS - self._rows if len(self.logs) < MOST_LOGS else 0
+        if self._setup.log and not rows:
+            self._say_once(_FULL)
+        return Flight(self._setup, rows)
+
+    def answer(self, data: bytes, sender: Address) -> bytes:
         """Return the reply to a datagram; it is empty if there is none.
 
         Raises InputError if the motion cannot be computed, and WriteError if the log cannot be written.
         """
         packet = servo_packet(data)
-        kind = self.order.kind(packet, sender) if packet else Kind.STRANGE
+        kind = self._kind(packet, sender) if packet else Kind.STRANGE
         if packet is None or kind is Kind.STRANGE:
             self.traffic.ignored += 1
             return b""
         if kind is Kind.REPEATED:
             self.traffic.repeated += 1
             return self._answer
+        self._passed += self._silence()
+        self._last_step = self._clock()
         if kind is Kind.RESTART:
+            self._passed += self.flight.time
             self.write_log()
             self.traffic.restarts += 1
-            self.flight = Flight(self._setup, self.traffic.restarts + 1)
+            self.flight = self._begin()
         self.traffic.frames += 1
         self._answer = self.flight.step(packet)
         return self._answer
 
+    def _kind(self, packet: ServoPacket, sender: Address) -> Kind:
+        """Return what to do with a packet. Only the first sender is followed.
+
+        When it is silent, another one from the same host is the autopilot that was started again.
+        """
+        if self._sender is None or sender == self._sender:
+            kind = self.order.kind(packet)
+        elif sender[0] == self._sender[0] and self._silence() and packet.is_plausible:
+            self.order.restart()
+            self.order.kind(packet)
+            kind = Kind.RESTART
+        else:
+            other, own = (f"{host}:{port}" for host, port, *_ in (sender, self._sender))
+            self._say_once("packets of other senders, such as {}, are ignored, because {} is followed", other, own)
+            return Kind.STRANGE
+        if kind is not Kind.STRANGE:
+            self._sender = sender
+        return kind
+
+    def _say_once(self, words: str, *values: str) -> None:
+        if words not in self._hinted:
+            self._hinted.add(words)
+            self._hint(words.format(*values))
+
+    def _silence(self) -> float:
+        """Return the real time since the last step, s, or 0 if it is too short to be a silence."""
+        silence = self._clock() - self._last_step
+        return silence if silence >= _SILENCE else 0.0
+
+    def _time(self) -> float:
+        """Return the time since the start, s: that of all flights, and the real time of silences."""
+        silence = self._silence() if self._sender else self._clock() - self._last_step
+        return self._passed + self.flight.time + silence
+
     def write_log(self) -> None:
-        """Write the log of the flight, if there is one to write. Raises WriteError."""
-        if self.flight.log:
-            self.flight.log.write()
+        """Write the log of the flight, if it has a complete row, under a name that is free. Raises WriteError."""
+        log, path = self.flight.log, self._setup.log
+        if not (log and path and log.rows):
+            return
+        while True:
+            self._number += 1
+            numbered = path if self._number == 1 else path.with_stem(f"{path.stem}_{self._number}")
+            if self._setup.force or not os.path.lexists(numbered):
+                break
+        log.write(numbered)
+        self.logs.append(numbered)
+        self._rows += log.rows
+        if self._rows >= MOST_ROWS:
+            self._say_once(_FULL)
 
     def serve(self, server: socket, duration: float = inf) -> None:
-        """Answer the datagrams that arrive, for a duration of the flight in seconds.
+        """Answer the datagrams that arrive, until a duration has passed since the start, s.
 
         A reply that cannot be sent is lost, and ArduPilot asks again. Raises what `answer` raises.
         """
-        while self.flight.time < duration - 1e-6:  # the time is a sum of steps, with their rounding
+        port = server.getsockname()[1]
+        while (left := duration - self._time()) > 1e-6:  # the time is a sum of steps, with their rounding
+            server.settimeout(min(left, _SILENCE))
             try:
                 data, sender = server.recvfrom(_DATAGRAM)
+            except TimeoutError:
+                self._say_once("waiting for packets of ArduSub to UDP port {}: start it with --model JSON", str(port))
+                continue
             except ConnectionError:  # Windows reports in this way that nobody received the last reply
                 continue
             begin = thread_time()

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from rov_fmu.io.csv_table import NO_OUTPUT
+
 PORT = 9002
 """The UDP port to which ArduPilot sends its servo packets."""
 _HEAD = struct.Struct("<HHI")
@@ -17,8 +19,10 @@ _CHANNELS = {18458: 16, 29569: 32}
 """The number of channels in a packet, by its magic number."""
 _BODIES = {magic: struct.Struct(f"<{count}H") for magic, count in _CHANNELS.items()}
 _JSON = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
-_MOST_LOST = 1000
+_MOST_LOST = 10
 """A packet whose count has risen by more than this is probably not the next one."""
+_HIGHEST_RATE = 20_000
+_PULSE = range(500, 2501)
 _WRAP = 2**32
 Address = tuple[Any, ...]
 
@@ -32,6 +36,11 @@ class ServoPacket:
     frame_count: int
     pulses: tuple[int, ...]
     """The pulse widths of 16 or 32 channels, µs; 0 stands for no pulse."""
+
+    @property
+    def is_plausible(self) -> bool:
+        """True if an autopilot would send these numbers."""
+        return 0 < self.frame_rate <= _HIGHEST_RATE and all(p in _PULSE or p in NO_OUTPUT for p in self.pulses)
 
 
 def servo_packet(data: bytes) -> ServoPacket | None:
@@ -72,25 +81,44 @@ class Sequence:
     """The count of the last packet that was answered with a step."""
     lost: int = 0
     """The number of counts that were left out."""
-    _sender: Address = ()
+    _is_sure: bool = False
+    """True when the next packet has come after the first one. Until then, any plausible packet may be the first one."""
+    _before: int | None = None
+    """The last count before a jump, until the next packet shows whether the jump was damage."""
     _strange: int | None = field(default=None, repr=False)
 
-    def kind(self, packet: ServoPacket, sender: Address) -> Kind:
+    def kind(self, packet: ServoPacket) -> Kind:
         """Return what to do with a packet.
 
         A packet whose count is older, or much newer, came late or is damaged. It is believed if it comes a second time
-        with no other in between, since ArduPilot repeats a packet that is not answered. An autopilot that is started
-        again counts from 0, usually from another port.
+        with no other in between, since ArduPilot repeats a packet that is not answered. After a jump of the count, the
+        packet that should have come is believed, too. An autopilot that is started again counts from 0.
         """
         count = packet.frame_count
-        ahead = 1 if self.last is None else (count - self.last) % _WRAP
+        if self.last is None or not self._is_sure:
+            if count == self.last:
+                return Kind.REPEATED
+            if not packet.is_plausible:
+                return Kind.STRANGE
+            self._is_sure = self.last is not None and count == (self.last + 1) % _WRAP
+            self.last = count
+            return Kind.NEW
+        ahead = (count - self.last) % _WRAP
         if ahead == 0:
             return Kind.REPEATED
-        restarted = count == 0 and self.last is not None
-        if ahead > _MOST_LOST and count != self._strange and not (restarted and sender != self._sender):
+        is_next = ahead == 1 or (self._before is not None and count == (self._before + 1) % _WRAP)
+        if not is_next and ahead > _MOST_LOST and count != self._strange:
             self._strange = count
             return Kind.STRANGE
+        if is_next:
+            self._before = None
+        elif self._before is None:
+            self._before = self.last
         if ahead <= _MOST_LOST:
             self.lost += ahead - 1
-        self.last, self._sender, self._strange = count, sender, None
-        return Kind.RESTART if restarted and ahead > _MOST_LOST else Kind.NEW
+        self.last, self._strange = count, None
+        return Kind.RESTART if count == 0 and ahead > _MOST_LOST and not is_next else Kind.NEW
+
+    def restart(self) -> None:
+        """Forget which packet is the next one."""
+        self.last, self._is_sure, self._before, self._strange = None, False, None, None

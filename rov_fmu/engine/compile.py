@@ -1,21 +1,26 @@
 """Compile C with the compiler of the ziglang package: the FMU's libraries, the page's module, and the engine."""
 
+import atexit
 import importlib.util
 import os
 import platform
-import signal
 import subprocess
+import sys
+import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from fat_macho import FatWriter
+from platformdirs import user_cache_path
 
+from rov_fmu.io.child_process import cause, kill
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
-from rov_fmu.io.messages import brief
+from rov_fmu.io.messages import MOST, listed
 from rov_fmu.io.paths import FMU_SRC
 
 C_SOURCES = FMU_SRC / "c"
@@ -23,6 +28,9 @@ UNITY_FILE = "fmu.c"
 MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
+_LOCATION_FILE = FMU_SRC / "python" / "location.c"
+PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
+"""The name by which PythonFMU's library for Linux knows itself."""
 # The numbers and their cost depend on these flags: the same rounding on every processor, no errno in the mathematics.
 # LLVM's vectorizer of straight-line code is off, because it does not terminate for the equations of a few vehicles.
 C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-slp-vectorize")
@@ -34,6 +42,11 @@ _MODULE_FLAGS = (
     *("-Os", "-target", "wasm32-freestanding", "-msimd128", "-nostdlib", "-I.", "-Wl,--no-entry"),
     *("-Wno-unused-function", MODULE_FILE),
 )
+_TIME_LIMIT = 900.0
+"""The longest time of one compiler, s. Without a cache, all of them together take a minute on two free processors."""
+_CACHE_VARIABLE = "ZIG_GLOBAL_CACHE_DIR"
+_NO_SPACE = ("No space left on device", "NoSpaceLeft", "FileTooBig", "File too large")
+"""What the compiler prints about a file that it could not write completely."""
 
 
 class BuildError(Exception):
@@ -80,6 +93,13 @@ PLATFORMS: dict[str, Platform] = {
     "darwin64": Platform("x86_64-darwin", ".dylib", "x86_64-macos.11.0", also=_APPLE_SILICON),
     "aarch64-darwin": Platform("aarch64-darwin", ".dylib", _APPLE_SILICON),
 }
+
+INTERFACES = {
+    "cs": ("CoSimulation",),
+    "me": ("ModelExchange",),
+    "both": ("ModelExchange", "CoSimulation"),
+}
+"""The kinds of simulation that an FMU offers, by the value of the option `interface`."""
 
 OTHER_NAMES = {
     **{platform.folder: name for name, platform in PLATFORMS.items()},
@@ -140,6 +160,14 @@ def compile_module(sources: Mapping[str, str]) -> bytes:
     return _side_by_side({MODULE_FILE: partial(_compile_module, sources)})[MODULE_FILE]
 
 
+def compile_location(pythonfmu: bytes) -> bytes:
+    """Compile the library of the Python flavour on Linux, which decodes the location of the resources.
+
+    `pythonfmu` is PythonFMU's library, which must lie beside it. Raises BuildError.
+    """
+    return _side_by_side({_LOCATION_FILE.name: partial(_compile_location, pythonfmu)})[_LOCATION_FILE.name]
+
+
 def engine_flags() -> list[str]:
     """Return the compiler's arguments for the engine. They are those of the FMU, so the numbers are the same."""
     name = host_platform(fmi=3)
@@ -157,8 +185,8 @@ def _side_by_side(
     work: Mapping[str, Callable[["_Compilers"], bytes]], on_done: Callable[[str], None] = lambda _: None
 ) -> dict[str, bytes]:
     """Run compilations in parallel and return their results by name. Raises BuildError."""
-    compilers = _Compilers()
     try:
+        compilers = _Compilers(_cache())
         with ThreadPoolExecutor(os.cpu_count()) as pool, cleaned_up(compilers.end):
             jobs = {pool.submit(job, compilers): name for name, job in work.items()}
             for job in as_completed(jobs):
@@ -166,22 +194,40 @@ def _side_by_side(
                 on_done(jobs[job])
             return {name: job.result() for job, name in jobs.items()}
     except OSError as error:
-        raise BuildError(f"cannot compile: {error.strerror or error}") from error
+        place = error.filename or f"the temporary folder {tempfile.gettempdir()}"
+        raise BuildError(f"cannot compile: {place}: {error.strerror or error}") from error
 
 
-def _kill(process: "subprocess.Popen[bytes]") -> None:
-    """Kill a compiler, with the processes that it has started."""
-    if os.name == "posix":
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()
+def _cache() -> str:
+    """Return the compiler's cache folder: the usual one, or a temporary one if that cannot be written.
+
+    Without a folder that it can write, the compiler may try for ever.
+    """
+    folder = Path(os.environ.get(_CACHE_VARIABLE) or user_cache_path("zig", appauthor=False)).absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return str(folder)
+    except OSError as error:
+        reason = f"{folder}: the compiler's cache cannot be written there: {error.strerror}"
+        remedy = f"A temporary one is used, which makes compiling slow; {_CACHE_VARIABLE} can name another folder"
+        warnings.warn(f"{reason}. {remedy}", UserWarning, stacklevel=2)
+        return _temporary_cache()
+
+
+@cache
+def _temporary_cache() -> str:
+    """Make a folder for all compilers of this process, which is removed when the process ends."""
+    made = ExitStack()
+    atexit.register(made.close)
+    return made.enter_context(temporary_folder("rov-fmu-zig-"))
 
 
 class _Compilers:
     """The compilers that are running. A thread waits for each of them."""
 
-    def __init__(self) -> None:
+    def __init__(self, cache_folder: str) -> None:
+        self._cache = cache_folder
         self._running: set[subprocess.Popen[bytes]] = set()
         self._ended = False
 
@@ -190,12 +236,13 @@ class _Compilers:
         with UNINTERRUPTED:
             self._ended = True
             for process in self._running:
-                _kill(process)
+                kill(process)
 
-    def run(self, command: Sequence[str], folder: str) -> tuple[int, str]:
-        """Run a compiler, and return its exit code and output.
+    def run(self, command: Sequence[str], folder: str, failed: str, most_lines: int = 2 * MOST) -> None:
+        """Run a compiler. When this returns, no process writes into the folder any more.
 
-        When this returns, no process writes into the folder any more.
+        Raises BuildError if the compiler fails or exceeds its time limit. Its text begins with `failed`, and has a few
+        lines of the compiler's output.
         """
         with UNINTERRUPTED:
             if self._ended:
@@ -203,17 +250,50 @@ class _Compilers:
             process = subprocess.Popen(
                 command,
                 cwd=folder,
+                env={**os.environ, _CACHE_VARIABLE: self._cache},
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # so that the compiler's own child processes can be killed with it
             )
             self._running.add(process)
         try:
-            output, _ = process.communicate()  # waits for the compiler's child processes too
+            output, _ = process.communicate(timeout=_TIME_LIMIT)  # waits for the compiler's child processes too
+        except subprocess.TimeoutExpired as error:
+            kill(process)
+            process.communicate()
+            raise BuildError(
+                f"{failed}: it did not end within {_TIME_LIMIT:g} s. Its cache is in {self._cache}; {_CACHE_VARIABLE} "
+                "can name another folder"
+            ) from error
         finally:
             with UNINTERRUPTED:
                 self._running.remove(process)
-        return process.returncode, output.decode(errors="replace").strip()
+        if process.returncode != 0:
+            reasons = self._reasons(process.returncode, output.decode(errors="replace").splitlines())
+            raise BuildError(f"{failed}: " + "\n".join(reasons[:most_lines]))
+
+    def _reasons(self, exit_code: int, output: Sequence[str]) -> list[str]:
+        """Return why a compiler failed: its own messages, or one line about what this machine does not allow."""
+        if any(words in line for line in output for words in _NO_SPACE):
+            folders = f"{self._cache} or {tempfile.gettempdir()}"
+            return [f"a file in {folders} could not be written completely, because the disk is full{_shell_limits()}"]
+        messages = [line for line in output if line.strip() and not line.startswith("warning(")]
+        return messages if messages and exit_code > 0 else [f"it ended with {cause(exit_code)}{_shell_limits()}"]
+
+
+def _shell_limits() -> str:
+    """Return the end of a message: the limits under which this process and its compilers run, if there are any."""
+    if sys.platform == "win32":
+        return ""
+    import resource
+
+    kinds = {
+        "the size of files (ulimit -f)": resource.RLIMIT_FSIZE,
+        "processor time (ulimit -t)": resource.RLIMIT_CPU,
+        "memory (ulimit -v)": resource.RLIMIT_AS,
+    }
+    found = [words for words, kind in kinds.items() if resource.getrlimit(kind)[0] != resource.RLIM_INFINITY]
+    return f"; perhaps because the shell limits {listed(found)}" if found else ""
 
 
 @contextmanager
@@ -228,18 +308,29 @@ def _folder_of(sources: Mapping[str, str]) -> Iterator[str]:
 def _compile_module(sources: Mapping[str, str], compilers: _Compilers) -> bytes:
     with _folder_of(sources) as folder:
         command = [*compiler(), *C_FLAGS, "-g0", "-s", *WARNINGS, *_MODULE_FLAGS, "-o", "module.wasm"]
-        code, output = compilers.run(command, folder)
-        if code != 0:
-            raise BuildError(f"the compiler failed for the page's module\n{output}")
+        compilers.run(command, folder, "the compiler failed for the page's module")
         return Path(folder, "module.wasm").read_bytes()
 
 
 def _compile_engine(sources: Mapping[str, str], compilers: _Compilers) -> bytes:
     with _folder_of(sources) as folder:
-        code, output = compilers.run([*compiler(), *engine_flags(), "-o", "engine.library"], folder)
-        if code != 0:
-            raise BuildError(f"the C compiler failed for the engine: {brief(output)}")
+        command = [*compiler(), *engine_flags(), "-o", "engine.library"]
+        compilers.run(command, folder, "the C compiler failed for the engine", most_lines=1)
         return Path(folder, "engine.library").read_bytes()
+
+
+def _compile_location(pythonfmu: bytes, compilers: _Compilers) -> bytes:
+    linux = PLATFORMS["linux64"]
+    with _folder_of({_LOCATION_FILE.name: _LOCATION_FILE.read_text(encoding="utf-8")}) as folder:
+        Path(folder, PYTHONFMU_LIBRARY).write_bytes(pythonfmu)
+        command = [
+            *(*compiler(), "-target", linux.target),
+            *("-std=gnu11", "-O2", "-fPIC", *_LIBRARY_FLAGS, *WARNINGS, "-isystem", str(fmi_headers())),
+            *(_LOCATION_FILE.name, "-Wl,--no-as-needed", PYTHONFMU_LIBRARY, "-Wl,-rpath,$ORIGIN"),
+            *("-Wl,--allow-shlib-undefined", "-ldl", *linux.flags, "-o", "location.so"),
+        ]
+        compilers.run(command, folder, "the C compiler failed for the library of the Python flavour")
+        return Path(folder, "location.so").read_bytes()
 
 
 def _compile(name: str, sources: Mapping[str, str], identifier: str, fmi: int, compilers: _Compilers) -> bytes:
@@ -261,9 +352,7 @@ def _compile(name: str, sources: Mapping[str, str], identifier: str, fmi: int, c
                 *install_name,
                 *("-o", library.name),
             ]
-            code, output = compilers.run(command, folder)
-            if code != 0:
-                raise BuildError(f"{name}: the compiler failed for {target}\n{output}")
+            compilers.run(command, folder, f"{name}: the compiler failed for {target}")
             slices.append(library.read_bytes())
         if len(slices) > 1:
             universal = FatWriter()  # type: ignore[no-untyped-call]

@@ -8,7 +8,7 @@ from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
-from rov_fmu.model.formula import names, tangent, to_c
+from rov_fmu.model.formula import CHANGE, names, tangent, to_c
 from rov_fmu.model.layout import Layout
 
 
@@ -133,14 +133,9 @@ class EquationSource:
     def finish(self) -> list[str]:
         """Return statements that assign the states of the vehicle after a step."""
         lines = []
-        ends = self.equation.ends
-        known = {name: f"state[REF_{name} - FIRST_STATE]" for name in self.layout.state} | {name: name for name in ends}
-        known |= {name: f"y[Y_{name}]" for name in self.equation.states if name in self.equation.orientation}
-        for name, formula in ends.items():
-            lines.append(f"const double {name} = {to_c(formula, lambda n: known[n])};")
         for name in self.layout.state:
-            if f"next_{name}" in ends:
-                end = f"next_{name}"
+            if name in QUATERNION:
+                end = f"state[REF_{name} - FIRST_STATE]"
             elif name in self.equation.lagging:
                 end = f"q->{name}"
             elif name in self.equation.used:
@@ -149,6 +144,18 @@ class EquationSource:
                 end = f"state[REF_{name} - FIRST_STATE] + displacement[Y_{name}]"
             lines.append(f"next[REF_{name} - FIRST_STATE] = {end};")
         return lines
+
+    def attitude(self) -> list[str]:
+        """Return statements that set the quaternion to that of the rotation matrix in y."""
+        ends, place = self.equation.ends, {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
+        known = place | {name: name for name in ends} | {entry: f"y[Y_{entry}]" for entry in self.equation.orientation}
+        lines = [f"const double {name} = {to_c(formula, known.__getitem__)};" for name, formula in ends.items()]
+        return [*lines, *(f"{place[name]} = next_{name};" for name in QUATERNION)]
+
+    def rotation(self) -> list[str]:
+        """Return statements that set the rotation matrix in y to that of the quaternion."""
+        entries = [name for name in self.equation.states if name in self.equation.orientation]
+        return self._results({f"y[Y_{name}]": name for name in entries})
 
     # ---- Rates and terms ----
 
@@ -317,15 +324,15 @@ class EquationSource:
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
         text = {name: f"at[REF_{name}]" for name in self.layout.initial}
-        text |= {f"d_{name}": f"d[REF_{name}]" for name in self.layout.initial}
+        text |= {f"{CHANGE}{name}": f"d[REF_{name}]" for name in self.layout.initial}
         lines: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            change = to_c(tangent(formula, lambda n: f"d_{n}") or "0", text.__getitem__)
+            change = to_c(tangent(formula, lambda n: f"{CHANGE}{n}") or "0", text.__getitem__)
             if name in self.layout.state:
                 lines.append(f"d[REF_{name}] += {change};")
             else:
-                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, d_{name} = {change};")
-                text.update({name: name, f"d_{name}": f"d_{name}"})
+                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {CHANGE}{name} = {change};")
+                text.update({name: name, f"{CHANGE}{name}": f"{CHANGE}{name}"})
         return lines
 
     def tangent_lines(self) -> list[str]:
@@ -336,17 +343,17 @@ class EquationSource:
         equation = self.equation
         given = self.variables - {*self.layout.calculated}
         text = {name: f"at[REF_{name}]" for name in given}
-        text |= {f"d_{name}": f"d[REF_{name}]" for name in given}
+        text |= {f"{CHANGE}{name}": f"d[REF_{name}]" for name in given}
         steps: dict[str, str] = {}
 
         def change_of(name: str) -> str | None:
-            return f"d_{name}" if name in given or f"d_{name}" in steps else None
+            return f"{CHANGE}{name}" if name in given or f"{CHANGE}{name}" in steps else None
 
         for name, formula in {**equation.program, **equation.outputs}.items():
             steps[name] = formula
             if change := tangent(formula, change_of):
-                steps[f"d_{name}"] = change
-        results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.calculated if f"d_{name}" in steps}
+                steps[f"{CHANGE}{name}"] = change
+        results = {f"d[REF_{name}]": f"{CHANGE}{name}" for name in self.layout.calculated if f"{CHANGE}{name}" in steps}
         for name in self.layout.state:
             results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
         needed = _needed(steps, {name for formula in results.values() for name in names(formula)})

@@ -9,7 +9,7 @@ from io import BytesIO
 from types import MappingProxyType
 from uuid import UUID
 
-from rov_fmu.engine.compile import C_SOURCES, UNITY_FILE, fmi_headers
+from rov_fmu.engine.compile import C_SOURCES, INTERFACES, UNITY_FILE, fmi_headers
 from rov_fmu.engine.source import generated_sources, unused_sources
 from rov_fmu.fmu.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.fmu.python_flavour import python_files, python_sources
@@ -43,8 +43,10 @@ class Content:
     """The C files to compile by name; none in pure Python."""
 
 
-def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2) -> Content:
-    """Return the FMU in C, for Co-Simulation and Model Exchange. `pages` are further files, by their paths."""
+def native_content(
+    vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2, interface: str = "both"
+) -> Content:
+    """Return the FMU in C for one of INTERFACES. `pages` are further files, by their paths."""
     declared = variables(vehicle.rov)
     other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
     left_out = (other_version, *unused_sources(vehicle.layout))
@@ -52,9 +54,10 @@ def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
     sources |= generated_sources(vehicle.layout)
     source_files = (UNITY_FILE,) if fmi == 2 else ()
-    describe = partial(model_description, vehicle, declared, interfaces=NATIVE[fmi], source_files=source_files, fmi=fmi)
+    interfaces = {name: NATIVE[fmi][name] for name in INTERFACES[interface]}
+    describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi)
+    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi, [*interfaces])
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:

@@ -22,6 +22,9 @@ _DEFAULT_STEPS = 500
 """The number of communication steps if neither the experiment nor the FMU has a step size."""
 _MOST_STEPS = 1_000_000
 """The largest number of communication steps of an experiment. FMPy needs minutes for this number."""
+_MOST_EXPERIMENTS = 1000
+_MOST_BYTES = 20_000_000
+"""The largest size of a file of the experiments."""
 _NON_NUMERIC = ("String", "Binary", "Clock")
 """The types whose variables cannot be columns of numbers."""
 
@@ -66,7 +69,8 @@ class ReferenceResults:
 
     def __init__(self, fmu: Path) -> None:
         self._manifest = _Member(fmu, MANIFEST)
-        self._description = _Member(fmu, "modelDescription.xml")
+        self._read_series: dict[str, Series] = {}
+        """The CSV files by their path, because many experiments may have the same one."""
         try:
             self._archive = zipfile.ZipFile(fmu)
         except FileNotFoundError as error:
@@ -88,6 +92,8 @@ class ReferenceResults:
             if role == "experiment" and purpose != "uncertainty-analysis":
                 member = self._manifest.resolve(related.get("source"))
                 found += self._read(member, description.defaultExperiment, variables)
+        if len(found) > _MOST_EXPERIMENTS:
+            raise self._manifest.error(f"names {len(found)} experiments; at most {_MOST_EXPERIMENTS} are run")
         if not any(experiment.references for experiment in found):
             raise self._manifest.error("names no experiment with expected results")
         return found
@@ -107,7 +113,7 @@ class ReferenceResults:
                 if key in given:
                     return number(given[key], f"experiment {shown(name)}: {key}", member.error)
                 value: str | None = getattr(default, key, None)
-                return number(value, f"DefaultExperiment: {key}", self._description.error) if value else fallback
+                return float(value) if value else fallback
 
             start = setting("startTime", 0.0)
             stop = setting("stopTime", start + 1.0)
@@ -115,6 +121,9 @@ class ReferenceResults:
             tolerance = setting("tolerance", _DEFAULT_TOLERANCE)
             if not (stop > start and step > 0.0 and tolerance > 0.0):
                 raise member.error(f"experiment {shown(name)}: must go on from its start, in steps, with a tolerance")
+            if tolerance >= 1.0:
+                reason = f"tolerance = {tolerance:g}: must be less than 1, or nothing would be compared"
+                raise member.error(f"experiment {shown(name)}: {reason}")
             steps = (stop - start) / step
             if not steps <= _MOST_STEPS:
                 reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
@@ -152,10 +161,14 @@ class ReferenceResults:
             if variable.type in _NON_NUMERIC or getattr(variable, "dimensions", None):
                 raise member.error(f"column {shown(name)}: the variable is not a single number")
 
-        return series(self._text(member), member.error, check_column)
+        if member.path not in self._read_series:
+            self._read_series[member.path] = series(self._text(member), member.error, check_column)
+        return self._read_series[member.path]
 
     def _text(self, member: _Member) -> str:
         try:
+            if (size := self._archive.getinfo(member.path).file_size) > _MOST_BYTES:
+                raise member.error(f"has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
             return self._archive.read(member.path).decode("utf-8-sig")
         except KeyError:
             raise member.error("there is no such file in the FMU") from None

@@ -62,6 +62,11 @@ PYTHON_NOTE = (
     "LD_PRELOAD=/path/to/libpython3.x.so, or it cannot load the library (undefined symbol: _Py_NoneStruct)."
 )
 """The text that follows the vehicle's summary in the description of the FMU in pure Python."""
+DEAD_TIME_NOTE = (
+    "The commands act after a dead time, so they change only in events: use Co-Simulation, or Model Exchange in a tool "
+    "that sets inputs in Event Mode."
+)
+"""The text that follows the summary of a vehicle with a dead time, if the FMU is for Model Exchange."""
 
 _EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize": 0.01}
 
@@ -80,11 +85,13 @@ def model_description(
 
     `note` follows the vehicle's summary in the description of the model.
     """
+    if vehicle.layout.has_dead_time and "ModelExchange" in interfaces:
+        note = " ".join(filter(None, (DEAD_TIME_NOTE, note)))
     head = {
         "fmiVersion": f"{fmi}.0",
         "modelName": vehicle.identifier,
         "guid" if fmi == 2 else "instantiationToken": guid,
-        "description": f"{vehicle.summary}. {note}" if note else vehicle.summary,
+        "description": ". ".join(filter(None, (vehicle.summary, note))),
         "author": vehicle.source,
         "version": vehicle.version,
         "license": "MIT, see documentation/licenses/license.txt",
@@ -94,8 +101,8 @@ def model_description(
     }
     if fmi == 3:
         variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
-        if "ModelExchange" in interfaces:  # the turns of a vehicle with an attitude are counted in this function
-            needs = {"needsCompletedIntegratorStep": "true" if vehicle.layout.has_attitude else "false"}
+        if "ModelExchange" in interfaces:
+            needs = {"needsCompletedIntegratorStep": "true" if _needs_completed_steps(vehicle.layout) else "false"}
             interfaces = {**interfaces, "ModelExchange": {**interfaces["ModelExchange"], **needs}}
     number = {v.name: v.index for v in variables}
     return render(
@@ -113,6 +120,11 @@ def model_description(
         numbers=lambda names: " ".join(str(number[name]) for name in names),
         structure=_structure(variables, vehicle.layout, _LISTS[fmi]),
     ).encode()
+
+
+def _needs_completed_steps(layout: Layout) -> bool:
+    """Return True when completedIntegratorStep does something: it counts turns, and sends commands to the dead time."""
+    return layout.has_attitude or layout.has_dead_time
 
 
 def build_description(identifier: str) -> bytes:
@@ -168,7 +180,7 @@ def _structure(
             add(outputs, v, v.dependencies)
         if v.derivative_of:
             add(derivatives, v, v.dependencies)
-        if v.initial == "calculated":
+        if v.initial in ("calculated", "approx"):
             # In Initialization Mode no parameter is fixed, so the only kinds are constant and dependent (2.2.8). The
             # quaternion is not known yet: it follows from parameters.
             known = {n: kind for n, kind in v.dependencies.items() if n not in QUATERNION}

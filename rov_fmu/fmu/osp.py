@@ -66,10 +66,13 @@ def osp_model_description(layout: Layout) -> bytes:
         name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()
     }
     groups = []
+    names = [name for name, _ in _groups(layout)]
     for name, candidates in _groups(layout):
         if members := {variable: axis for variable, axis in candidates.items() if variable in unit_of}:
             (unit,) = {unit_of[variable] for variable in members}
-            groups.append((_ELEMENTS[unit], name, unit, members))
+            # the name of a curve or a thruster may make a name that another group has
+            unique = name if names.count(name) == 1 else "_".join((name, *members))
+            groups.append((_ELEMENTS[unit], unique, unit, members))
     grouped = [variable for *_, members in groups for variable in members]
     assert sorted(grouped) == sorted(unit_of), "every variable must be in one group"
     order = list(_ELEMENTS.values())

@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.engine.child_process import ChildError, ChildProcess
 from rov_fmu.fmu.experiments import Experiment, ReferenceResults
 from rov_fmu.fmu.unpacking import unpack_fmu
+from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
@@ -32,13 +32,17 @@ _TOLERANCE_OF_SOLVER = 1e-3
 """The share of the tolerance that the solver of Model Exchange may use at each step."""
 _LEAST_OF_SOLVER = 1e-7
 """The smallest deviation that counts in Model Exchange, where the errors of the solver's steps add up."""
+TIME_LIMIT = 60.0
+"""The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
+MEMORY, DISK = 4_000_000_000, 1_000_000_000
+"""The address space of the process of an FMU and the size of each file that it writes, in bytes (Linux)."""
 _WARNING = 1
 """The status `warning` in every version of FMI; more serious ones are greater."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The result for one variable of an experiment, or for an experiment that does not end."""
+    """The result for one variable of an experiment, or for an experiment that fails as a whole."""
 
     experiment: str
     variable: str
@@ -57,15 +61,17 @@ def prove(
     fmu: Path,
     interface: str | None = None,
     tolerance: float | None = None,
+    time_limit: float = TIME_LIMIT,
     on_experiment: Callable[[str, float], None] = lambda *_: None,
 ) -> list[Finding]:
     """Run the experiments of an FMU in a child process and compare the results with the expected ones.
 
     `interface` is one of INTERFACES. The default is the first of these that the FMU has. `tolerance` replaces the
-    tolerances of the experiments. In Model Exchange, where a solver integrates, it is at least 1e-7. `on_experiment` is
-    called before each experiment with its name and the share that is done.
+    tolerances of the experiments. In Model Exchange, where a solver integrates, it is at least 1e-7. `time_limit` is
+    the time that each experiment may take, s. `on_experiment` is called before each experiment with its name and the
+    share that is done.
 
-    Raises FileError, and ProofError if the FMU ends its process.
+    Raises FileError, and ProofError if the FMU ends its process or exceeds a limit.
     """
     import fmpy
 
@@ -86,14 +92,17 @@ def prove(
             )
         chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
         experiment, found = chosen[0], list[Finding]()
+        limits = Limits(time=time_limit, memory=MEMORY, disk=DISK)
         try:
-            with closing(ChildProcess(_Experiments, folder, interface or has[0])) as child:
+            with closing(ChildProcess(_Experiments, folder, interface or has[0], limits=limits)) as child:
                 for n, experiment in enumerate(chosen):
                     on_experiment(experiment.name, n / len(chosen))
                     found += child.call("findings", experiment)
         except ChildError as error:
             where = one_line(f"{fmu}: experiment {experiment.name!r}")
-            raise ProofError(f"{where}: {error}") from error
+            is_time = isinstance(error, LimitError) and error.limit == "time"
+            remedy = "; --time-limit allows more" if is_time else ""
+            raise ProofError(f"{where}: the FMU {error}{remedy}") from error
     return found
 
 
@@ -112,10 +121,15 @@ class _Experiments:
 
 
 def _findings(folder: str, description: Any, interface: str, experiment: Experiment) -> Iterator[Finding]:
-    """Yield a finding for each variable, or a single one if the experiment fails or has no expected results."""
+    """Yield a finding for each variable, or a single one if the experiment fails or compares nothing."""
     import fmpy
 
-    names = [*(experiment.references or ())][1:]
+    if experiment.references is None:
+        reason = "has no expected results, so nothing is compared"
+        yield Finding(experiment.name, "-", inf, experiment.tolerance, reason)
+        return
+    times, *expected = map(np.array, experiment.references.values())
+    names = [*experiment.references][1:]
     kind = INTERFACES[interface]
     reasons: list[bytes] = []
 
@@ -138,7 +152,7 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
                 fmi_type=kind[0].upper() + kind[1:],
                 start_values=dict(experiment.parameters),
                 input=_signals(experiment.stimuli),
-                output=names or None,
+                output=names,
                 model_description=description,
                 remote_platform=None,
                 debug_logging=True,
@@ -149,13 +163,9 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
         what = str(error).replace(folder + os.sep, "").rstrip(".")  # the cause follows the library's path
         yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(what + messages, 240))
         return
-    if not experiment.references:
-        yield Finding(experiment.name, "-", 0.0, experiment.tolerance)
-        return
-    times, *expected = experiment.references.values()
-    nominal = {v.name: float(v.nominal or 1.0) for v in description.modelVariables}
+    nominal = {v.name: abs(float(v.nominal or 0.0)) or 1.0 for v in description.modelVariables}
     for name, values in zip(names, expected, strict=True):
-        scale = max(*map(abs, values), _SHARE_OF_NOMINAL * abs(nominal[name]))
+        scale = max(float(np.abs(values).max()), _SHARE_OF_NOMINAL * nominal[name])
         off = _deviation(result["time"], result[name], times, values)
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         yield Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved))
@@ -169,11 +179,11 @@ def _signals(stimuli: Series | None) -> Any:
     return np.array(list(zip(*stimuli.values(), strict=True)), [(name, np.float64) for name in ("time", *names)])
 
 
-def _deviation(times: Any, values: Any, at: Sequence[float], expected: Sequence[float]) -> float:
+def _deviation(times: Any, values: Any, at: Any, expected: Any) -> float:
     """Return the largest deviation. At an event, which has two values at one time, the nearer value counts."""
     values = np.asarray(values, dtype=np.float64)
     worst = 0.0
-    for t, value in zip(at, expected, strict=True):
+    for t, value in zip(at.tolist(), expected.tolist(), strict=True):
         there = values[np.abs(times - t) <= _SAME * max(1.0, abs(t))]
         if not there.size:
             if not times[0] <= t <= times[-1]:

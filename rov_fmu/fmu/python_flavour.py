@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pythonfmu import FmuBuilder
 
+from rov_fmu.engine.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -39,7 +40,10 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
 
 
 def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
-    """Return the files that FmuBuilder packs, by their path, except its modelDescription.xml."""
+    """Return the files that FmuBuilder packs, by their path, except its modelDescription.xml.
+
+    On Linux, another library is before that of PythonFMU.
+    """
     with temporary_folder("fmu-") as folder:
         for name, text in sources.items():
             path = Path(folder, "sources", name)
@@ -50,11 +54,14 @@ def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, byte
         with _imports_restored():
             built = FmuBuilder.build_FMU(script, dest=Path(folder, "built.fmu"), project_files=project)
         with zipfile.ZipFile(built) as archive:
-            return {
+            files = {
                 name.replace("\\", "/"): archive.read(name)
                 for name in archive.namelist()
                 if name != "modelDescription.xml" and "__pycache__" not in name
             }
+    library = f"binaries/linux64/{vehicle.identifier}.so"
+    pythonfmu = files[library]
+    return {**files, library: compile_location(pythonfmu), f"binaries/linux64/{PYTHONFMU_LIBRARY}": pythonfmu}
 
 
 @contextmanager

@@ -331,7 +331,7 @@ def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> l
 def _pose_without_quaternion(layout: Layout) -> dict[str, Declaration]:
     """Return the position, and the heading where it is a state.
 
-    The quaternion is left out. After more than half a turn, its sign depends on the division of the turn into steps.
+    The quaternion is left out, because both of its signs mean the same attitude.
     """
     return {name: declaration for name, declaration in layout.pose.items() if name not in QUATERNION}
 

@@ -17,6 +17,8 @@ from pythonfmu.enums import Fmi2Status
 
 from rov_fmu.model import attitude, delay, formula, layout, rov
 
+_TOO_LATE = "must not be set after the initialization"
+
 
 def layout_of(given: Any) -> layout.Layout:
     """Return the layout of a vehicle from the JSON of its dataclasses.asdict."""
@@ -67,10 +69,11 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
         self._set_attitude()
         self.time = 0.0
+        self.is_initialized = False
         self.stop_time: float | None = None
         self.line = delay.DelayLine(self.layout)
         self._put(self.line.delayed)
-        self.warned: set[int | str] = set()
+        self.warned: set[str] = set()
         for reference, v in enumerate(self.declared):
             self.register_variable(
                 Real(
@@ -90,12 +93,17 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         """Keep the start and stop time. A step past the stop time is an error."""
         self.time, self.stop_time = start_time, stop_time
 
+    def exit_initialization_mode(self) -> None:
+        """Begin the simulation. From now on, only inputs and tunable parameters change."""
+        self.is_initialized = True
+
     def set_real(self, references: list[int], values: list[float]) -> None:
         """Set all values, or none if one is refused."""
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
-            if self._is_calculated(reference):
-                self.log(f"{v['name']} is calculated and must not be set; it was not.", Fmi2Status.error)
+            if not self._may_set(reference) and (self._is_calculated(reference) or value != self.values[reference]):
+                words = "is calculated and must not be set" if self._is_calculated(reference) else _TOO_LATE
+                self.log(f"{v['name']} {words}; it was not.", Fmi2Status.error)
                 return
             if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
                 self.log(
@@ -104,12 +112,19 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                 return
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
+            if not self._may_set(reference):
+                self._warn_once("again", f"{v['name']} {_TOO_LATE}, but it has this value already")
+                continue
             self.values[reference] = value
-            limit = _limited(v, value)
-            if v["causality"] == "input" and limit != value:
-                self._warn_once(reference, f"{v['name']} = {value!r} saturates at {limit:g}")
-        if not self.layout.initial.keys().isdisjoint(self.declared[reference]["name"] for reference in references):
+            self._warn_of_input(v, value)
+        if not self.is_initialized:
             self._set_attitude()
+        for reference, value in zip(references, values, strict=True):
+            if self.declared[reference]["initial"] == "approx" and value != self.values[reference]:
+                words = f"{self.declared[reference]['name']} = {value!r} is replaced by {self.values[reference]!r}"
+                self._warn_once(
+                    "guess", f"{words}, because phi_0, theta_0 and psi_0 determine the attitude at the start"
+                )
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""
@@ -135,10 +150,12 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             self.log(f"{error}.", Fmi2Status.error)
             return False
         if not all(map(isfinite, after.values())):
-            self.log(f"the motion overflows within {step_size!r} s.", Fmi2Status.error)
+            self.log(
+                f"the motion overflows within {step_size!r} s, or never settles and needs shorter steps.",
+                Fmi2Status.error,
+            )
             return False
         if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
-            self.line.move(current_time - self.time)
             self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
         self._put({**after, **self.line.delayed})
         self.time = end
@@ -158,13 +175,32 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def _named(self, names: Iterable[str]) -> dict[str, float]:
         return {name: self.values[self.place[name]] for name in names}
 
-    def _warn_once(self, what: int | str, text: str) -> None:
+    def _warn_of_input(self, v: dict[str, Any], value: float) -> None:
+        """Warn once about a command without a signal, and about an input that saturates."""
+        name = v["name"]
+        if v["unit"] == "us" and value == 0.0:
+            self._warn_once("signal", f"{name} = 0 means that there is no signal: it acts as neutral")
+        elif name == "voltage" and self.layout.voltage_ranges:
+            for (low, high), curves in self.layout.voltage_ranges.items():
+                if not low <= value <= high:
+                    limit = low if value < low else high
+                    self._warn_once(curves, f"{name} = {value!r} saturates at {limit:g} for the thrust curve {curves}")
+        elif v["causality"] == "input" and _limited(v, value) != value:
+            self._warn_once(name, f"{name} = {value!r} saturates at {_limited(v, value):g}")
+
+    def _warn_once(self, what: str, text: str) -> None:
         if what not in self.warned:
             self.warned.add(what)
             self.log(f"{text}; logged once.", Fmi2Status.warning)
 
     def _is_calculated(self, reference: int) -> bool:
         return bool(self.declared[reference]["initial"] == "calculated")
+
+    def _may_set(self, reference: int) -> bool:
+        v = self.declared[reference]
+        if self.is_initialized:
+            return bool(v["causality"] == "input" or v["variability"] == "tunable")
+        return not self._is_calculated(reference)
 
     def _model(self) -> tuple[rov.Rov, dict[str, float], dict[str, float]]:
         """Return the vehicle, its inputs and its state."""
@@ -176,8 +212,10 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
 
     def _get_fmu_state(self) -> dict[str, Any]:
         line = {"acting": dict(self.line.acting), "waiting": list(self.line.waiting)}
-        return {"values": list(self.values), "time": self.time, "stop_time": self.stop_time, **line}
+        own = {"values": list(self.values), "time": self.time, "stop_time": self.stop_time}
+        return {**own, "is_initialized": self.is_initialized, **line}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self.values, self.time, self.stop_time = list(state["values"]), state["time"], state["stop_time"]
+        self.is_initialized = state["is_initialized"]
         self.line.acting, self.line.waiting = dict(state["acting"]), list(state["waiting"])

@@ -7,7 +7,7 @@ The value reference of a variable is its place in this order: from 0 in FMI 2.0,
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import degrees, isfinite
 from typing import Any
@@ -173,7 +173,8 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             declaration,
             "output",
             "continuous",
-            **({"initial": "calculated"} if name in QUATERNION else {"initial": "exact", "start": 0.0}),
+            initial="approx" if name in QUATERNION else "exact",
+            start=1.0 if name == QUATERNION[0] else 0.0,
             nominal=declaration.nominal,
             dependencies={name: "constant"},
         )
@@ -227,7 +228,7 @@ LOG_CATEGORIES = {
 """The log categories by the standard's names (2.2.4), each with its description."""
 
 
-def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str:
+def interface_header(rov: Rov, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
     """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
     declared = variables(rov)
     return render(
@@ -237,6 +238,8 @@ def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str
         identifier=identifier,
         token=token,
         fmi=fmi,
+        interfaces=interfaces,
+        ranges=rov.layout.voltage_ranges,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

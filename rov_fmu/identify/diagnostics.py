@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from scipy.special import fdtrc
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate, rms
 from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_errors
@@ -22,7 +23,6 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import Requests
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
 
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""

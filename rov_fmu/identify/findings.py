@@ -352,16 +352,16 @@ FACTS = frozenset(EFFECTS) | {
     "unread cells",
     "no pulse",
     "no servo pulse",
-    "pulse beyond full thrust",
+    "beyond full thrust",
     "constant motion",
     "constant push",
     "cancelling thrusters",
     "gaps",
     "source of commands",
+    "source",
+    "range of pulses",
     "dropouts",
     "damaged pieces",
-    "messages without time",
-    "several vehicles",
     "reversed motors",
     "axis left out",
     "not coupled",
@@ -371,13 +371,14 @@ FACTS = frozenset(EFFECTS) | {
     "delay not modelled",
 }
 """The kinds of findings that need no action."""
-FIRST = frozenset({"missing column", "copy", "frozen sensors", "axis not pushed", "no fit", "poor prediction"})
+FIRST = frozenset(
+    {"unreadable file", "missing column", "copy", "frozen sensors", "axis not pushed", "no fit", "poor prediction"}
+)
 """The kinds of warnings that stand first: wrong or missing data, and axes that must not be trusted."""
 DOUBTS = frozenset(
     {
         "too few samples",
         "time of arrival",
-        "arrival time",
         "other clock",
         "aligned clock",
         "unknown direction",

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from rov_fmu.identify.adapter.tank_tests import TankTests
 from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NextTest
@@ -19,7 +20,6 @@ from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.vehicle import Vehicle
 
 

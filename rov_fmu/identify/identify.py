@@ -12,6 +12,8 @@ import numpy as np
 
 from rov_fmu import __version__
 from rov_fmu.identify import diagnostics
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import TankTests, kind_of_data
 from rov_fmu.identify.driving import connected, curves_of
 from rov_fmu.identify.findings import FIRST, facts, sentences, warnings
 from rov_fmu.identify.identification import AxisResult, Identification
@@ -35,8 +37,6 @@ from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import REVERSE, Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import TankTests, kind_of_data
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
@@ -67,7 +67,8 @@ def identify(tests: TankTests, on_progress: Progress = silent) -> Identification
 def _identify(tests: TankTests, on_progress: Progress) -> Identification:
     """Identify a vehicle from all tests. Raises UnusableError, DataFileError, VehicleFileError."""
     given = tests.given
-    against = load_vehicle(given.description.against) if given.description.against else None
+    named = given.description.tables.against
+    against = load_vehicle(named) if named else None
     on_progress("thrust curves", 0.0)
     thrust = {curve.name: fit for curve in given.rov.layout.curves if (fit := _thrust(tests, curve))}
     found = _Found(tests)
@@ -185,7 +186,8 @@ class _Found:
     def _estimates(self, together: Together) -> dict[str, Estimated]:
         """Return the standard errors and correlations of the identified coefficients, and those kept from the base."""
         given = self.tests.given
-        base = load_vehicle(given.description.base) if given.description.base else None
+        path = given.description.tables.base
+        base = load_vehicle(path) if path else None
         rows = base.estimates if base else {}
         kept = {
             name
@@ -204,6 +206,7 @@ class _Found:
     def vehicle(self, results: Sequence[AxisResult], together: Together, findings: Sequence[Finding]) -> Vehicle:
         """Return the vehicle with its provenance."""
         given, names = self.tests.given, self.rov.layout.coefficients
+        validity = given.description.tables.validity
         method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
         made = Provenance(
             f"rov-fmu {__version__} identify",
@@ -219,7 +222,7 @@ class _Found:
             **dict(given.head),
             rov=Rov(self.rov.layout, {name: self.rov[name] for name in names}),
             sources={name: self.sources[name] for name in names},
-            command_range=given.description.command_range or _command_range(results, self.rov),
+            command_range=validity.command_range if validity else _command_range(results, self.rov),
             alternatives={},
             data=None,
             limits=(*given.description.limits, *delays),
@@ -443,14 +446,14 @@ def _next_test(
     fit = result.recordings
     quantity = fit.simulations[0].recording.quantity if fit else result.axis.position
     noise = max(s.noise * np.sqrt(s.correlation_time) for s in fit.simulations) if fit else NOISE[quantity]
-    sensor, limits = Sensor(quantity, max(float(noise), 1e-9)), tests.given.description.tank_limits
+    sensor, limits = Sensor(quantity, max(float(noise), 1e-9)), tests.given.description.tables.limits
     driving = {curve.name for curve in curves_of(rov.layout, result.axis)}
     scales = {name: fit.estimate.noise for name, fit in thrust.items() if name in driving and fit.estimate.noise > 0.0}
     return next_test(result.axis, rov, result.estimate, sensor, limits, scales, repeat=repeat)
 
 
 def _weight(tests: TankTests, window: str, command: float) -> float:
-    low, high = tests.given.description.windows.get(window, (-1.0, 1.0))
+    low, high = tests.given.description.tables.windows.get(window, (-1.0, 1.0))
     return float(low - 1e-9 <= command <= high + 1e-9)
 
 

@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.thrust_fit import forces
 from rov_fmu.identify.simulation.limits import MotionError
@@ -23,7 +24,6 @@ from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)

@@ -15,6 +15,8 @@ from scipy.linalg import block_diag, solve_triangular
 from scipy.special import fdtrc
 from threadpoolctl import threadpool_limits
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import without_spikes
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.current import is_in_flow
 from rov_fmu.identify.least_squares import basis, scaled
@@ -25,8 +27,6 @@ from rov_fmu.identify.simulation.linear_response import LinearResponse
 from rov_fmu.model.layout import SURGE, SWAY
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import without_spikes
 
 _CHANCE = 1e-4
 """The probability of a false alarm by one cause; there are about ten causes."""

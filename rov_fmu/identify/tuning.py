@@ -4,7 +4,7 @@ It holds for any vehicle and axis, with thrust and drag by direction, dead band 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
+from rov_fmu.tank.columns import columns_of, refuse_slips
 from rov_fmu.tank.findings import Finding
 
 ALPHA = 0.5, 2.0
@@ -105,12 +105,9 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
 
     Raises DataFileError.
     """
-    columns = {
-        "command": HELD_COMMAND,
-        "velocity": velocity_column(axis, optional=True),
-        "time constant": time_constant_column(optional=True),
-    }
-    table = read_columns(path, columns)
+    columns = columns_of("steady", axis) | columns_of("time_constant")
+    optional = {name: replace(column, optional=True, blanks=True) for name, column in columns.items()}
+    table = read_columns(path, optional | {"command": columns["command"]})
     refuse_slips(table, ["command"])
     points = []
     for quantity, column in (("V_ss", "velocity"), ("Tau", "time constant")):

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import TankTests
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.findings import refusals
 from rov_fmu.identify.simulation.prepared import prepare
@@ -17,9 +19,7 @@ from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.columns import VELOCITIES
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tables import Row
-from rov_fmu.tank.tank_tests import TankTests
+from rov_fmu.tank.readers.tank_tables import Row
 
 _LEAST_PUSH = 1e-6
 """The smallest thrust that counts, N or N m. A fit with less could overflow."""

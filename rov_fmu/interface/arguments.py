@@ -1,7 +1,7 @@
 """Check the arguments of a simulation and convert them to arrays; each wrong argument gives one clear line."""
 
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import copysign
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -115,20 +115,24 @@ class Commands:
                     place = np.searchsorted(own, self.time, side="right") - 1
                     found = np.where(place >= 0, found[..., np.maximum(place, 0)], layout.inputs[name].start)
             self.values[name] = found
-            if name in layout.commands and (beyond := _beyond(found, layout.commands[name])):
+            for beyond in _beyond(found, layout.commands[name]) if name in layout.commands else ():
                 warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
 
 
-def _beyond(values: Array, command: Declaration) -> str:
-    """Describe the value that exceeds the range of a command most, or return an empty text."""
+def _beyond(values: Array, command: Declaration) -> Iterator[str]:
+    """Describe a pulse of 0, and the value that exceeds the range of a command most, if there are such values."""
     low, high = command.minimum, command.maximum
     excess = np.maximum(low - values, values - high)
+    if command.unit != "1" and np.any(values == 0.0):
+        yield "0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as neutral"
+        excess = np.where(values == 0.0, 0.0, excess)
     if np.max(excess, initial=0.0) <= 0.0:
-        return ""
+        return
     value = values.flat[np.argmax(excess)]
     if command.unit == "1":
-        return f"{value:.6g}, which acts as {copysign(1.0, value):g}: commands saturate at ±1"
-    return f"{value:.6g}: commands are pulse widths, and saturate at {low:g} and {high:g} {command.unit}"
+        yield f"{value:.6g}, which acts as {copysign(1.0, value):g}: commands saturate at ±1"
+    else:
+        yield f"{value:.6g}: commands are pulse widths, and saturate at {low:g} and {high:g} {command.unit}"
 
 
 def _names(what: str, given: Any) -> list[str]:

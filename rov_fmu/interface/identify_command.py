@@ -5,12 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify import identify
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.identification import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
 from rov_fmu.io.messages import Progress
-from rov_fmu.io.output import Output, check_targets, write_whole
-from rov_fmu.io.seal import check_replaced
-from rov_fmu.tank.tank_tests import load_tank_tests
+from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
 

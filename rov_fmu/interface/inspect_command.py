@@ -1,18 +1,25 @@
-"""The command `rov-fmu identify --inspect`: the content of a log as a table, and a draft of rov.toml."""
+"""What the logs of a folder contain, and a draft of rov.toml: `rov-fmu identify --inspect` and `--draft`."""
 
 import errno
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
-from rov_fmu.io.messages import NO_FILE, brief
+from rov_fmu.io.messages import NO_FILE, brief, first_of, one_line
 from rov_fmu.io.output import Output, WriteError, write_whole
-from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL
-from rov_fmu.tank.description import ROV_FILE, read_description
-from rov_fmu.tank.inspection.inspection import Inspection, fitting, inspect, logs_of
-from rov_fmu.tank.inspection.table_headers import TableHeaders, headers_of_tables
+from rov_fmu.io.templates import render
+from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL, Layout
+from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
+from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
+from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.folder import unreadable
+from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
+from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
+from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -20,31 +27,70 @@ _BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
 
 
-def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
-    """Return what a log, or each log in a folder, contains, with the place and the text of a draft of rov.toml.
+@dataclass(frozen=True)
+class Inspected:
+    """What the logs of a folder contain, and what rov.toml would be."""
+
+    logs: Sequence[Inspection]
+    warnings: Sequence[str]
+    """A sentence for each file that cannot be read."""
+    draft: Path
+    """The place of rov.toml."""
+    text: str
+    """The draft of rov.toml."""
+
+
+def lacks_description(folder: Path) -> bool:
+    """Return True for a folder with logs or tables but without rov.toml."""
+    return folder.is_dir() and not (folder / ROV_FILE).exists() and bool(logs_of(folder))
+
+
+def inspect_logs(path: Path) -> Inspected:
+    """Return what a log, or each log in a folder, contains, with a draft of rov.toml.
 
     If there is a rov.toml already, thrusters and columns have its names, unless its hardware tables have a mistake.
-    Raises DataFileError, and VehicleFileError if rov.toml is not TOML.
+    Files that cannot be read are left out. Raises DataFileError if no file is left, and VehicleFileError if rov.toml is
+    not TOML.
     """
     if not path.exists():
         raise DataFileError(f"{path}: {NO_FILE}")
-    vehicles = {name: load_vehicle(file) for name, file in SHIPPED.items()}
-    layouts = [vehicle.layout for vehicle in vehicles.values()]
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / _BAG).is_file() else folder
-    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else None
-    found = [inspect(log, layouts, described) for log in logs_of(path)]
+    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE
+    layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
+    found: list[Inspection] = []
+    mistakes: list[str] = []
+    findings: list[Finding] = []
+    with one_parser():
+        for log in logs_of(path, described.tables.columns):
+            try:
+                found += inspect(log, layouts.values(), described)
+            except DataFileError as error:
+                mistakes += str(error).splitlines()
+                findings.append(unreadable(log, error))
     if not found:
-        raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")
+        none = f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it"
+        raise DataFileError(*(mistakes or [none]))
+    tables = headers_of_tables(folder)
+    text = _draft(folder, found, tables, *_thrusters(found, layouts, tables.curves))
+    return Inspected(found, sentences(findings, SENTENCES), folder / ROV_FILE, text)
+
+
+def _thrusters(
+    found: Iterable[Inspection], layouts: Mapping[str, Layout], curves: Collection[str]
+) -> tuple[list[str], str]:
+    """Return the thrusters of the log that has most of them, and the first vehicle that has such ones and the curves.
+
+    Without such a vehicle, its name is empty.
+    """
     most = max(found, key=lambda one: (len(one.commands), _changing(one)))
     thrusters = [row.name.removeprefix("thruster ") for row in most.commands]
-    fits = fitting(thrusters, layouts)
-    if not fits and most.path.suffix.lower() in LOG_SUFFIXES:
+    if not fitting(thrusters, layouts.values()) and _is_bag(most.path):
         thrusters = thrusters[: _changing(most)]
-        fits = fitting(thrusters, layouts)
-    base = next((name for name, vehicle in vehicles.items() if vehicle.layout == fits), "")
-    lines = _draft(found, headers_of_tables(folder), thrusters, base, vehicles.get(base))
-    return found, folder / ROV_FILE, "\n".join(lines) + "\n"
+    fits = fitting(thrusters, layouts.values())
+    if fits and not {*curves} <= {curve.name for curve in fits.curves}:
+        fits = None
+    return thrusters, next((name for name, layout in layouts.items() if layout == fits), "")
 
 
 def _changing(inspection: Inspection) -> int:
@@ -54,101 +100,135 @@ def _changing(inspection: Inspection) -> int:
 
 def write_draft(path: Path, text: str) -> None:
     """Write a draft of rov.toml. Raises WriteError if the file exists."""
+    check_no_description(path)
+    write_whole(Output(path, text.encode()))
+
+
+def check_no_description(path: Path) -> None:
+    """Raise WriteError if there is a rov.toml already."""
     if path.exists():
         raise WriteError(errno.EEXIST, "the file there is not replaced by a draft", str(path))
-    write_whole(Output(path, text.encode()))
 
 
 # ---- The draft -------------------------------------------------------------------------------------------------------
 
 
-def _draft(
-    found: Sequence[Inspection], tables: TableHeaders, thrusters: Sequence[str], base: str, vehicle: Vehicle | None
-) -> Iterator[str]:
-    """Yield the lines of a draft, which is a complete rov.toml if a vehicle that ships has such thrusters."""
-    first = found[0].path
-    names = brief(", ".join(one.path.name for one in found))
-    word = re.sub(r"[^a-z0-9]+", "_", first.stem.lower()).strip("_")
-    yield f"# A draft by `rov-fmu identify --inspect` of {names}: edit it, then run `rov-fmu identify` on its folder."
-    signals = {row.name for one in found for row in one.signals}
-    is_own = not base and len(thrusters) > 1
-    if is_own:
-        those = f"{len(thrusters)} thrusters of these names"
-        yield f'# No vehicle that ships has {those}, so the draft describes them. Replace each "?".'
-        yield '# For a vehicle file that you have, write base = "its path" here, and remove the tables from [body] on.'
-        yield f"# A vehicle that ships has its name instead of the path: {', '.join(SHIPPED)}."
-    else:
-        first_fitting = f"The first vehicle that ships with {len(thrusters)} thrusters"
-        why = first_fitting if base else "These logs do not tell which thrusters the vehicle has"
-        yield f"# {why}. Write the path of your vehicle file, or {', '.join(SHIPPED)}."
-        yield f"base = {_quoted(base or '?')}"
-    yield from ("", "[vehicle]", f"name = {_quoted(first.stem)}")
-    yield f"identifier = {_quoted(word if word[:1].isalpha() else f'rov_{word}')}"
-    yield from ('version = "1.0"', f'description = "A vehicle identified from {_quoted(names)[1:-1]}"')
-    yield f"source = {_quoted(names)}"
-    if is_own:
-        yield from _hardware(thrusters, tables.curves, signals)
-    else:
-        yield from (
-            "",
-            ("[known]  # values that no log determines: replace the values of the base by those of your vehicle"),
-        )
-    for key in BODY:
-        if vehicle and key in vehicle.layout.coefficients:
-            unit = vehicle.layout.coefficients[key].unit
-            yield f'# {key} = {{ value = {vehicle.rov[key]:g}, unit = "{unit}", source = "..." }}'
-    effects = {"voltage": {"voltage"}}
-    if not (vehicle and vehicle.layout.has_attitude):
-        effects["attitude"] = {"roll", "pitch"}
-    if fitted := [key for key, names in effects.items() if names <= signals]:
-        yield from ("", "[fit]  # every log has the columns for these: remove # to fit them")
-        yield from (f"# {key} = true" for key in fitted)
-    is_csv = {one.path: one.path.suffix.lower() not in LOG_SUFFIXES for one in found}
-    yield from _columns([one for one in found if is_csv[one.path]], tables)
-    topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}
-    mappable = [f"{name}.{what.rpartition(': ')[2].split(', ')[0]}" for name, what in topics.items() if ": " in what]
-    if mappable:
-        yield from ("", '[topics]  # what other fields of topics stand for, such as "depth [m]"')
-        yield from (f'# {_quoted(field)} = "?"' for field in mappable)
-    if len([one for one in found if one.commands]) == 1 and len(found) > 1:
-        files = ", ".join(_quoted(one.path.name) for one in found)
-        yield from ("", f"[dives.{word or 'dive'}]", f"files = [{files}]")
-        yield "# other_clock = [...]  # files with another clock than the commands"
+def _draft(folder: Path, found: Sequence[Inspection], tables: TableHeaders, thrusters: Sequence[str], base: str) -> str:
+    """Return a draft, which is a complete rov.toml if a vehicle that ships, `base`, has such thrusters."""
+    name = folder.resolve().name or found[0].path.stem
+    word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    signals = {row.name for one in found for row in one.channels}
+    vehicle = load_vehicle(SHIPPED[base]) if base else None
+    columns, headers = _columns([one for one in found if not _is_bag(one.path)], tables)
+    return render(
+        "rov.toml.j2",
+        Path(__file__).parent / "templates",
+        quoted=_quoted,
+        names=one_line(brief(", ".join(dict.fromkeys(one.path.name for one in found)))),
+        is_own=not base and len(thrusters) > 1,
+        thrusters=thrusters,
+        shipped=SHIPPED,
+        base=base,
+        name=name,
+        identifier=word if word[:1].isalpha() else f"rov_{word}",
+        curves=tables.curves or ["all"],
+        axes=_axes(signals),
+        body=_body(vehicle) if vehicle else (),
+        effects=_effects(vehicle, signals),
+        columns=columns,
+        headers=_questions(headers),
+        fields=_questions(_fields(found)),
+        dives=_dives(found),
+    )
 
 
-def _columns(found: Sequence[Inspection], tables: TableHeaders) -> Iterator[str]:
-    """Yield the table [columns]. Unknown headers are comments."""
-    columns = {**tables.columns, **{title: meant for one in found for title, meant in one.columns.items()}}
-    unknown = dict.fromkeys(tables.unknown, "") | {name: what for one in found for name, what in one.unread.items()}
-    others = {name: what for name, what in unknown.items() if name not in columns}
-    if columns or others:
-        yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
-        yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
-    if others:
-        yield ("# These headers are not known. The comments show their values. Remove the first # of a header that you")
-        yield '# need, and write what it stands for, such as "depth [m]" or "surge velocity [m/s]".'
-    yield from (f'# {_quoted(title)} = "?"{what and f"   # {what}"}' for title, what in sorted(others.items()))
-
-
-def _hardware(thrusters: Sequence[str], curves: Sequence[str], signals: Collection[str]) -> Iterator[str]:
-    """Yield tables for the hardware of a vehicle; the values that must be given are question marks."""
-    curves = curves or ["all"]
-    yield from ("", "[body]", 'm_rov = { value = "?", unit = "kg", source = "Weighed" }')
-    yield 'I_r = { value = "?", unit = "kg.m2", source = "CAD" }   # moment of inertia about the vertical axis'
-    yield "# coupling = true   # if the vehicle turns while it moves in surge or sway"
-    yield from ("", "# a curve for each kind of thruster")
-    yield from (f"[curves.{name}]   # thrust_{name}.csv has the forces of one thruster" for name in curves)
-    curve = f'curve = "{curves[0]}"' if len(curves) == 1 else f'curve = "?"   # {" or ".join(curves)}'
-    for name in thrusters:
-        yield from ("", "[[thruster]]", f"name = {_quoted(name)}", curve)
-        yield 'direction = { value = ["?", "?", "?"], source = "CAD" }   # of its thrust: forward, starboard, down'
-        yield 'position = { value = ["?", "?", "?"], unit = "m", source = "CAD" }   # from the centre of mass'
+def _axes(signals: Collection[str]) -> list[str]:
+    """Return the names of the axes that the logs measure; every autopilot measures roll and pitch."""
     measured = [axis for axis in AXES.values() if {axis.position, f"{axis.name} velocity"} & {*signals}]
-    yield from ("", "# axes that the logs measure: remove those that no thruster drives")
-    yield from (f"[axes.{axis.name}]" for axis in measured if axis not in (ROLL, PITCH))
+    return [axis.name for axis in measured if axis not in (ROLL, PITCH)]
+
+
+def _body(vehicle: Vehicle) -> list[tuple[str, str, str]]:
+    """Return the names, values and units of the coefficients of a vehicle's body."""
+    units = {key: declaration.unit for key, declaration in vehicle.layout.coefficients.items()}
+    return [(key, f"{vehicle.rov[key]:g}", units[key]) for key in BODY if key in units]
+
+
+def _effects(vehicle: Vehicle | None, signals: Collection[str]) -> list[str]:
+    """Return the keys of [fit] for which the logs have the channels."""
+    needed = {"voltage": {"voltage"}, "attitude": {"roll angle", "pitch angle"}}
+    if vehicle and vehicle.layout.has_attitude:
+        del needed["attitude"]
+    return [key for key, names in needed.items() if names <= {*signals}]
+
+
+def _fields(found: Iterable[Inspection]) -> dict[str, str]:
+    """Return the descriptions of the fields of topics that are not recognised, without those of what is wanted."""
+    unread = {name: what for one in found if _is_bag(one.path) for name, what in one.unread.items()}
+    return {
+        name: what
+        for name, what in unread.items()
+        if any(name[:n] in unread for n, mark in enumerate(name) if mark == ".") and not NOT_MEASURED & words_of(name)
+    }
+
+
+def _is_bag(path: Path) -> bool:
+    """Return True for a log with topics, by its name."""
+    return path.suffix.lower() in LOG_SUFFIXES
+
+
+def _questions(names: Mapping[str, str]) -> list[str]:
+    """Return a line for each of the first names, with the description of its values."""
+    return first_of([one_line(f'{_quoted(name)} = "?"{what and f"   # {what}"}') for name, what in names.items()])
+
+
+def _dives(found: Sequence[Inspection]) -> list[list[str]]:
+    """Return the files of each dive of several files: one with commands, and those without commands that belong to it.
+
+    A file without commands belongs to the one whose times overlap most with its own, or, without an overlap, to the
+    only one with commands.
+    """
+    times = {one.path: _times(one) for one in found}
+    files = {one.path: [one.path.name] for one in found if one.commands}
+    for path, (start, end) in times.items():
+        if files and path not in files and isfinite(start):
+            overlaps = {other: min(end, times[other][1]) - max(start, times[other][0]) for other in files}
+            best = max(files, key=lambda other: overlaps[other])
+            if overlaps[best] > 0.0 or len(files) == 1:
+                files[best].append(path.name)
+    return [names for names in files.values() if len(names) > 1]
+
+
+def _times(inspection: Inspection) -> tuple[float, float]:
+    """Return the first and the last time of a log; the first is later if it has no times."""
+    rows = [row for row in (*inspection.commands, *inspection.channels) if row.samples]
+    return min((row.start for row in rows), default=inf), max((row.end for row in rows), default=-inf)
+
+
+def _columns(found: Iterable[Inspection], tables: TableHeaders) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what headers seem to mean, and the descriptions of the others."""
+    columns = {title: meant for title, meant in tables.columns.items() if meant}
+    others = dict.fromkeys(tables.columns, "")
+    for one in found:  # of several ranges of forces, such as [N 20] and [N 50], the widest
+        columns |= {title: max(columns.get(title, ""), meant, key=_full_force) for title, meant in one.columns.items()}
+        others |= one.unread
+    return columns, {title: others[title] for title in sorted(others) if title not in columns}
+
+
+def _full_force(header: str) -> float:
+    """Return the force at full command in a header such as `u_x [N 50]`; 0 in others, and -1 for no header."""
+    match = re.search(r"\[N\S* (\S+)\]$", header)
+    return float(match[1]) if match else 0.0 if header else -1.0
 
 
 def _quoted(text: str) -> str:
-    """Return a text as a basic string of TOML."""
-    clean = "".join(c if c.isprintable() else " " for c in text)
-    return '"{}"'.format(clean.replace("\\", "\\\\").replace('"', '\\"'))
+    """Return a text as a basic string of TOML. A byte of a name that is not Unicode becomes a blank."""
+    return '"{}"'.format("".join(map(_in_quotes, text)))
+
+
+def _in_quotes(character: str) -> str:
+    if character in '\\"':
+        return f"\\{character}"
+    if character.isprintable():
+        return character
+    return " " if "\ud800" <= character <= "\udfff" else f"\\U{ord(character):08X}"

@@ -1,5 +1,6 @@
 """The vehicle of the Python interface: loaded by name, changed, simulated, built."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -25,6 +26,7 @@ from rov_fmu.interface.arguments import (
 )
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError, shown
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.delay import MOST_WAITING
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
@@ -88,11 +90,26 @@ class VehicleModel(Vehicle):
         result = self._simulated(time, inputs, start, _NONE, record, workers=1, many=False)
         if len(result.failed):
             first = int(np.argmax(np.isnan(next(iter(result.values())))))
-            reason = "it overflows, or changes too fast for its step: check the inputs, the start and the coefficients"
+            length = result.time[first] - result.time[first - 1]
+            reason = f"it overflows, or never settles and needs shorter steps than {length:g} s"
             if self.layout.has_dead_time:
                 reason += f"; at most {MOST_WAITING} changes of commands can wait for the dead time"
             raise InputError(f"the motion cannot be computed up to time[{first}] = {result.time[first]:g} s: {reason}")
         return result
+
+    def _warn_if_turned_over(self, times: Array, quaternion: Array) -> None:
+        """Warn when a vehicle that begins upright turns over. The quaternion has the shape (4, vehicles, times)."""
+        _, roll, pitch, _ = np.square(quaternion) / np.square(quaternion).sum(axis=0)
+        over = roll + pitch > 0.5  # the cosine of the tilt, R_33 = 1 - 2 (roll + pitch), is negative
+        turned = over.any(axis=1) & ~over[:, 0]
+        if turned.any():
+            when = f"{times[over[turned].any(axis=0).argmax()]:g} s"
+            warnings.warn(
+                f"{self.name} turns over at {when}: nothing holds it level. On a real one, an autopilot does, with the "
+                "vertical thrusters; command them as well, or command less thrust",
+                UserWarning,
+                stacklevel=4,
+            )
 
     def simulate_many(
         self,
@@ -159,12 +176,13 @@ class VehicleModel(Vehicle):
         platforms: str | Sequence[str] | None = None,
         backend: str = "native",
         fmi: int = 2,
+        interface: str | None = None,
         osp: bool = False,
     ) -> "Built":
         """Build the FMU of the vehicle. The arguments, the result and the errors are those of `rov_fmu.build.build`."""
         from rov_fmu.build import build
 
-        return build(self, output, platforms=platforms, backend=backend, fmi=fmi, osp=osp)
+        return build(self, output, platforms=platforms, backend=backend, fmi=fmi, interface=interface, osp=osp)
 
     def _simulated(
         self,
@@ -190,19 +208,23 @@ class VehicleModel(Vehicle):
         recorded = checked_record(record, layout, units)
         vehicles = number_of_vehicles(values)
         try:
-            found = simulate(self.rov, commands.time, values, recorded, vehicles=vehicles, workers=workers)
+            attitude = QUATERNION if layout.has_attitude else ()
+            recording = [*recorded, *(name for name in attitude if name not in recorded)]
+            found = simulate(self.rov, commands.time, values, recording, vehicles=vehicles, workers=workers)
         except MemoryError as error:
             size = 8e-9 * vehicles * len(commands.time) * len(recorded)
             raise InputError(
                 f"time, record: the result needs {size:.3g} GB, which is more than the available memory. Record "
                 "fewer variables"
             ) from error
+        if attitude:
+            self._warn_if_turned_over(commands.time, found.values[[recording.index(name) for name in attitude]])
         rows = found.values
         if len(commands.time) > len(times):
             rows = rows[..., np.searchsorted(commands.time, times)]
         return Result(
             times,
-            {name: row if many else row[0] for name, row in zip(recorded, rows, strict=True)},
+            {name: row if many else row[0] for name, row in zip(recorded, rows, strict=False)},
             {name: units[name] for name in recorded},
             tuple(name for name in recorded if name in layout.state),
             np.flatnonzero(found.failed < len(commands.time)),

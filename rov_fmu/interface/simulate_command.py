@@ -1,6 +1,5 @@
 """The command `rov-fmu simulate`: the meaning of its options, the files that it writes, and what it prints."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
@@ -11,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.interface.arguments import TIME, Array
+from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, one_line, only, shown, wrapped
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, one_line, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, write_whole
-from rov_fmu.io.reading import read_text
-from rov_fmu.io.time_series import Series, series
 from rov_fmu.model.layout import Layout
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
 
@@ -47,10 +45,9 @@ def run(
     """Simulate a vehicle as the options say. Raises InputError, FileError, BuildError."""
     inputs: dict[str, Any] = {}
     if commands:
-        (_, times), *columns = _read_commands(commands, vehicle).items()
-        inputs = {TIME: times, **dict(columns)}
+        inputs = {**read_inputs(commands, vehicle.layout)}
         if stop is None:
-            stop = times[-1]
+            stop = float(inputs[TIME][-1])
         if stop < _SHORTEST:
             raise FileError(
                 f"{commands}: the last time is {stop:g} s, and must be at least {_SHORTEST:g}, without --stop"
@@ -134,20 +131,6 @@ def _percent(text: str) -> str:
     return f": {number:.6g} % is {number / 100.0:.6g}" if isfinite(number) else ""
 
 
-def _read_commands(path: Path, vehicle: VehicleModel) -> Series:
-    """Read a table of commands: the time (s) in the first column, and an input by its name in each other one."""
-    inputs = vehicle.layout.inputs
-
-    def error(reason: str) -> FileError:
-        return FileError(f"{path}: {reason}")
-
-    def check_column(name: str) -> None:
-        if name not in inputs:
-            raise error(f"column {shown(name)}: there is no such input{only(name, inputs)}")
-
-    return series(read_text(path), error, check_column)
-
-
 def moves(setting: str, layout: Layout) -> bool:
     """Return True if an option --set has an input or a state, so that the vehicle may move, and not a coefficient."""
     return setting.partition("=")[0].strip() not in layout.coefficients
@@ -192,11 +175,12 @@ def _plot_output(result: Result, path: Path, title: str) -> Output:
     """Return the plot of a result, in the format of the path's suffix."""
     from matplotlib.figure import Figure
 
+    from rov_fmu.report.plots.svg import without_font_warnings
+
     figure = result.plot(figure=Figure(layout="constrained"))
     figure.suptitle(wrapped(title, 90), fontsize="medium", parse_math=False)
     picture = BytesIO()
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)  # in the name of the vehicle
+    with without_font_warnings():
         figure.savefig(picture, format=path.suffix[1:].lower())
     return Output(path, picture.getvalue())
 

@@ -1,5 +1,6 @@
 """The command `rov-fmu sitl`: the meaning of its options, and what it prints."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -12,7 +13,7 @@ from rov_fmu.interface.arguments import checked_start, checked_values
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings
 from rov_fmu.io.interrupts import cleaned_up
-from rov_fmu.io.messages import InputError, did_you_mean, shown
+from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.model.layout import Layout
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
@@ -32,6 +33,7 @@ class Options:
     """Texts such as `V_N=0.3`."""
     bottom: float
     log: Path | None
+    force: bool
     log_rate: float
     duration: float | None
     host: str
@@ -51,7 +53,7 @@ def serve(path: Path, options: Options) -> None:
             raise InputError(
                 f"--host {options.host}, --port {options.port}: cannot listen there: {error.strerror}"
             ) from error
-        connection = Connection(setup)
+        connection = Connection(setup, lambda words: print_message(f"rov-fmu: {words}"))
         address, port = server.getsockname()
         paragraph(console(), _listed(setup.servos))
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
@@ -59,8 +61,10 @@ def serve(path: Path, options: Options) -> None:
         def end() -> None:
             connection.write_log()
             paragraph(console(), _summary(connection))
-            if options.log:
-                print_end([options.log], shell_words("rov-fmu", "identify", "--inspect", options.log))
+            if connection.logs:
+                print_end(connection.logs, shell_words("rov-fmu", "identify", "--inspect", connection.logs[0]))
+            elif options.log:
+                paragraph(console(), "No log was written, because no row was complete.")
 
         with cleaned_up(end):
             connection.serve(server, options.duration or inf)
@@ -76,6 +80,8 @@ def _setup(path: Path, options: Options) -> Setup:
     vehicle = load(path)
     if options.log:
         check_targets([options.log], [path, *vehicle.files])
+        if os.path.lexists(options.log) and not options.force:
+            raise InputError(f"--log {options.log}: the file exists; choose another name, or replace it with --force")
     given = read_settings(options.settings, vehicle.layout)
     vehicle = vehicle.with_(**given.coefficients)
     checked_values("inputs", given.inputs, vehicle.layout.inputs, many=False)
@@ -85,8 +91,8 @@ def _setup(path: Path, options: Options) -> Setup:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = given.inputs | given.start
-    currents = vehicle.electric_currents
-    return Setup(vehicle.rov, servos, start, currents, options.bottom, options.log, 1.0 / options.log_rate)
+    currents, interval = vehicle.electric_currents, 1.0 / options.log_rate
+    return Setup(vehicle.rov, servos, start, currents, options.bottom, options.log, interval, options.force)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

@@ -4,26 +4,37 @@ import csv
 import re
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from math import isfinite, isnan, nan
 from pathlib import Path
 from types import MappingProxyType
+from typing import TextIO
 
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, shown, similar
 from rov_fmu.io.reading import read_lines
 
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
-_HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]+)\]")
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
+"""A number as a cell has it, with a decimal point."""
+_HEADER = re.compile(r"(?P<name>[^\[\]]+)\[(?P<unit>[^\[\]]+)\]")
 _BLANKS = ("", "-", "nan")
+_MOST_COMPARED = 1000
+"""The largest number of headers that are compared with all known names, which takes long."""
 LARGEST = 500_000_000
 """The largest file that is read, in bytes. Its numbers and lines take up to a few times its size in memory."""
 
 Conversion = Callable[[float], float]
+"""The conversion of a number. It can be sent to the child process that reads a log."""
 
 
 class DataFileError(FileError):
     """A data file that cannot be used. Each mistake is a line with the place in the file, the value and a reason."""
+
+
+class UnreadableFileError(DataFileError):
+    """A data file of which nothing can be read, because it is damaged, cut short, or of an unknown kind."""
 
 
 class UnknownColumnError(ValueError):
@@ -48,6 +59,8 @@ class Column:
     """The smallest magnitude of a number other than zero, in the first unit."""
     also: tuple[str, ...] = ()
     """Other names of the column. They are recognised only together with one of its units."""
+    parse: Callable[[str], float] | None = None
+    """Returns the number, in the first unit, of a text that is no number, such as a date; raises ValueError."""
     conversions: Mapping[str, Callable[[tuple[float, ...]], Conversion]] = field(default_factory=dict)
     """Units that need more than a factor. Numbers may follow such a unit, as in `[us 1500 400]`. The function takes
     these numbers and returns the conversion to the first unit, or raises ValueError with the reason. The bounds do not
@@ -98,7 +111,7 @@ class FileColumn:
     convert: Conversion
     """The conversion of a number to the first unit."""
     factor: float
-    """How many of this unit make one of the first unit; 1 if a factor is not enough."""
+    """How many of this unit make one of the first unit; 1 if a factor is not enough. Negative with a minus sign."""
 
 
 def read_columns(
@@ -109,7 +122,8 @@ def read_columns(
     loose: bool = False,
     renamed: Mapping[str, str] = MappingProxyType({}),
     hint: str = "",
-    check_header: Callable[[Mapping[str, str], Iterable[str]], Iterable[str]] = lambda _, __: (),
+    check_header: Callable[[Mapping[str, str], Sequence[str]], Iterable[str]] = lambda _, __: (),
+    open_stream: Callable[[], TextIO] | None = None,
 ) -> Columns:
     """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError with all mistakes.
 
@@ -117,13 +131,14 @@ def read_columns(
     not a number becomes NaN, and a row with too many cells is left out. `renamed` has other headers for some of those
     of the file. `hint` ends the messages about unknown headers. `check_header` is called before the rows are
     read, with the headers that are read, by column, and with all other headers; it returns the mistakes in them.
+    `open_stream` opens the lines of a table that is not the text of the file itself.
     """
-    open_stream = read_lines(path, DataFileError, most=LARGEST)
+    open_stream = open_stream or read_lines(path, UnreadableFileError, most=LARGEST)
     separator = _separator(open_stream())
     lines = _csv_lines(path, open_stream(), separator)
     line, header = next(lines, (1, []))
     if not header:
-        raise DataFileError(f"{path}: the file is empty")
+        raise UnreadableFileError(f"{path}: the file is empty")
     titles, header = header, [renamed.get(title, title) for title in header]
     found = _find_columns(path, line, header, columns, others, hint)
     names = [column.name for column in found.values()]
@@ -171,10 +186,12 @@ def read_columns(
     return Columns(path, titles, headers, units, values, row_lines, unread, torn.count, rows)
 
 
-def read_header(path: Path) -> list[str]:
+def read_header(path: Path, open_stream: Callable[[], TextIO] | None = None) -> list[str]:
     """Return the cells of the first line that is not blank. Raises DataFileError."""
-    open_stream = read_lines(path, DataFileError, most=LARGEST)
+    open_stream = open_stream or read_lines(path, UnreadableFileError, most=LARGEST)
     _, header = next(_csv_lines(path, open_stream(), _separator(open_stream())), (1, []))
+    if not header:
+        raise UnreadableFileError(f"{path}: the file is empty")
     return header
 
 
@@ -223,12 +240,12 @@ def _csv_lines(path: Path, lines: Iterable[str], separator: str) -> Iterator[tup
 def _with_point(text: str, separator: str) -> str:
     """Return a number with a decimal point instead of a comma, unless commas separate the cells."""
     with_point = text.replace(",", ".", 1)
-    return with_point if separator != "," and _NUMBER.fullmatch(with_point) else text
+    return with_point if separator != "," and NUMBER.fullmatch(with_point) else text
 
 
 def _comma_hint(cells: list[str], separator: str) -> str:
     """Return a hint at decimal commas for a row with too many cells, or an empty text."""
-    commas = separator == "," and all(_NUMBER.fullmatch(cell) for cell in cells)
+    commas = separator == "," and all(NUMBER.fullmatch(cell) for cell in cells)
     return " (are these decimal commas? They need ; between the columns)" if commas else ""
 
 
@@ -239,7 +256,7 @@ def _is_blank(text: str) -> bool:
 
 def _number(text: str) -> float | None:
     """Return a text as a finite number, or None."""
-    number = float(text) if _NUMBER.fullmatch(text) else nan
+    number = float(text) if NUMBER.fullmatch(text) else nan
     return number if isfinite(number) else None
 
 
@@ -254,10 +271,13 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
     if not text:
         raise ValueError("this cell is missing; leave out the row if nothing was measured")
     if (number := _number(text)) is None:
+        if column.parse:
+            with suppress(ValueError):
+                return column.parse(text)
         if loose:
             return nan
         hint = ""
-        if "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1)):
+        if "," in text and NUMBER.fullmatch(text.replace(",", ".", 1)):
             hint = " with a decimal point, unless ; separates the columns"
         elif ";" in text or "\t" in text:
             hint = "; what separates the cells must be the same as in the header"
@@ -267,12 +287,14 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
     value = file_column.convert(number)
     if file_column.unit in column.conversions:
         return value
+    lower, upper = ("least", "most") if factor > 0.0 else ("most", "least")
     if column.minimum is not None and value < column.minimum:
-        raise ValueError(f"must be at least {column.minimum * factor:g}")
+        raise ValueError(f"must be at {lower} {column.minimum * factor:g}")
     if column.maximum is not None and value > column.maximum:
-        raise ValueError(f"must be at most {column.maximum * factor:g}")
+        raise ValueError(f"must be at {upper} {column.maximum * factor:g}")
     if 0.0 < abs(value) < column.least:
-        raise ValueError(f"must be 0, or {column.least * factor:g} at least, or {-column.least * factor:g} at most")
+        least = column.least * abs(factor)
+        raise ValueError(f"must be 0, or {least:g} at least, or {-least:g} at most")
     return value
 
 
@@ -283,53 +305,85 @@ def _find_columns(
     path: Path, line: int, header: list[str], columns: Mapping[str, Column], others: bool, hint: str
 ) -> dict[int, FileColumn]:
     """Return the columns that are read, by their index in the header. Raises DataFileError."""
-    if not any(_may_be_header(title, columns) for title in header):
+    known = KnownColumns(columns)
+    if not any(_may_be_header(title, known) for title in header[:_MOST_COMPARED]):
         needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
         reason = f"the first line must be a header that names the columns, such as {needed}"
         if all(any(map(str.isalpha, title)) for title in header):
             reason = f"none of these headers is known; the first line must have the headers {needed}{hint}"
         raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
     found: dict[int, FileColumn] = {}
+    names: set[str] = set()
     wrong = []
     for place, title in enumerate(header):
         try:
-            if column := find_column(title, columns, others):
-                if any(column.name == before.name for before in found.values()):
+            if column := known.find(title, others):
+                if column.name in names:
                     raise ValueError("this column occurs twice")
                 found[place] = column
+                names.add(column.name)
         except ValueError as error:
             is_unknown = isinstance(error, UnknownColumnError) and not str(error).endswith("?")
             end = hint if is_unknown else ""
             wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}{end}")
-    names = {column.name for column in found.values()}
     missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
         first, *more = (repr(_title(name, column)) for name, column in missing.items())
         reason = ", and so is ".join([f"{first} is missing", *more])
         unread = {_name_and_unit(title)[0]: title for place, title in enumerate(header) if place not in found}
-        near = [shown(unread[name]) for wanted in missing for name in similar(wanted, unread)]
-        hint = f"; is it the column {' or '.join(near)}?" if near else ""
+        near = [shown(unread[name]) for wanted in missing for name in similar(wanted, [*unread][:_MOST_COMPARED])]
+        hint = f"; is it the column {' or '.join(near)}?" if near else f"{_listed_titles(unread)}{hint}"
         wrong.append(f"{path}, line {line}, column {len(header) + 1}: {reason}{hint}")
     if wrong:
         raise DataFileError(*wrong[:MOST])
     return found
 
 
-def find_column(title: str, columns: Mapping[str, Column], others: bool) -> FileColumn | None:
-    """Return the column with this header, or None if it is not read. Raises ValueError with only the reason."""
-    name, unit_and_numbers = _name_and_unit(title)
-    word, *numbers = unit_and_numbers.split() or [""]
-    for key, column in columns.items():
-        if name in map(_folded, (key, *column.also)) and (unit := _find_unit(word, column)):
-            return FileColumn(key, column, unit, *_conversion(unit, numbers, column))
-    for key, column in columns.items():
-        if _folded(key) == name:
-            raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(column))}")
-    if others:
-        return None
-    titles = {key: _title(key, column) for key, column in columns.items()}
-    known = ", ".join(titles.values())
-    raise UnknownColumnError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
+def _listed_titles(unread: Mapping[str, str]) -> str:
+    """Return words about the columns that are not known, or an empty text."""
+    return f". The other columns are {brief(', '.join(map(repr, unread.values())))}" if unread else ""
+
+
+class KnownColumns:
+    """The columns that a file may have, by their names, so that a header is found without a look at all of them."""
+
+    def __init__(self, columns: Mapping[str, Column]) -> None:
+        self._columns = columns
+        self.keys: dict[str, dict[str, None]] = {}
+        """The columns that may have a name, by the name as it is compared."""
+        for key, column in columns.items():
+            for name in (key, *column.also):
+                self.keys.setdefault(_folded(name), {})[key] = None
+
+    def find(self, title: str, others: bool) -> FileColumn | None:
+        """Return the column with this header, or None if it is not read. Raises ValueError with only the reason.
+
+        A header that begins with a minus sign is that of a column with the opposite sign.
+        """
+        name, unit_and_numbers = _name_and_unit(title.removeprefix("-"))
+        word, *numbers = unit_and_numbers.split() or [""]
+        keys = self.keys.get(name, {})
+        for key in keys:
+            column = self._columns[key]
+            if unit := _find_unit(word, column):
+                convert, factor = _conversion(unit, numbers, column)
+                if title.startswith("-"):
+                    convert, factor = partial(_opposite, convert), -factor
+                return FileColumn(key, column, unit, convert, factor)
+        if key := next((key for key in keys if _folded(key) == name), ""):
+            raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(self._columns[key]))}")
+        if others:
+            return None
+        titles = {key: _title(key, column) for key, column in self._columns.items()}
+        known = ", ".join(titles.values())
+        raise UnknownColumnError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
+
+    def has(self, title: str, *, in_any_unit: bool = False) -> bool:
+        """Return True if a file may have a column with this header; or with its name, in a unit that is not known."""
+        try:
+            return self.find(title, others=True) is not None
+        except ValueError:
+            return in_any_unit
 
 
 def _name_and_unit(title: str) -> tuple[str, str]:
@@ -338,11 +392,10 @@ def _name_and_unit(title: str) -> tuple[str, str]:
     return _folded(match["name"] if match else title), match["unit"] if match else ""
 
 
-def _may_be_header(title: str, columns: Mapping[str, Column]) -> bool:
+def _may_be_header(title: str, columns: KnownColumns) -> bool:
     """Return True if a title has a unit, or a name that is similar to that of a column."""
     name, unit = _name_and_unit(title)
-    names = [_folded(known) for key, column in columns.items() for known in (key, *column.also)]
-    return bool(unit) or bool(similar(name, names))
+    return bool(unit) or bool(similar(name, columns.keys))
 
 
 def _conversion(unit: str, numbers: list[str], column: Column) -> tuple[Conversion, float]:
@@ -355,7 +408,15 @@ def _conversion(unit: str, numbers: list[str], column: Column) -> tuple[Conversi
     if numbers:
         raise ValueError(f"must be [{unit}] alone")
     factor = column.units[unit]
-    return lambda number: number / factor, factor
+    return partial(_divided, factor), factor
+
+
+def _divided(by: float, number: float) -> float:
+    return number / by
+
+
+def _opposite(convert: Conversion, number: float) -> float:
+    return -convert(number)
 
 
 def _folded(text: str) -> str:
@@ -399,4 +460,19 @@ def pulses(numbers: tuple[float, ...] = ()) -> Conversion:
     neutral, span = numbers if len(numbers) == 2 else (NEUTRAL, 0.0 if numbers else SPAN)
     if span == 0.0 or neutral <= 0.0:
         raise ValueError("must be [us], or [us NEUTRAL SPAN] such as [us 1500 400]")
-    return lambda pulse: 0.0 if pulse in NO_OUTPUT else (pulse - neutral) / span
+    return partial(_command, neutral, span)
+
+
+def _command(neutral: float, span: float, pulse: float) -> float:
+    return 0.0 if pulse in NO_OUTPUT else (pulse - neutral) / span
+
+
+# ---- Forces as commands ----------------------------------------------------------------------------------------------
+
+
+def shares(numbers: tuple[float, ...] = ()) -> Conversion:
+    """Return the conversion of a force to the share of the force at full command, which is the only number. Raises
+    ValueError."""
+    if len(numbers) != 1 or numbers[0] <= 0.0:
+        raise ValueError("must be a unit of force with the force at full command, such as [N 50]")
+    return partial(_divided, numbers[0])

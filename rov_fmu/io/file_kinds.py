@@ -8,7 +8,7 @@ from rov_fmu.io.messages import FileError
 VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (TOML)", "an FMU", "a page (HTML)"
 GAZEBO_MODEL = "a model for Gazebo (SDF)"
 TESTS_FILE = "the rov.toml of a folder of tank tests"
-_TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot or of ROS"
+_TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot, of ROS or of MATLAB"
 DATAFLASH_SUFFIX = ".bin"
 """The suffix of a DataFlash log, which the autopilot writes."""
 MAVLINK_SUFFIXES = (DATAFLASH_SUFFIX, ".tlog")
@@ -18,11 +18,13 @@ ULOG_SUFFIX = ".ulg"
 BAG_SUFFIXES = (".bag", ".db3", ".mcap")
 """The suffixes of a bag of ROS 1 and of the files in a bag of ROS 2."""
 LOG_SUFFIXES = (*MAVLINK_SUFFIXES, ULOG_SUFFIX, *BAG_SUFFIXES)
-"""The suffixes of logs other than CSV."""
+"""The suffixes of logs that are no tables."""
+TABLE_SUFFIXES = (".csv", ".mat")
+"""The suffixes of tables: CSV files, and variables of MATLAB."""
 _BY_SUFFIX = {
     **{".toml": _TOML, ".fmu": FMU, ".html": PAGE, ".sdf": GAZEBO_MODEL},
     **dict.fromkeys((".csv", ".tsv"), _TABLE),
-    **dict.fromkeys(LOG_SUFFIXES, _LOG),
+    **dict.fromkeys((*LOG_SUFFIXES, ".mat"), _LOG),
 }
 _BY_KEY = {
     **dict.fromkeys(("stop_time", "vary", "figures"), PLAN),

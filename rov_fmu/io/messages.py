@@ -4,7 +4,7 @@ import os
 import reprlib
 import shutil
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from textwrap import wrap
@@ -34,12 +34,20 @@ class FileError(ValueError):
     def __init__(self, *reasons: str) -> None:
         super().__init__("\n".join(map(one_line, reasons)))
 
+    def __reduce__(self) -> tuple[type["FileError"], tuple[str, ...]]:
+        """Return what pickle needs: the lines."""
+        return type(self), tuple(str(self).split("\n"))
 
-class InputError(ValueError):
-    """An argument that cannot be used. The message is a line with its name, its value and what is allowed."""
+
+class _OneLineError(Exception):
+    """An exception whose message is one line."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(one_line(reason))
+
+
+class InputError(_OneLineError, ValueError):
+    """An argument that cannot be used. The message is a line with its name, its value and what is allowed."""
 
 
 class UnknownNameError(InputError, KeyError):
@@ -48,11 +56,11 @@ class UnknownNameError(InputError, KeyError):
     __str__ = ValueError.__str__
 
 
-class ProofError(Exception):
+class ProofError(_OneLineError):
     """An FMU that does not reproduce the results that it contains."""
 
 
-class StudyError(Exception):
+class StudyError(_OneLineError):
     """A study that cannot continue. Its finished runs are kept."""
 
 
@@ -69,20 +77,36 @@ def lines_on(path: Path, mistakes: Iterable[str]) -> list[str]:
     return lines
 
 
+def first_of(lines: Sequence[str], most: int = 100) -> list[str]:
+    """Return the first of many lines, and a line with the number of the others."""
+    more = len(lines) - most
+    return [*lines[:most], *([f"{more} more"] if more > 0 else [])]
+
+
 def one_line(text: str) -> str:
     """Return the text with line breaks, control characters and undecodable bytes escaped, as Python writes them."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def on_terminal(text: str) -> str:
-    """Return the text as stderr gets it: on a terminal in lines that end between words, in a pipe as it is."""
+def print_message(text: str) -> None:
+    """Print a line to stderr: on a terminal in lines that end between words, in a pipe as it is.
+
+    All messages are printed here, and all other text by `rov_fmu.report.console`. Both escape control characters,
+    because a name or value of a stranger's file could otherwise change what the terminal shows.
+    """
+    if sys.stderr:
+        print(_on_terminal(one_line(text)), file=sys.stderr)
+
+
+def _on_terminal(line: str) -> str:
+    """Return a line as stderr gets it."""
     if not (sys.stderr and sys.stderr.isatty()):
-        return text
+        return line
     try:
         columns = os.get_terminal_size(sys.stderr.fileno()).columns
     except (OSError, ValueError):
         columns = 0
-    return wrapped(text, columns or shutil.get_terminal_size().columns, "  ")
+    return wrapped(line, columns or shutil.get_terminal_size().columns, "  ")
 
 
 def wrapped(text: str, width: int, indent: str = "") -> str:
@@ -96,10 +120,10 @@ def brief(text: str, most: int = 80) -> str:
     return clean if len(clean) <= most else f"{clean[: most - 3]}..."
 
 
-def listed(words: Iterable[str]) -> str:
+def listed(words: Iterable[str], before_last: str = "and") -> str:
     """Return words as in a sentence: a, b and c."""
     *some, last = [*words] or [""]
-    return f"{', '.join(some)} and {last}" if some else last
+    return f"{', '.join(some)} {before_last} {last}" if some else last
 
 
 def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:

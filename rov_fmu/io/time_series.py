@@ -3,7 +3,8 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Sequence
+from array import array
+from collections.abc import Callable, Iterator, Sequence
 from math import isfinite, nan
 
 from rov_fmu.io.messages import FileError, shown
@@ -13,7 +14,7 @@ _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
 
 
-class Series(dict[str, Sequence[float]]):
+class Series(dict[str, "array[float]"]):
     """The columns of a CSV file by name; the first is the time."""
 
     lines: Sequence[int] = ()
@@ -25,16 +26,10 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
 
     A mistake raises the exception that `error` returns for its reason. `check_column` may raise one about a name.
     """
-    try:
-        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-        lines = [(reader.line_num, line) for line in reader if any(map(str.strip, line))]
-    except csv.Error as wrong:
-        raise error(f"not CSV: {wrong}") from wrong
-    if not lines:
+    lines = _lines(text, error)
+    if (first := next(lines, None)) is None:
         raise error("is empty")
-    if len(lines) < 2:
-        raise error("has no rows below a header")
-    header = [name.strip() for name in lines[0][1]]
+    header = [name.strip() for name in first[1]]
     if all(_NUMBER.fullmatch(name) for name in header):
         raise error("the first line must be a header that names the columns: the time, and then variables")
     if len(header) == 1 and (mark := next((mark for mark in ";\t" if mark in header[0]), None)):
@@ -46,18 +41,31 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
             plain = shown(_UNIT.sub("", name))
             raise error(f"column {shown(name)}: must be {plain} without a unit; a command of 30 % is 0.3 here")
         check_column(name)
-    rows: list[list[float]] = []
-    for n, line in lines[1:]:
+    found, numbers = Series({name: array("d") for name in header}), array("L")
+    for n, line in lines:
         if len(line) != len(header):
             raise error(f"line {n}: {len(line)} cells below {len(header)} columns")
-        rows.append(
-            [number(cell, f"line {n}, column {shown(name)}", error) for name, cell in zip(header, line, strict=True)]
-        )
-        if len(rows) > 1 and rows[-1][0] < rows[-2][0]:
+        for (name, column), cell in zip(found.items(), line, strict=True):
+            column.append(number(cell, f"line {n}, column {shown(name)}", error))
+        times = found[header[0]]
+        if len(times) > 1 and times[-1] < times[-2]:
             raise error(f"line {n}: the time goes back")
-    found = Series(zip(header, zip(*rows, strict=True), strict=True))
-    found.lines = [n for n, _ in lines[1:]]
+        numbers.append(n)
+    if not numbers:
+        raise error("has no rows below a header")
+    if len(header) < 2:
+        raise error("has no columns beside the time")
+    found.lines = numbers
     return found
+
+
+def _lines(text: str, error: Callable[[str], FileError]) -> Iterator[tuple[int, list[str]]]:
+    """Yield the lines that are not empty, each with its number. They are not kept, because cells take much memory."""
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        yield from ((reader.line_num, line) for line in reader if any(map(str.strip, line)))
+    except csv.Error as wrong:
+        raise error(f"not CSV: {wrong}") from wrong
 
 
 def number(text: str, where: str, error: Callable[[str], FileError]) -> float:

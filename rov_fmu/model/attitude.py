@@ -4,8 +4,8 @@ The state of the vehicle is a quaternion (eta, epsilon_1, epsilon_2, epsilon_3),
 contains the rotation matrix R from the body frame to the earth frame instead: R' = R S(omega) is a sum of products.
 """
 
-from collections.abc import Callable
-from math import isfinite, nan, tau
+from collections.abc import Mapping, Sequence
+from math import atan2, isfinite, nan, tau
 
 from .formula import joined
 
@@ -35,17 +35,28 @@ def unwrapped(angle: float, near: float) -> float:
     return angle + tau * round(turns) if isfinite(turns) else nan
 
 
-def followed(angle_at: Callable[[float], float], start: float, end: float, angle: float, depth: int = 40) -> float:
-    """Follow an angle from one time to another, and return the unwrapped angle at the end.
+BESIDE_NOSE = (1.0, 1e-6, 0.618e-6)
+"""A direction in the body frame just beside the nose, for which turns are counted, as in fmu_src/c/heading.c.
 
-    In between, the vehicle must turn by at most 1 rad about any axis. The angle itself turns faster where the nose
-    points nearly upward or downward, so the time is halved until the angle changes by at most 1 rad.
-    """
-    after = unwrapped(angle_at(end), angle)
-    if not abs(after - angle) > 1.0 or depth == 0:  # also when it overflows
-        return after
-    middle = 0.5 * (start + end)
-    return followed(angle_at, middle, end, followed(angle_at, start, middle, angle, depth - 1), depth - 1)
+The heading of the nose jumps by half a turn where the nose passes the vertical, and rounding would choose the side.
+"""
+
+
+def beside_nose(values: Mapping[str, float], rows: Sequence[int] = (1, 2)) -> list[float]:
+    """Return components of the direction beside the nose, by default north and east, for a rotation matrix."""
+    a, b, c = BESIDE_NOSE
+    return [a * values[f"R_{row}1"] + (b * values[f"R_{row}2"] + c * values[f"R_{row}3"]) for row in rows]
+
+
+def turned_heading(values: Mapping[str, float], near: float) -> float:
+    """Return the heading of the direction beside the nose that differs from another heading by at most half a turn."""
+    north, east = beside_nose(values)
+    return unwrapped(atan2(east, north), near)
+
+
+def unwrapped_heading(psi: float, values: Mapping[str, float], near: float) -> float:
+    """Return the heading psi of the nose, without its turns, in the turn that follows from a heading before."""
+    return unwrapped(psi, turned_heading(values, near))
 
 
 def rotation_formulas() -> dict[str, str]:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from .attitude import QUATERNION, start_angle_formulas, start_formulas
 from .equation import equation_of
-from .formula import names, tangent
+from .formula import CHANGE, names, tangent
 from .layout import Layout
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
@@ -29,7 +29,7 @@ def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
     for known in (*layout.inputs, *layout.state):
         kind_of_slope = {known: 0}  # the derivative of the known itself is 1
         for name, formula in formulas.items():
-            changing = {other: f"slope_{other}" for other in names(formula) if other in kind_of_slope}
+            changing = {other: f"{CHANGE}{other}" for other in names(formula) if other in kind_of_slope}
             slope = tangent(formula, changing.get) if changing else None
             if slope is not None:
                 inner = kinds | {word: kind_of_slope[other] for other, word in changing.items()}

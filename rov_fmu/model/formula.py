@@ -15,6 +15,8 @@ FUNCTIONS = {"sin": "sin", "cos": "cos", "abs": "fabs", "sqrt": "sqrt", "pow": "
 """The functions that a formula may call, with their names in C."""
 SLOPE = "slope_of_"
 """The name of the derivative of a thrust table begins with this."""
+CHANGE = "change_of_"
+"""The name of the change of a number begins with this. No name that comes from a vehicle file begins so."""
 _OPERATORS: Mapping[type[ast.AST], str] = {
     ast.Add: "+",
     ast.Sub: "-",

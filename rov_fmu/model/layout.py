@@ -13,7 +13,7 @@ which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the c
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sin
@@ -322,6 +322,11 @@ class ThrustTable:
     voltage: float = 0.0
     """The voltage at which the table was measured, V; 0 if the curve has only this table."""
 
+    @property
+    def function(self) -> str:
+        """The name of the function that formulas call."""
+        return f"thrust_{self.name}"
+
     def force(self, command: float) -> float:
         """Return the force at a command between -1 and 1.
 
@@ -491,6 +496,25 @@ class Layout:
             curves=tuple(replace(curve, keys=keys(CURVE, curve.keys, curve.name)) for curve in self.curves),
         )
 
+    def renamed(self, rename: Callable[[str, str], str]) -> "Layout":
+        """Return the layout with other names of its parts.
+
+        `rename` is called once for each part with its kind and its name. The kinds are curves, thruster, fin and
+        inputs, as in the vehicle file, and table.
+        """
+        tables = [tuple(replace(table, name=rename("table", table.name)) for table in c.tables) for c in self.curves]
+        curves = [replace(c, name=rename("curves", c.name), tables=t) for c, t in zip(self.curves, tables, strict=True)]
+        curve_of = {old.name: new.name for old, new in zip(self.curves, curves, strict=True)}
+        thrusters = [replace(t, name=rename("thruster", t.name), curve=curve_of[t.curve]) for t in self.thrusters]
+        fins = [replace(fin, name=rename("fin", fin.name)) for fin in self.fins]
+        driven = {old.name: new.name for old, new in zip(self.thrusters, thrusters, strict=True)}
+        driven |= {old.name: new.name for old, new in zip(self.fins, fins, strict=True)}
+        mix = {
+            rename("inputs", name): {driven[one]: gain for one, gain in gains.items()}
+            for name, gains in self.mix.items()
+        }
+        return replace(self, curves=tuple(curves), thrusters=tuple(thrusters), fins=tuple(fins), mix=mix)
+
     # -- lookup --
 
     @cached_property
@@ -624,7 +648,9 @@ class Layout:
         if self.pulse is None:
             return Declaration("1", f"{words}; saturates at ±1", -1.0, 1.0)
         low, neutral, high = self.pulse
-        text = f"{words}; pulse width, {neutral:g} is neutral, saturates at {low:g} and {high:g}"
+        text = (
+            f"{words}; pulse width, {neutral:g} is neutral, saturates at {low:g} and {high:g}; 0 is no signal: neutral"
+        )
         return Declaration("us", text, low, high, neutral, start=neutral)
 
     def command_of(self, fraction: float) -> float:
@@ -635,9 +661,10 @@ class Layout:
         return neutral + fraction * (high - neutral if fraction > 0.0 else neutral - low)
 
     def fraction_of(self, command: float) -> float:
-        """Return the fraction from -1 to 1 that a command stands for."""
+        """Return the fraction from -1 to 1 that a command stands for. A pulse of 0 is no signal, and stands for 0."""
         if self.pulse is not None:
             low, neutral, high = self.pulse
+            command = command or neutral
             command = (command - neutral) / (high - neutral if command > neutral else neutral - low)
         return max(-1.0, min(1.0, command))
 
@@ -668,10 +695,22 @@ class Layout:
             if self.has_attitude:
                 found["V_D"] = Declaration("m/s", "Velocity of a steady current, downward")
         if self.voltage is not None:
-            voltages = [table.voltage for curve in self.curves for table in curve.tables if table.voltage]
-            low, high = (min(voltages), max(voltages)) if voltages else (0.0, inf)
+            lows, highs = zip(*(self.voltage_ranges or [(0.0, inf)]), strict=True)
+            low, high = min(lows), max(highs)
             found["voltage"] = Declaration("V", "Voltage of the battery", low, high, 10.0, start=self.voltage)
         return found
+
+    @cached_property
+    def voltage_ranges(self) -> dict[tuple[float, float], str]:
+        """The lowest and the highest voltage of the curves with several tables, with the names of the curves.
+
+        Beyond its range, the thrust of a curve stays that of the nearest table.
+        """
+        names: dict[tuple[float, float], list[str]] = {}
+        for curve in self.curves:
+            if len(curve.tables) > 1:
+                names.setdefault((curve.tables[0].voltage, curve.tables[-1].voltage), []).append(curve.name)
+        return {bounds: " and ".join(curves) for bounds, curves in names.items()}
 
     @cached_property
     def usual_inputs(self) -> dict[str, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from math import inf
 
-from .attitude import unwrapped
+from .attitude import unwrapped_heading
 from .equation import equation_of
 from .formula import compiled
 from .layout import ARM, HEAVE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm, delayed_name
@@ -32,7 +32,9 @@ class _Formulas:
 
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
-_thrust_of = cache(lambda curve: compiled(curve_formulas(curve), {table.name: table.force for table in curve.tables}))
+_thrust_of = cache(
+    lambda curve: compiled(curve_formulas(curve), {table.function: table.force for table in curve.tables})
+)
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class Rov:
         """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
         found = self._formulas.calculate(self._values(inputs, state))
         for name in self.layout.continued:
-            found[name] = unwrapped(found[name], state.get(name, found[name]))
+            found[name] = unwrapped_heading(found[name], found, state.get(name, found[name]))
         return {name: found[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:

@@ -12,23 +12,24 @@ them have settled, the rest of the step is straight or circular motion.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import atan2, ceil, copysign, hypot, inf, isfinite, nan, prod, sin, tau
+from math import atan2, copysign, hypot, inf, isfinite, nan, prod, sin, tau
 from operator import mul
 
-from .attitude import QUATERNION, followed, unwrapped
+from .attitude import BESIDE_NOSE, QUATERNION, beside_nose, turned_heading, unwrapped
 from .equation import Equation
 from .formula import compiled, names
 
 ORDER = 20
 """The order of the series. A higher order costs more than its longer pieces save. The C code has its own order."""
-MOST_PIECES = 10_000
-"""The largest number of pieces of a step. It is enough for 1,000 s of motion that changes at 10/s and never settles. A
-step that needs more is not computed."""
+MOST_PIECES = 100_000
+"""The largest number of pieces of a step. A vehicle that swings without linear drag never settles, and each swing takes
+a few pieces. A step that needs more is not computed. The C code, which is much faster, has its own number."""
 
 _EPSILON = 2.0**-53  # half a unit in the last place of 1
 _FADED = 1e-40  # a state below this share of its largest size has no effect any more, whatever the drag is
 _RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers beyond ORDER are below rounding
 _SMALLEST = 1e-322  # rounding keeps smaller numbers from fading any further
+_MOST_PARTS = 4096  # of a piece, between which the attitude is computed
 _SHORTEST = 2.0**-20  # within this share of a piece, the drag of a velocity that just touches 0 is negligible
 
 Series = Sequence[Sequence[float]]
@@ -96,10 +97,9 @@ class Motion:
         self.settled: set[int] = set()
         self.unit = 0.0  # the unit of time of the current series, s
         self.heading = 0.0
-        """The unwrapped heading of a vehicle with an attitude."""
+        """The heading of a vehicle with an attitude, with its turns, for the direction beside the nose."""
         if table.equation.ends:
-            angle = self.angle(self.y)
-            self.heading = unwrapped(angle, values.get("psi", angle))
+            self.heading = turned_heading(found, values.get("psi", 0.0))
         self.hold()
 
     def advance(self, h: float) -> bool:
@@ -161,19 +161,30 @@ class Motion:
         rows = [[self.k[n] * prod(y[i] for i in factors) for n, factors in row] for row in self.table.rows]
         return [_sum(row) for row in rows], [_sum(map(abs, row)) for row in rows]
 
-    # ---- Heading ----
+    # ---- Attitude ----
 
-    def angle(self, y: Sequence[float]) -> float:
-        """Return the heading between -pi and pi."""
-        place = self.table.place
-        return atan2(y[place["R_21"]], y[place["R_11"]])
+    def follow(self, y_at: Callable[[float], Sequence[float]], end: float, turn: float, swing: float) -> None:
+        """Follow the turns of the heading, and the sign of the quaternion, from time 0 to the end of a motion.
 
-    def follow(self, y_at: Callable[[float], Sequence[float]], end: float, turn: float) -> None:
-        """Follow the heading from time 0 to the end of a motion, in which the vehicle turns by at most `turn`."""
-        parts = min(ceil(turn), MOST_PIECES) or 1
-        for n in range(parts):
-            times = end * n / parts, end * (n + 1) / parts
-            self.heading = followed(lambda t: self.angle(y_at(t)), *times, self.heading)
+        Per unit of time, the vehicle turns by at most `turn`, and the direction beside the nose by at most `swing`. In
+        each part of this time, the direction moves by less than its distance from the vertical, so that its heading is
+        that of the same turn; and the vehicle turns by less than half a turn, so that its quaternion has the sign that
+        is nearer to the one before.
+        """
+        t, horizontal = 0.0, beside_nose(self.rotation(y_at(0.0)))
+        for n in range(1, _MOST_PARTS + 1):
+            if not t < end:
+                break
+            part = min(0.9 * hypot(*horizontal) / (swing or _SMALLEST), 2.0 / (turn or _SMALLEST))
+            t = min(t + max(part, end / _MOST_PARTS), end) if n < _MOST_PARTS else end
+            values = self.rotation(y_at(t))
+            found = self.table.end_formulas({**self.start, **values})
+            self.start |= {name: found[f"next_{name}"] for name in QUATERNION}
+            horizontal, self.heading = beside_nose(values), turned_heading(values, self.heading)
+
+    def rotation(self, y: Sequence[float]) -> dict[str, float]:
+        """Return the entries of the rotation matrix by name."""
+        return {name: y[self.table.place[name]] for name in self.table.equation.orientation if name.startswith("R_")}
 
     # ---- Settled states ----
 
@@ -223,27 +234,29 @@ class Motion:
                 mean[i] += 2.0 * half * half / angle * along + (1.0 - whole / angle) * across
                 end[i] += whole * along + 2.0 * half * half * across
             if table.equation.ends:
-                self.follow_circle(first, second, w, angle)
+                sines = [x / w if i in turning else 0.0 for i, x in enumerate(first)]
+                self.follow_circle(sines, [x / w / w if i in turning else 0.0 for i, x in enumerate(second)], angle)
         rates, _ = self.rates(mean)
         self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(end)]
 
-    def follow_circle(self, first: Sequence[float], second: Sequence[float], w: float, angle: float) -> None:
-        """Follow the heading through a rotation with constant velocities.
+    def follow_circle(self, along: Sequence[float], across: Sequence[float], angle: float) -> None:
+        """Follow the attitude through a rotation with constant velocities.
 
-        Every whole turn changes it by the same angle.
+        At the angle a, the table has the states y + sin(a) along + (1 - cos(a)) across. Every whole turn changes the
+        heading by the same angle, and the sign of the quaternion.
         """
-        start = self.y
 
         def y_at(t: float) -> list[float]:
-            change = (
-                (sin(t) * a / w + 2.0 * sin(0.5 * t) ** 2 * b / w / w) for a, b in zip(first, second, strict=True)
-            )
-            return [x + dx for x, dx in zip(start, change, strict=True)]
+            whole, half = sin(t), sin(0.5 * t)
+            return [x + whole * a + 2.0 * half * half * b for x, a, b in zip(self.y, along, across, strict=True)]
 
-        before = self.heading
-        self.follow(y_at, tau, tau)
-        self.heading = before + (self.heading - before) * (angle // tau)
-        self.follow(y_at, angle % tau, tau)
+        swing, turns = hypot(*beside_nose(self.rotation(along), (1, 2, 3))), angle // tau
+        before, start = self.heading, dict(self.start)
+        self.follow(y_at, tau, 1.0, swing)
+        self.heading = before + (self.heading - before) * turns
+        if turns % 2.0 == 0.0:
+            self.start = start
+        self.follow(y_at, angle % tau, 1.0, swing)
 
     # ---- A piece ----
 
@@ -310,19 +323,20 @@ class Motion:
         self.hold()
 
     def follow_series(self, series: Series, length: float) -> None:
-        """Follow the heading through a piece."""
-        place, n = self.table.place, [self.table.place[name] for name in ("R_11", "R_21")]
-        rates = [
-            sum(abs(x) * length**k for k, x in enumerate(series[place[v]])) for v in "pqr" if v in place
-        ]  # bounds of the angular velocities
+        """Follow the attitude through a piece."""
+        place, entries = self.table.place, [self.table.place[name] for name in self.rotation(self.y)]
+        bounds = {v: sum(abs(x) * length**k for k, x in enumerate(series[place[v]])) for v in "pqr" if v in place}
+        about = {"p": 2.0 * BESIDE_NOSE[1], "q": 1.0, "r": 1.0}
+        turn = self.unit * hypot(*bounds.values())
+        swing = self.unit * hypot(*(about[v] * bound for v, bound in bounds.items()))
 
         def y_at(t: float) -> list[float]:
             y = list(self.y)
-            for i in n:
-                y[i] = series[i][0] + _change(series[i], t)
+            for i in entries:
+                y[i] += _change(series[i], t)
             return y
 
-        self.follow(y_at, length, hypot(*rates) * self.unit * length)
+        self.follow(y_at, length, turn, swing)
 
     def end(self) -> dict[str, float]:
         """Return the vehicle's states by their names."""
@@ -332,7 +346,9 @@ class Motion:
                 found[name] = x if name in equation.starts else self.start[name] + x
         if equation.ends:
             after = self.table.end_formulas({**self.start, **dict(zip(self.table.states, self.y, strict=True))})
-            found |= {name: after[f"next_{name}"] for name in QUATERNION} | {"psi": self.heading}
+            rotation = self.rotation(self.y)
+            psi = unwrapped(atan2(rotation["R_21"], rotation["R_11"]), self.heading)
+            found |= {name: after[f"next_{name}"] for name in QUATERNION} | {"psi": psi}
         return found
 
 

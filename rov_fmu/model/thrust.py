@@ -45,11 +45,14 @@ def curve_formulas(curve: Curve) -> dict[str, str]:
 
 
 def _fraction(name: str, pulse: tuple[float, float, float]) -> str:
-    """Return the formula from a pulse width to its fraction. Above and below neutral, the scale may differ."""
+    """Return the formula from a pulse width to its fraction. Above and below neutral, the scale may differ.
+
+    A pulse of 0 means that there is no signal, and stops the thruster as speed controllers do.
+    """
     low, neutral, high = pulse
     below, above = neutral - low, high - neutral
     span = repr(above) if below == above else f"({above!r} if {name} > {neutral!r} else {below!r})"
-    return f"({name} - {neutral!r}) / {span}"
+    return f"0 if {name} == 0 else ({name} - {neutral!r}) / {span}"
 
 
 def _saturated(name: str) -> str:
@@ -80,13 +83,13 @@ def _from_tables(name: str, curve: Curve) -> tuple[dict[str, str], str]:
     Between two voltages, the force is interpolated linearly.
     """
     command = f"command_{name}"
-    formula = f"{curve.tables[-1].name}({command})"
+    formula = f"{curve.tables[-1].function}({command})"
     for table, following in reversed([*pairwise(curve.tables)]):
         share = f"(battery - {table.voltage!r}) / {following.voltage - table.voltage!r}"
-        low, high = f"{table.name}({command})", f"{following.name}({command})"
+        low, high = f"{table.function}({command})", f"{following.function}({command})"
         formula = f"{low} + {share} * ({high} - {low}) if battery < {following.voltage!r} else {formula}"
     if len(curve.tables) > 1:
-        formula = f"{curve.tables[0].name}({command}) if battery < {curve.tables[0].voltage!r} else {formula}"
+        formula = f"{curve.tables[0].function}({command}) if battery < {curve.tables[0].voltage!r} else {formula}"
     return {f"table_{name}": formula}, f"{curve.coefficient('k_t')} * table_{name}"
 
 

@@ -7,13 +7,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
+from rich.text import Text
 
 from rov_fmu.io.messages import listed, one_line, wrapped
 from rov_fmu.vehicle.published import Cell, ResponseTable
@@ -28,20 +29,36 @@ _WIDE = 110
 """The width of tables in a pipe or a file, in columns."""
 
 
+class _Console(Console):
+    """A console on which every string is one line: line breaks and control characters in it are escaped.
+
+    Rich lays out each string that this method returns, in tables and outside them, so none of a stranger's can forge a
+    line. Text of more than one line is a `Text`.
+    """
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Return a string as Rich's text."""
+        return super().render_str(one_line(text), **options)
+
+
 def console(*, stderr: bool = False) -> Console:
     """Return a console that prints text without markup, as wide as the terminal."""
-    found = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
+    found = _Console(stderr=stderr, markup=False, highlight=False, emoji=False)
     if not found.is_terminal:
         found.width = max(found.width, _WIDE)  # Rich assumes 80 columns
     return found
 
 
-def paragraph(out: Console, words: str) -> None:
-    """Print a paragraph. A terminal gets lines that end between words; a pipe or a file gets one line."""
-    if out.is_terminal:
-        out.print(wrapped(words, out.width, "  " if words.startswith(("- ", "  ")) else ""))
-    else:
-        out.print(words, soft_wrap=True)
+def paragraph(out: Console, words: str, indent: str | None = None) -> None:
+    """Print a paragraph. A terminal gets lines that end between words; a pipe or a file gets one line.
+
+    Lines after the first have the indent; without one, those of an item of a list or of an indented line have two
+    blanks.
+    """
+    words = one_line(words)
+    if indent is None:
+        indent = "  " if words.startswith(("- ", "  ")) else ""
+    out.print(Text(wrapped(words, out.width, indent) if out.is_terminal else words), soft_wrap=not out.is_terminal)
 
 
 def shell_words(*words: str | Path) -> str:
@@ -73,7 +90,7 @@ def print_table(found: Table, out: Console | None = None) -> None:
     caption, found.title, found.caption = found.caption, None, None
     for column in found.columns:
         if column.no_wrap:
-            lines = [line for cell in (column.header, *column.cells) for line in str(cell).splitlines()]
+            lines = str(column.header).splitlines() + [one_line(str(cell)) for cell in column.cells]
             column.min_width = max(map(cell_len, lines), default=0)
     least = Measurement.get(out, out.options.update(max_width=10_000), found).minimum
     if not out.is_terminal:
@@ -173,9 +190,9 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
         padding=(0, 1, 0, 0),
         show_edge=False,
     )
-    result.add_column(first, no_wrap=True)
+    result.add_column(Text(first), no_wrap=True)
     for header in numbers:
-        result.add_column(header, justify="right", no_wrap=True)
+        result.add_column(Text(header), justify="right", no_wrap=True)
     for header in texts:
         result.add_column(header)
     return result

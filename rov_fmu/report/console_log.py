@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
+from rov_fmu.io.messages import first_of
 from rov_fmu.report.console import console, paragraph, print_table, table, text
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import SENTENCES, sentences
@@ -14,28 +15,33 @@ _MOST_GAPS = 3
 
 
 def print_inspection(inspection: Inspection) -> None:
-    """Print the commands and signals of a log, what is not recognised, and what was left out."""
+    """Print the commands and channels of a log, what is not recognised, and what was left out."""
     out = console()
-    print_table(_rows(inspection))
+    if inspection.commands or inspection.channels:
+        print_table(_rows(inspection))
+    else:
+        paragraph(out, str(inspection.path))
+        paragraph(out, "No command and no measurement with a time is recognised.")
     for heading, lines in {
         "Not recognised": [f"{name}{': ' if what else ''}{what}" for name, what in inspection.unread.items()],
         "Notes": [
             *(f"{title} is taken as {meant}" for title, meant in inspection.columns.items()),
-            *sentences(inspection.findings, SENTENCES),
+            *(line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings, SENTENCES)),
         ],
     }.items():
         if lines:
-            out.print(f"\n{heading}:")
-        for line in lines:
+            out.print()
+            out.print(f"{heading}:")
+        for line in first_of(lines):
             paragraph(out, f"- {line}")
     out.print()
 
 
 def _rows(inspection: Inspection) -> Table:
-    """Return the table of the commands and signals; angles are in degrees."""
+    """Return the table of the commands and channels; angles are in degrees."""
     numbers = ("unit", "samples", "rate [Hz]", "least", "largest")
-    found = table(str(inspection.path), "", numbers, ("gaps",))
-    for row in (*inspection.commands, *inspection.signals):
+    found = table(str(inspection.path.with_name(inspection.name)), "", numbers, ("gaps",))
+    for row in (*inspection.commands, *inspection.channels):
         factor, unit = in_degrees(row.unit)
         digits = [text(number, ".4g") for number in (row.rate, factor * row.low, factor * row.high)]
         found.add_row(row.name, unit, str(row.samples), *digits, ", ".join(_gaps(row)))

@@ -49,9 +49,9 @@ def print_identification(identification: Identification) -> None:
         remaining = _SCREEN - (before.get() + after.get()).count("\n") - 5  # 2 blank lines, a heading, what is next
         if remaining >= _FEWEST_LINES:
             break
-    out.out(before.get(), end="\n")
+    out.file.write(f"{before.get()}\n")  # it has been laid out and escaped already
     _print_coefficients(out, vehicle, remaining)
-    out.out("", after.get(), sep="\n", end="")
+    out.file.write(f"\n{after.get()}")
 
 
 def _predictions(identification: Identification) -> Iterator[Table]:

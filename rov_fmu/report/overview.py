@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from rov_fmu.identify.adapter.tank_tests import TankTests
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.recordings.held_out import Prediction
 from rov_fmu.identify.recordings.prediction_errors import shown_in
@@ -17,7 +18,6 @@ from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.findings import Accuracy, Known, Unseen
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _MOST_KNOWN = 16

@@ -11,7 +11,6 @@ from functools import partial
 from time import perf_counter
 from typing import Protocol
 
-import click
 from rich.console import RenderableType
 from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TaskID, TimeElapsedColumn
 from rich.progress_bar import ProgressBar
@@ -20,8 +19,8 @@ from rich.text import Text
 
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import Progress as OnProgress
-from rov_fmu.io.messages import on_terminal
-from rov_fmu.report.console import console
+from rov_fmu.io.messages import print_message
+from rov_fmu.report.console import console, paragraph
 
 _BAR = 12
 """The width of a bar, which leaves room for the words on a terminal of 80 columns."""
@@ -65,11 +64,10 @@ class Parts:
 
     def print(self, message: str) -> None:
         """Print a line, on a terminal above the parts."""
-        line = on_terminal(f"rov-fmu: {message}")
         if self._display:
-            self._display.console.print(line, soft_wrap=True)
+            paragraph(self._display.console, f"rov-fmu: {message}", "  ")
         else:
-            click.echo(line, err=True)
+            print_message(f"rov-fmu: {message}")
 
 
 @contextmanager
@@ -175,9 +173,9 @@ def per_second(rate: float) -> str:
 class _Words(ProgressColumn):
     """The name of a part, or the step that it is at, in the room that the other columns leave."""
 
-    def render(self, task: Task) -> Text:
+    def render(self, task: Task) -> RenderableType:
         """Return the words."""
-        return Text(task.description)
+        return task.description
 
 
 class _Share(ProgressColumn):

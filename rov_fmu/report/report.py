@@ -8,6 +8,8 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from rov_fmu.identify.adapter.recording import Recording, signal_name
+from rov_fmu.identify.adapter.tank_tests import TankTests, kind_of_data
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED
@@ -15,8 +17,7 @@ from rov_fmu.identify.recordings.prediction_errors import shown_in
 from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.messages import Progress, silent
-from rov_fmu.io.output import Output
-from rov_fmu.io.seal import sealed
+from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.findings import (
     EXPLAINED,
     Known,
@@ -42,8 +43,6 @@ from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_rec
 from rov_fmu.report.plots.svg import Draw, inline_svg, with_even_text
 from rov_fmu.report.templates import number, page
 from rov_fmu.tank.description import ROV_FILE
-from rov_fmu.tank.recording import Recording, signal_name
-from rov_fmu.tank.tank_tests import TankTests, kind_of_data
 
 _WIDTH = 3.7
 """The width of every plot, inches. All plots of a page are as wide, so that their text has the same size."""
@@ -168,7 +167,7 @@ def _holds(tests: TankTests) -> dict[str, str]:
     """Return the content of each input file, in words."""
     holds = dict.fromkeys(tests.inputs, "not used")
     holds[ROV_FILE] = "what is given beforehand: mass, geometry"
-    if tests.given.description.base:
+    if tests.given.description.base_name:
         holds[tests.given.description.base_name] = "the vehicle to begin from"
     tables = {"force": tests.thrust, "steady velocity": tests.steady, "time constant": tests.time_constants}
     for what, rows in tables.items():

@@ -1,34 +1,63 @@
-"""The columns of tank tests and logs: their units and bounds, and checks of the unit of commands.
+"""The columns of tank tests and logs: their units and bounds, their names in rov.toml, and checks of their units.
 
 Numbers are converted to SI units, and commands to fractions of the full command. The bounds are far beyond any vehicle,
 so a number outside is a mistake; without bounds, fits could overflow.
 """
 
-from collections.abc import Iterable
-from dataclasses import replace
-from math import pi
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timezone
 
-from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, Columns, DataFileError, pulses
+import numpy as np
+from pydantic import TypeAdapter
+
+from rov_fmu.io.csv_table import (
+    FORCE_UNITS,
+    NEUTRAL,
+    PULSES,
+    SPAN,
+    Column,
+    Columns,
+    Conversion,
+    DataFileError,
+    KnownColumns,
+    pulses,
+    shares,
+)
 from rov_fmu.io.messages import shown
-from rov_fmu.model.layout import SURGE, YAW, Axis
+from rov_fmu.io.toml_file import key_line
+from rov_fmu.model.layout import SURGE, YAW, Axis, Layout
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import ANGLES, QUANTITIES, TIMES, Quantity
+from rov_fmu.tank.commands import NO_KEYS, LogKeys
+from rov_fmu.tank.description import RovTables
 
-LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
-TIMES = {"s": 1.0, "ms": 1000.0}
 VELOCITIES = 1e-5, 1e3
 """The smallest and the largest velocity, m/s or rad/s."""
-_MOST_POSITION = 1e7
-
 RENAMING = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
 """The end of a message about a header that is not known."""
+_DATE = TypeAdapter(datetime)
 
-COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
-HELD_COMMAND = replace(COMMAND, least=1e-4)
-LOGGED_COMMAND = replace(COMMAND, conversions=dict.fromkeys(PULSES, pulses))
-FORCE = Column(FORCE_UNITS, also=("thrust",), minimum=-1e6, maximum=1e6)
-TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # some loggers count from 1970
 
-VOLTAGE = Column({"V": 1.0, "mV": 1000.0}, True, True, 0.0, 1e4, also=("battery", "battery voltage"))
+def seconds(text: str) -> float:
+    """Return the time since 1970 of a text by ISO 8601, s; UTC if it names no offset. Raises ValueError."""
+    date = _DATE.validate_python(text.replace(",", "."))
+    return (date if date.tzinfo else date.replace(tzinfo=timezone.utc)).timestamp()
+
+
+COMMAND = "command"
+"""The column with the command of an axis, or of all thrusters of a curve."""
+FRACTION = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
+HELD_COMMAND = replace(FRACTION, least=1e-4, conversions=dict.fromkeys(PULSES, pulses))
+TIME = Column(TIMES, minimum=-1e10, maximum=1e10, parse=seconds)  # some loggers count from 1970
+
+
+def logged_command(keys: LogKeys = NO_KEYS) -> Column:
+    """Return the column of a command in a log. A pulse in µs has the neutral and the span of the keys unless the header
+    has others; a force in N needs the force of full thrust, as in [N 50]."""
+    usual = (keys.neutral or NEUTRAL, keys.span or SPAN)
+    conversions = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual)) | dict.fromkeys(("N", "N.m"), shares)
+    return replace(FRACTION, optional=True, conversions=conversions)
 
 
 def in_degrees(unit: str) -> tuple[float, str]:
@@ -37,40 +66,153 @@ def in_degrees(unit: str) -> tuple[float, str]:
     return (ANGLES["deg"], unit.replace("rad", "deg")) if "rad" in unit else (1.0, unit)
 
 
-def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
-    """Return a column of velocities along the axis; an optional column may have blanks."""
-    lengths = ANGLES if axis.unit == "rad/s" else LENGTHS
-    units = {f"{unit}/s": per for unit, per in lengths.items()}
-    return Column(units, optional, optional, -VELOCITIES[1], VELOCITIES[1], least)
+TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
+"""The words that the name of a table of tank tests begins with, each with the measured quantity."""
+_MEASURED = {
+    "thrust": Column(FORCE_UNITS, also=("thrust",), minimum=-1e6, maximum=1e6),
+    "time_constant": Column(TIMES, maximum=1e5, least=1e-4),
+}
 
 
-VELOCITY_OF_ANY_AXIS = replace(
-    velocity_column(SURGE), units={**velocity_column(SURGE).units, **velocity_column(YAW).units}
+def columns_of(kind: str, axis: Axis | None = None) -> dict[str, Column]:
+    """Return the columns of a table. Without an axis, the velocities may be linear or angular."""
+    axes = [axis] if axis else [SURGE, YAW]
+    units = {unit: per for one in axes for unit, per in QUANTITIES[f"{one.name} velocity"].units.items()}
+    velocity = Column(units, minimum=-VELOCITIES[1], maximum=VELOCITIES[1], least=VELOCITIES[0])
+    return {COMMAND: HELD_COMMAND, TABLES[kind]: _MEASURED.get(kind, velocity)}
+
+
+def has_column(header: Iterable[str], columns: Mapping[str, Column]) -> bool:
+    """Return True if a header has one of the columns, even in an unknown unit."""
+    known = KnownColumns(columns)
+    return any(known.has(title, in_any_unit=True) for title in header)
+
+
+SLIPS = (
+    (("%",), 1.0, "no command exceeds 1 %. Are they fractions? Then write [1]"),
+    (PULSES, 1.0, "no pulse beyond 1 us: fractions under [us]? Write [1]"),
+    (PULSES, 100.0, "no pulse beyond 100 us: percent under [us]? Write [%]"),
 )
-"""A column of velocities, linear or angular."""
-
-
-def position_column(axis: Axis) -> Column:
-    """Return a column of positions along the axis, which may have blanks."""
-    units = ANGLES if axis.position_unit == "rad" else LENGTHS
-    return Column(units, True, True, -_MOST_POSITION, _MOST_POSITION)
-
-
-def time_constant_column(*, optional: bool = False) -> Column:
-    """Return a column of time constants; an optional column may have blanks."""
-    return Column(TIMES, optional, optional, maximum=1e5, least=1e-4)
+"""Units of commands, the largest number below such a header that shows a slip, and what is wrong."""
 
 
 def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
     """Raise DataFileError where the commands cannot be in the unit of their header: fractions under [%] or [us]."""
     names = [name for name in commands if name in table.values]
-    for units, most, mistake in (
-        (("%",), 1.0, "no command exceeds 1 %. Are they fractions? Then write [1]"),
-        (PULSES, 1.0, "no pulse beyond 1 us: fractions under [us]? Write [1]"),
-        (PULSES, 100.0, "no pulse beyond 100 us: percent under [us]? Write [%]"),
-    ):
+    for units, most, mistake in SLIPS:
         columns = [name for name in names if table.units[name] in units]
         rows = table.texts(*columns) if columns else ()
         if 0.0 < max((abs(float(text)) for row in rows for text in row if text), default=0.0) <= most:
             titles = ", ".join(shown(table.headers[name]) for name in columns)
             raise DataFileError(f"{table.path}, column {titles}: {mistake}")
+
+
+# ---- Names of rov.toml -----------------------------------------------------------------------------------------------
+
+WELL_KNOWN = {"%time": "time [ns]"}
+"""The headers of programs, by what they stand for: `rostopic echo -p`."""
+_OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kind).items() if name != COMMAND}
+"""The columns of tables."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The meaning of a header or a field: the command of an input or a thruster, or a quantity."""
+
+    name: str
+    """The name of the column that a CSV file would have."""
+    quantity: Quantity | None
+    """None for a command."""
+    convert: Conversion | None = None
+    """The conversion of the numbers; None where they have the unit of the column already."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """The tables [columns], [topics] and [logs] of rov.toml."""
+
+    columns: Mapping[str, str] = field(default_factory=lambda: WELL_KNOWN)
+    """Headers, by the headers of the CSV files."""
+    topics: Mapping[str, Entry] = field(default_factory=dict)
+    """Meanings by topic and field: `/bar30/depth.data`."""
+    keys: LogKeys = NO_KEYS
+    """What the logs do not tell."""
+
+
+def motion_columns(axis: Axis | None) -> dict[str, Quantity]:
+    """Return the quantities by the name of their column. In a log of one axis, the name need not tell the axis."""
+    found = dict(QUANTITIES)
+    for quantity in QUANTITIES.values():
+        if axis and quantity.axis == axis:
+            short = "velocity" if quantity.is_velocity else axis.position
+            also = (*quantity.also, *((quantity.name,) if short != quantity.name else ()))
+            found.pop(quantity.name)
+            found[short] = replace(quantity, also=also)
+    return found
+
+
+def command_columns(layout: Layout, axis: Axis | None = None, keys: LogKeys = NO_KEYS) -> list[dict[str, Column]]:
+    """Return the columns of commands that a log may have, of which it has one kind: those of inputs, those of thrusters
+    if inputs drive several, or that of the axis.
+
+    If each input drives one thruster, its column may also have the thruster's name.
+    """
+    command = logged_command(keys)
+    inputs = [dict.fromkeys(layout.commands, command)] if layout.mix else []
+    thrusters = {column: replace(command, also=(name,)) for column, name in thrusters_of(layout).items()}
+    return [*inputs, thrusters, *([{COMMAND: command}] if axis else [])]
+
+
+def thrusters_of(layout: Layout) -> dict[str, str]:
+    """Return the names of the thrusters by the column of their command."""
+    return {f"{'thruster ' if layout.mix else 'u_'}{t.name}": t.name for t in layout.thrusters}
+
+
+def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, Column]:
+    """Return the columns that a log of the axis, or of several, may have."""
+    columns = {"time": TIME}
+    for kind in reversed(command_columns(layout, axis, keys)):  # a header of the axis is not that of an input
+        columns |= kind
+    return columns | {name: quantity.column for name, quantity in motion_columns(axis).items()}
+
+
+def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]]:
+    """Return the names of rov.toml, and a line for every value that is no column of a log, or of a table in a CSV file.
+
+    Without a layout, a value that is not known may be the command of a thruster.
+    """
+    known_layout, layout = layout is not None, layout or Layout((), (), ())
+    known = columns_of_log(layout, None, tables.logs)
+    of_csv = {**known, COMMAND: logged_command(tables.logs), **_OF_TABLES}
+    del known["time"]
+    thrusters = thrusters_of(layout)
+    entries, mistakes = {}, []
+    for table, allowed, targets in (("columns", of_csv, tables.columns), ("topics", known, tables.topics)):
+        columns = KnownColumns(allowed)
+        for source, title in targets.items():
+            try:
+                found = columns.find(title, others=not known_layout)
+            except ValueError as error:
+                mistakes.append(key_line(f"{table}.{source}", str(error), title))
+                continue
+            if found and table == "topics":
+                name = thrusters.get(found.name, found.name)
+                entries[source] = Entry(name, QUANTITIES.get(found.name), found.convert)
+    return Names({**WELL_KNOWN, **tables.columns}, entries, tables.logs), mistakes
+
+
+def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list[str], Array]:
+    """Return the names of the thrusters, and n x thrusters commands within ±1, from n commands of inputs or thrusters.
+
+    An input or a thruster without a command has the command 0.
+    """
+    count = len(next(iter(values.values())))
+    still = np.zeros(count)
+    if layout.mix and values.keys() <= {*layout.commands}:
+        mixed = {
+            t: sum((g * values.get(u, still) for u, g in gains.items()), still) for t, gains in layout.gains.items()
+        }
+    else:
+        mixed = {t.name: values.get(t.name, still) for t in layout.thrusters}
+    fractions = np.column_stack([*mixed.values()])
+    return [*mixed], np.clip(fractions, -1.0, 1.0, out=fractions)

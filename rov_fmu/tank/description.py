@@ -6,7 +6,7 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.io.messages import MOST, did_you_mean, lines_on, similar
+from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     Strict,
@@ -39,8 +39,10 @@ from rov_fmu.model.layout import (
     VehicleAxis,
     coefficient_name,
 )
+from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity
+from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Finite, Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, keys_in_file
 from rov_fmu.vehicle.shipped import PAPER, PAPER_SOURCES, SHIPPED
@@ -49,34 +51,49 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 ROV_FILE = "rov.toml"
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
 """The tables that are not allowed together with `base`, because the base has its own."""
-_FILE_TABLES = ("columns", "topics", "dives")
+_FILE_TABLES = ("columns", "topics", "dives", "logs")
 """The tables that explain the files of tests."""
 
 
 # ---- The keys of the file --------------------------------------------------------------------------------------------
 
 
-def _check_window(window: tuple[float, float]) -> tuple[float, float]:
-    if not -1.0 <= window[0] < window[1] <= 1.0:
-        raise ValueError("must be [low, high] within -1 ... 1, fractions of the full command: 20 % is 0.2")
-    return window
+def _must_be(reason: str, is_allowed: Callable[[Any], bool]) -> AfterValidator:
+    """Check that a value is allowed; the reason ends the message about one that is not."""
+
+    def check(value: object) -> object:
+        if not is_allowed(value):
+            raise ValueError(f"must be {reason}")
+        return value
+
+    return AfterValidator(check)
 
 
-_Window = Annotated[tuple[Finite, Finite], BeforeValidator(as_tuple), AfterValidator(_check_window)]
+_Window = Annotated[
+    tuple[Finite, Finite],
+    BeforeValidator(as_tuple),
+    _must_be(
+        "[low, high] within -1 ... 1, fractions of the full command: 20 % is 0.2",
+        lambda window: -1.0 <= window[0] < window[1] <= 1.0,
+    ),
+]
 
 
-def _check_vehicle_name(name: str, info: ValidationInfo) -> str:
-    if not _vehicle_file(name, inside(folder_of(info), name)):
+def _find_vehicle(name: object, info: ValidationInfo) -> Path:
+    """Return the path of the vehicle file in the folder of rov.toml, or of the one that ships. Raises ValueError."""
+    if not isinstance(name, str):
+        raise ValueError("must be text in quotes")
+    own = inside(folder_of(info), name)
+    path = own if os.path.isfile(own) else SHIPPED.get(name)  # noqa: PTH113 (as in vehicle/description.py)
+    if not path:
         raise ValueError(
             f"must be a vehicle file in this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
             f"{did_you_mean(name, SHIPPED)}"
         )
-    return name
+    return path
 
 
-def _vehicle_file(name: str, path: Path) -> Path | None:
-    """Return the vehicle file at `path`, or the one that ships under `name`, or None."""
-    return path if os.path.isfile(path) else SHIPPED.get(name)  # noqa: PTH113 (as in vehicle/description.py)
+_VehicleFile = Annotated[Path, BeforeValidator(_find_vehicle)]
 
 
 def _check_curve_names(value: object) -> object:
@@ -85,12 +102,15 @@ def _check_curve_names(value: object) -> object:
     return value if value is True else tuple(dict.fromkeys(value))
 
 
+_Curves = Annotated[Any, AfterValidator(_check_curve_names)]
+
+
 class _Fit(Strict):
     """The table [fit]: what is fitted in addition to thrust, drag and β."""
 
-    lag: Annotated[Any, AfterValidator(_check_curve_names)] = ()
+    lag: _Curves = ()
     """The curves whose lag is fitted. true means all curves."""
-    advance: Annotated[Any, AfterValidator(_check_curve_names)] = ()
+    advance: _Curves = ()
     """The curves whose loss of thrust by the speed of advance is fitted; true for all curves."""
     voltage: bool = False
     """True when thrust depends on the logged voltage: its exponent is fitted."""
@@ -114,9 +134,9 @@ class Requests:
     """The voltage at which the thrust of a curve was measured, V, where it is given."""
 
     @property
-    def columns(self) -> dict[str, tuple[str, ...]]:
-        """The columns that every log must have, by the key of [fit] that needs them."""
-        return {"voltage": ("voltage",) * self.voltage, "attitude": ("roll", "pitch") * self.attitude}
+    def quantities(self) -> dict[str, tuple[str, ...]]:
+        """The quantities that every log must have, by the key of [fit] that needs them."""
+        return {"voltage": ("voltage",) * self.voltage, "attitude": ("roll angle", "pitch angle") * self.attitude}
 
     def of(self, curves: Collection[str]) -> "Requests":
         """Return the requests for some curves."""
@@ -127,16 +147,14 @@ class Requests:
 NO_REQUESTS = Requests()
 
 
-def _check_several(files: tuple[str, ...]) -> tuple[str, ...]:
-    if len({*files}) < 2:
-        raise ValueError("must be two or more files: a log of one file needs no table")
-    return files
-
-
 class Dive(Strict):
     """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
 
-    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_several)]
+    files: Annotated[
+        tuple[str, ...],
+        BeforeValidator(as_tuple),
+        _must_be("two or more files: a log of one file needs no table", lambda files: len({*files}) > 1),
+    ]
     """The files, one of which has the commands."""
     other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
     """The files whose times come from another clock than the times of the commands."""
@@ -148,53 +166,50 @@ def _as_fraction(value: object) -> object:
     return float(percent[1]) / 100.0 if percent else value
 
 
-def _check_command(value: float) -> float:
-    if not 0.0 < value <= 1.0:
-        raise ValueError(
-            'must be above 0 and at most 1, a fraction of the full command: half is 0.5, or "50 %" in quotes'
-        )
-    return value
-
-
-def _above(least: float, what: str) -> AfterValidator:
-    """Check that a number is above the least one; `what` names it with its unit."""
-
-    def check(value: float) -> float:
-        if not value > least:
-            raise ValueError(f"must be {what}, above {least:g}")
-        return value
-
-    return AfterValidator(check)
-
-
 class TankLimits(Strict):
     """The table [limits]: the limits of a proposed test."""
 
-    tank_length: Annotated[Finite, _above(0.0, "the length of the tank in m")] = inf
+    tank_length: Annotated[Finite, _must_be("the length of the tank in m, above 0", lambda length: length > 0.0)] = inf
     """The longest distance along surge, sway or heave, m."""
-    command_max: Annotated[Finite, BeforeValidator(_as_fraction), AfterValidator(_check_command)] = 1.0
+    command_max: Annotated[
+        Finite,
+        BeforeValidator(_as_fraction),
+        _must_be(
+            'above 0 and at most 1, a fraction of the full command: half is 0.5, or "50 %" in quotes',
+            lambda fraction: 0.0 < fraction <= 1.0,
+        ),
+    ] = 1.0
     """The strongest command, a fraction of the full command."""
-    duration: Annotated[Finite, _above(0.0, "the duration of a test in s")] = inf
+    duration: Annotated[Finite, _must_be("the duration of a test in s, above 0", lambda duration: duration > 0.0)] = inf
     """The longest recording, s."""
 
 
-class _ReadableFile(OpenHardware):
-    """The parts of rov.toml that could be read."""
+class RovTables(OpenHardware):
+    """The tables of rov.toml that could be read."""
 
-    base: Annotated[str, AfterValidator(_check_vehicle_name)] | None = None
-    against: Annotated[str, AfterValidator(_check_vehicle_name)] | None = None
+    base: _VehicleFile | None = None
+    """The vehicle file to begin from."""
+    against: _VehicleFile | None = None
+    """The vehicle file to compare with."""
     vehicle: Head | None = None
     known: dict[str, Quantity] = Field(default={})
     windows: dict[str, _Window] = Field(default={})
+    """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
     fit: _Fit = _Fit()
     columns: dict[str, str] = Field(default={})
+    """What the headers of CSV files stand for: other headers."""
     topics: dict[str, str] = Field(default={})
+    """What the fields of topics stand for: headers of a CSV file."""
     dives: dict[str, Dive] = Field(default={})
+    """The dives of several files, by name."""
+    logs: LogKeys = LogKeys()
+    """What the logs do not tell."""
     limits: TankLimits = TankLimits()
+    """The most that a proposed test may take."""
 
 
-class _RovFile(_ReadableFile):
+class _RovFile(RovTables):
     """The schema of rov.toml with every key optional, for a file with mistakes."""
 
     vehicle: Head
@@ -209,8 +224,8 @@ class Description:
 
     path: Path
     """The path of rov.toml."""
-    head: Head | None
-    """The table [vehicle]; None where it has a mistake."""
+    tables: RovTables
+    """The tables of the file; [vehicle] is None where it has a mistake."""
     layout: Layout
     """The largest layout that the vehicle can have: every axis that its thrusters drive, and every coefficient that is
     known."""
@@ -224,21 +239,12 @@ class Description:
     """The coefficients that the base gives; tests replace them."""
     thruster_sources: Mapping[str, Mapping[str, str]]
     """The sources of each thruster's direction and position."""
-    windows: Mapping[str, tuple[float, float]]
-    """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     requests: Requests
     """What is fitted on request."""
-    tank_limits: TankLimits
-    """The most that a proposed test may take."""
-    command_range: tuple[float, float] | None
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
-    base: Path | None
-    """The vehicle file that `base` names."""
     base_name: str
     """The value of `base` as it stands in the file; empty without one."""
-    against: Path | None
-    """The vehicle file to compare with."""
 
     @property
     def has_hardware_tables(self) -> bool:
@@ -250,10 +256,12 @@ class Description:
         """The layout with the axes of which a log of several axes may have recordings.
 
         Every autopilot logs roll and pitch. They become recordings only if the file declares these axes. Otherwise they
-        are conditions of other recordings.
+        are conditions of other recordings. Neither does an axis that the thrusters drive only together with others,
+        such as sway by a toe-in.
         """
-        forms = (form for form in self.layout.axes if form.axis not in (ROLL, PITCH) or form.axis.name in self.axes)
-        return replace(self.layout, axes=tuple(forms))
+        forms = [form for form in self.layout.axes if form.axis.name in self.axes or form.axis not in (ROLL, PITCH)]
+        undriven = {axis for axis, _ in undriven_axes(replace(self.layout, axes=tuple(forms)))}
+        return replace(self.layout, axes=tuple(f for f in forms if f.axis.name in self.axes or f.axis not in undriven))
 
 
 @dataclass(frozen=True)
@@ -264,37 +272,33 @@ class RovFile:
     """None where a mistake leaves the hardware unknown."""
     mistakes: Sequence[str]
     """A line for every mistake."""
-    columns: Mapping[str, str]
-    """What the headers of CSV files stand for: other headers."""
-    topics: Mapping[str, str]
-    """The standard header for each renamed header of a CSV file."""
-    dives: Mapping[str, Dive]
-    """The dives of several files, by name."""
+    tables: RovTables
     explains_files: bool
-    """False if a mistake in [columns], [topics] or [dives] leaves the content of the files unknown."""
+    """False if a mistake in one of these tables leaves the content of the files unknown."""
+
+
+NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
+"""What there is without a rov.toml."""
 
 
 def read_description(path: Path) -> RovFile:
     """Read rov.toml. Raises VehicleFileError where there is no such file, or where it is not TOML."""
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
     _, problems = validate(data, _RovFile, **context)
-    file, lost = readable_parts(data, problems, context, _ReadableFile)
-    base, base_mistakes = _load_base(file, path.parent)
-    hardware_mistakes = [*_hardware_mistakes(file, lost, data)]
-    explains_files = not (lost & {*_FILE_TABLES} or _misspelt(lost, _FILE_TABLES))
-    found = RovFile(None, (), file.columns, file.topics, file.dives, explains_files)
-    of_hardware = "base", "axes", *_HARDWARE_TABLES
-    if base_mistakes or hardware_mistakes or lost & {*of_hardware} or _misspelt(lost, _HARDWARE_TABLES):
-        lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *hardware_mistakes))
-        return replace(found, mistakes=lines + base_mistakes)
-    description = _describe(path, file, data, base)
-    possible = _possible_coefficients(description.layout)
-    # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
-    unknown = {("known", name) for name in description.named if name not in possible}
-    problems = [problem for problem in problems if problem["loc"][:2] not in unknown]
-    mistakes = _mistakes(file, lost, description)
+    file, lost = readable_parts(data, problems, context, RovTables)
+    base, base_mistakes = _load_base(file)
+    mistakes = [*_hardware_mistakes(file, lost, data)]
+    description, of_hardware = None, {"base", "axes", *_HARDWARE_TABLES}
+    if not (base_mistakes or mistakes or lost & of_hardware or _misspelt(lost, _HARDWARE_TABLES)):
+        description = _describe(path, file, data, base)
+        possible = _possible_coefficients(description.layout)
+        # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
+        unknown = {("known", name) for name in description.named if name not in possible}
+        problems = [problem for problem in problems if problem["loc"][:2] not in unknown]
+        mistakes = [*_mistakes(file, lost, description)]
     lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes))
-    return replace(found, description=description, mistakes=lines)
+    explains_files = not (lost & {*_FILE_TABLES} or _misspelt(lost, _FILE_TABLES))
+    return RovFile(description, lines + base_mistakes, file, explains_files)
 
 
 def _misspelt(lost: Iterable[str], tables: Collection[str]) -> bool:
@@ -302,18 +306,15 @@ def _misspelt(lost: Iterable[str], tables: Collection[str]) -> bool:
     return any(similar(name, tables) for name in lost if name not in _RovFile.model_fields)
 
 
-def _load_base(file: _ReadableFile, folder: Path) -> tuple[Vehicle | None, list[str]]:
+def _load_base(file: RovTables) -> tuple[Vehicle | None, list[str]]:
     """Load the vehicle that `base` names, and return it with a line for every mistake in its file."""
-    path = _vehicle_file(file.base, folder / file.base) if file.base else None
-    if path is None:
-        return None, []
     try:
-        return load_vehicle(path), []
+        return load_vehicle(file.base) if file.base else None, []
     except VehicleFileError as error:
         return None, str(error).splitlines()
 
 
-def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Iterator[str]:
+def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[str]:
     """Yield a line for every mistake in the hardware tables."""
     present = [name for name in _HARDWARE_TABLES if name in data]
     for name, curve in file.curves.items():
@@ -334,47 +335,49 @@ def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Itera
         yield from check_names_and_keys(file, lost, data)
 
 
-def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None) -> Description:
+def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> Description:
     """Put together the description from the parts of the file and the base."""
-    own_layout, folder = file.layout, path.parent
-    if base:
-        start, thruster_sources, limits = base.layout, base.thruster_sources, base.limits
-    elif file.thruster:
-        start, thruster_sources, limits = own_layout, file.thruster_sources, ()
-    else:
-        start, thruster_sources, limits = PAPER, PAPER_SOURCES, ()
+    own_layout = file.layout
+    start, thruster_sources, limits = _start(file, base)
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
     # With `[fit] voltage`, V_0 belongs to the effect that is fitted.
     names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
-    measured_at = {names[name]: file.known[name].value for name in names.keys() & file.known.keys()}
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
     layout = _largest_layout(start, axis_keys, {*known_names} - names.keys())
-    curves = tuple(curve.name for curve in layout.curves)
     given = {name: quantity for name, quantity in file.quantities(layout).items() if quantity} | dict(file.known)
     return Description(
         path=path,
-        head=file.vehicle,
+        tables=file,
         layout=layout,
         axes=tuple(name for name in AXES if name in start.kinds or name in own_layout.kinds),
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
         base_quantities=_quantities(base) if base else {},
         thruster_sources=thruster_sources,
-        windows=file.windows,
-        requests=Requests(
-            lag=curves if file.fit.lag is True else file.fit.lag,
-            advance=curves if file.fit.advance is True else file.fit.advance,
-            voltage=file.fit.voltage,
-            attitude=file.fit.attitude,
-            measured_at=measured_at,
-        ),
-        tank_limits=file.limits,
-        command_range=file.validity.command_range if file.validity else None,
-        limits=file.validity.limits if file.validity else limits,
-        base=_vehicle_file(file.base, folder / file.base) if file.base else None,
-        base_name=file.base or "",
-        against=_vehicle_file(file.against, folder / file.against) if file.against else None,
+        requests=_requests(file, layout, names),
+        limits=limits,
+        base_name=data.get("base", ""),
     )
+
+
+def _requests(file: RovTables, layout: Layout, voltages: Mapping[str, str]) -> Requests:
+    """Return what [fit] asks for; `voltages` has the curves by the names of their V_0."""
+    curves = tuple(curve.name for curve in layout.curves)
+    requests: dict[str, Any] = {
+        key: curves if value is True and key in ("lag", "advance") else value for key, value in file.fit
+    }
+    measured_at = {voltages[name]: file.known[name].value for name in voltages.keys() & file.known.keys()}
+    return Requests(**requests, measured_at=measured_at)
+
+
+def _start(file: RovTables, base: Vehicle | None) -> tuple[Layout, Mapping[str, Mapping[str, str]], tuple[str, ...]]:
+    """Return the layout to begin with, the sources of its thrusters, and the limits of the vehicle."""
+    limits = file.validity.limits if file.validity else base.limits if base else ()
+    if base:
+        return base.layout, base.thruster_sources, limits
+    if file.thruster:
+        return file.layout, file.thruster_sources, limits
+    return PAPER, PAPER_SOURCES, limits
 
 
 def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
@@ -402,7 +405,7 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]], kn
 # ---- Mistakes that depend on the vehicle's hardware ------------------------------------------------------------------
 
 
-def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> Iterator[str]:
+def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iterator[str]:
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
     yield from _unknown_effects(layout, description.base_name)
@@ -412,8 +415,7 @@ def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> 
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.kinds]
     for name in file.windows:
         if name not in windows:
-            hint = did_you_mean(name, windows)
-            yield key_line(f"windows.{name}", f"there is no such key, only {join_names(windows)}{hint}")
+            yield key_line(f"windows.{name}", f"there is no such key{only(name, windows, join_names(windows))}")
     curves = [curve.name for curve in layout.curves]
     requests = description.requests
     asked = {"lag": ("T", requests.lag), "advance": ("d", requests.advance)}
@@ -422,8 +424,7 @@ def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> 
         for name in names:
             given = coefficient_name(coefficient, name)
             if name not in curves:
-                hint = did_you_mean(name, curves)
-                yield key_line(f"fit.{key}", f"there is no such curve, only {join_names(curves)}{hint}", name)
+                yield key_line(f"fit.{key}", f"there is no such curve{only(name, curves, join_names(curves))}", name)
             elif given in description.named:
                 yield key_line(f"fit.{key}", f"{given} is given, so it cannot be fitted too", name)
     if requests.attitude and (own := [name for name in ("roll", "pitch") if name in description.axes]):
@@ -447,8 +448,6 @@ def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
     for curve in layout.curves:
         keys = (*curve.keys, *(["table"] if curve.tables else []))
         found |= {f"curves.{curve.name}.{key}": reason for key, reason in _UNKNOWN_EFFECTS.items() if key in keys}
-    if layout.fins:
-        found["fin"] = "identification does not know fins"
     if layout.has_dead_time:
         found["commands.T_d"] = "identification finds delays itself"
     if layout.pulse:
@@ -460,7 +459,7 @@ def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
             yield key_line(key, f"{reason}. Leave it out here, and add it to the vehicle file later")
 
 
-def _mistakes_in_known(file: _ReadableFile, description: Description) -> Iterator[str]:
+def _mistakes_in_known(file: RovTables, description: Description) -> Iterator[str]:
     possible = _possible_coefficients(description.layout)
     unknown = [name for name in description.named if name not in possible]
     for name in unknown[:MOST]:
@@ -483,22 +482,19 @@ def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:
     ).coefficients
 
 
-def _missing_halves(file: _ReadableFile, description: Description) -> Iterator[str]:
+def _missing_halves(file: RovTables, description: Description) -> Iterator[str]:
     """Yield a line for each coefficient without its partner, unless check_names_and_keys reports it already."""
     given, tables = {*description.base_quantities, *description.known}, dict(keys_in_file(description.layout))
-    for one, other in _pairs(description.layout):
-        if one in given and other not in given and (one in file.known or not one.endswith(REVERSE)):
-            table = "known" if one in file.known else ".".join(tables[one][:-1])
-            yield key_line(table, f"{one} is given, but {other} is not")
+    layout = description.layout
+    for owner in (*(curve.name for curve in layout.curves), *(form.axis.velocity for form in layout.axes)):
+        for keys in _PAIRS:
+            one, other = (coefficient_name(key, owner) for key in keys)
+            if one in given and other not in given and (one in file.known or not one.endswith(REVERSE)):
+                table = "known" if one in file.known else ".".join(tables[one][:-1])
+                yield key_line(table, f"{one} is given, but {other} is not")
 
 
-def _pairs(layout: Layout) -> Iterator[tuple[str, str]]:
-    """Yield pairs of coefficient names of which the first needs the second."""
-    for curve in layout.curves:
-        for end in ("", REVERSE):
-            a_t, b_t = (coefficient_name(key + end, curve.name) for key in ("a_t", "b_t"))
-            yield from ((a_t, b_t), (b_t, a_t))
-        yield coefficient_name(f"c_0{REVERSE}", curve.name), coefficient_name("c_0", curve.name)
-    for form in layout.axes:
-        a_d, b_d = (form.axis.coefficient(key + REVERSE) for key in ("a_d", "b_d"))
-        yield from ((a_d, b_d), (b_d, a_d))
+_THRUST, _DRAG = (("a_t", "b_t"), ("b_t", "a_t")), (("a_d", "b_d"), ("b_d", "a_d"))
+_IN_REVERSE = tuple((one + REVERSE, other + REVERSE) for one, other in (*_THRUST, *_DRAG))
+_PAIRS = (*_THRUST, *_IN_REVERSE, (f"c_0{REVERSE}", "c_0"))
+"""The keys of coefficients of which the first needs the second."""

@@ -95,7 +95,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "torn rows": "{files}: {count:#row} with more cells than the header left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
-    "pulse beyond full thrust": "{files}: {count:#pulse} of {column} beyond full thrust taken as full thrust",
+    "beyond full thrust": "{files}: {count:#command} of {column} beyond full thrust taken as full thrust",
     "missing column": (
         "{files}: there is no column of {column}. Its command is taken as 0. Add the column if this is wrong"
     ),
@@ -104,11 +104,15 @@ SENTENCES: dict[str, SentenceForm] = {
         "{end:.4g} s. Did the log or the sensor stop? Their later values are left out"
     ),
     # Recordings
+    "nothing measured": "{files}: nothing measured of any axis",
     "too few samples": (
         "{files}: the recording of {axes} is left out: it has {count:#sample} of {quantity}, and needs "
         "at least {least:g}"
     ),
     "constant motion": "{files}: the recording of {axes} is left out: the {quantity} never changes",
+    "no thruster": (
+        "{files}: the recording of {axes} is left out: no thruster drives it, and the effect of fins is not fitted"
+    ),
     "constant push": "{files}: the recording of {axes} is left out: the thrust along it never changes",
     "cancelling thrusters": (
         "{files}: the recording of {axes} is left out: its thrusters cancel each other all the time"
@@ -123,7 +127,17 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "gaps": "{files}: {count:#gap} in {axes}: {gaps}",
     # Logs of autopilots and bags
-    "source of commands": "{files}: the commands of the thrusters are those of {source}",
+    "unreadable file": "{files}: left out, because it cannot be read: {reason}",
+    "source": "{files}: {quantities} from {source}, {rate:.3g} Hz{words}",
+    "source of commands": "{files}: the commands of the thrusters are those of {source}{others}",
+    "channel left out": "{files}: {source} is left out for {quantities}: {words}",
+    "clock restarts": "{files}: the clock restarts after {at} s. The log is read as two, before and after",
+    "unlikely rate": (
+        "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
+    ),
+    "range of pulses": "{files}: full thrust is {low} and {high} us, and no thrust {neutral} us",
+    "parameter changed": "{files}: {name} changes {at} s after the first command. Each value is used in its time",
+    "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "time of arrival": (
         "{files}: {count:#message} of {topics} without a time in the header: the time of arrival is used"
     ),
@@ -135,22 +149,31 @@ SENTENCES: dict[str, SentenceForm] = {
     "dropouts": "{files}: the autopilot lost data {count:#time}, for up to {longest:.3g} s",
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
     "damaged pieces": "{files}: {count:#damaged piece} left out",
-    "messages without time": "{files}: {count:#message} without a time left out",
-    "arrival time": ("{files}: {count:#message} VFR_HUD without a time of the vehicle: the time of arrival is used"),
-    "several vehicles": "{files}: the log has several vehicles. Vehicle {system} is used",
+    "several vehicles": (
+        "{files}: the log has the vehicles {vehicles}. {vehicle} is used; [logs] of rov.toml can name another"
+    ),
     "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
-    "reversed motors": "{files}: MOT_n_DIRECTION reverses the thrusters {thrusters}",
+    "reversed motors": "{files}: parameters of the autopilot reverse the thrusters {thrusters}",
     "unknown direction": (
-        "{files}: the log has no parameters MOT_n_DIRECTION, so every thruster is taken to push ahead above 1500 us"
+        "{files}: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
+        "push ahead above its neutral pulse"
     ),
     "unknown velocity": "{files}: {count:#velocity} left out, because the filter marks them as unknown",
     "depth by pressure": (
         "{files}: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water "
         "the true depth is 2.5 % smaller"
     ),
+    "together": (
+        "{files}: the motion in {axes} is left out, because the thrusters drive it only together with other axes. If "
+        "that is wrong, correct their directions, or write [axes.{axis}] into rov.toml"
+    ),
     # The vehicle
     "axis left out": "{axes}: neither tested nor known ({drag}), so the vehicle has no {axes}",
     "not coupled": "surge, sway and yaw are not coupled, because coupling needs all three axes",
+    "fins not fitted": (
+        "{fins}: the lift of fins is not fitted. The vehicle has the given one, and motion that fins cause is not "
+        "explained"
+    ),
     "unused curve": (
         "{files}: the thrusters of curve {curve} act on no axis that is tested or known, so it is not used"
     ),

@@ -33,7 +33,7 @@ from rov_fmu.model.layout import (
     cross_name,
     cross_of,
 )
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_part_names, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, Hardware, Parts, given_quantities
 
@@ -80,16 +80,16 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
         return
     layout = parts.layout
-    if "fin" not in lost:
-        yield from _check_fins(parts, layout)
+    wrong_fins = [] if "fin" in lost else [*_check_fins(parts, layout)]
+    yield from wrong_fins
     wrong_places = [*check_thruster_places(layout), *_check_arm(parts, layout)]
     yield from wrong_places or check_axes(layout)
     if not (wrong_places or wrong_names):
         yield from check_inputs(layout)
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
-    if not (wrong_names or wrong_coupling or lost & {"curves", "arm", "body"}):
-        yield from check_variable_names(layout)
+    if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
+        yield from check_part_names(layout)
         for title, alternative in parts.alternatives.items():
             yield from check_quantities(f"alternatives.{title}", alternative.quantities, layout.coefficients)
         if "estimates" not in lost:

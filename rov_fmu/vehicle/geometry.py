@@ -3,17 +3,16 @@
 Each mistake gives one line.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import hypot, sqrt
 from typing import Any
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.layout import PITCH, ROLL, YAW, Axis, Layout, cross_name
+from rov_fmu.model.equation import name_clashes
+from rov_fmu.model.layout import PITCH, ROLL, SWAY, YAW, Axis, Layout, cross_name
 from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.schema import keys_in_file
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
@@ -30,7 +29,7 @@ def check_layout(layout: Layout) -> Iterator[str]:
     else:
         yield from check_axes(layout)
         yield from check_inputs(layout)
-    yield from check_variable_names(layout)
+    yield from check_part_names(layout)
 
 
 def check_thruster_places(layout: Layout) -> Iterator[str]:
@@ -61,12 +60,22 @@ def check_axes(layout: Layout) -> Iterator[str]:
         if not any(thruster in layout.drivers(axis) for axis in axes):
             reason = f"acts on no axis of the vehicle, which are {join_names([axis.name for axis in axes])}"
             yield key_line(f"thruster.{thruster.name}", reason)
+    for axis, reason in undriven_axes(layout):
+        yield key_line(f"axes.{axis.name}", reason)
+
+
+def undriven_axes(layout: Layout) -> Iterator[tuple[Axis, str]]:
+    """Yield each axis that the thrusters cannot drive without the axes before it, and why.
+
+    Sway comes last: two thrusters with a toe-in turn the vehicle, and their push to the side is a by-product.
+    """
+    axes = sorted((form.axis for form in layout.axes), key=lambda axis: axis is SWAY)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
     for axis in (axis for axis in axes if axis not in _RIGHTED):
         if not layout.drivers(axis) and any(fin.effect(axis) for fin in layout.fins):
             continue
         if not layout.drivers(axis):
-            yield key_line(f"axes.{axis.name}", _undriven(axis))
+            yield axis, _undriven(axis)
             continue
         rest = _unit([thruster.effect(axis) for thruster in layout.thrusters])
         coupled = []
@@ -79,7 +88,7 @@ def check_axes(layout: Layout) -> Iterator[str]:
             independent.append((axis.name, _unit(rest)))
         else:
             reason = f"the thrusters cancel: they drive it only together with {join_names(coupled)}"
-            yield key_line(f"axes.{axis.name}", f"{reason}; correct a direction or a position, or remove this table")
+            yield axis, f"{reason}; correct a direction or a position, or remove this table"
 
 
 def _undriven(axis: Axis) -> str:
@@ -113,12 +122,10 @@ def _unit(row: Sequence[float]) -> list[float]:
     return [part / norm for part in row]
 
 
-def check_variable_names(layout: Layout) -> Iterator[str]:
-    """Check that no two variables of the FMU have the same name."""
-    names = [*layout.inputs, *layout.state, *layout.calculated, *(name for name, _ in keys_in_file(layout))]
-    for name, count in Counter(names).items():
-        if count > 1:
-            yield key_line(name, "two variables of the FMU would have this name; rename a curve or a thruster")
+def check_part_names(layout: Layout) -> Iterator[str]:
+    """Check that no two variables of the FMU, and no two quantities of the equation, have the same name."""
+    for name, reason in name_clashes(layout):
+        yield key_line(name, reason)
 
 
 # ---- Mass, damping, weight -------------------------------------------------------------------------------------------
@@ -203,8 +210,13 @@ def _doubts_of_damping(rov: Rov) -> Iterator[str]:
 
 
 def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
-    """Yield a line if the voltage of the battery is far above that at which a curve was measured."""
+    """Yield a line if thrust does not rise with the voltage, or if the voltage is far above that of the measurement."""
     voltage = rov.layout.voltage or 0.0
+    for curve in rov.layout.curves:
+        for low, high in pairwise(curve.tables):
+            if high.forces[-1] <= low.forces[-1] or high.forces[0] >= low.forces[0]:
+                same = f"at {high.voltage:g} V, full thrust is not stronger than at {low.voltage:g} V"
+                yield key_line(f"curves.{curve.name}.tables", f"{same}: is one table a copy of the other?")
     for curve in rov.layout.curves:
         if "V_0" in curve.keys and voltage > _FAR_ABOVE * (V_0 := rov[curve.coefficient("V_0")]):
             times = f"is {voltage / V_0:.3g} times V_0 = {V_0:g} V of curves.{curve.name}"

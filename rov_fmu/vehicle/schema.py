@@ -246,10 +246,10 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
         keys = _coefficient_keys(self, CURVE)
         measured: tuple[ThrustTable, ...] = ()
         if self.table:
-            measured = (self.table.table(f"thrust_{name}"),)
+            measured = (self.table.table(f"0_{name}"),)
         elif self.tables:
             rows = enumerate(self.tables, 1)
-            measured = tuple(row.table.table(f"thrust_{name}_{n}", row.voltage) for n, row in rows)
+            measured = tuple(row.table.table(f"{n}_{name}", row.voltage) for n, row in rows)
         if measured:
             keys = ("k_t", *(key for key in keys if key not in ("k_t", *layout.REPLACED_BY_TABLE)))
         words = self.description or ""

@@ -9,10 +9,9 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array, InlineTable, Item
 
 from rov_fmu.io.messages import brief, shown
-from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
-from rov_fmu.io.seal import sealed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
 from rov_fmu.vehicle.description import Head

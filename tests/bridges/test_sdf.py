@@ -556,3 +556,15 @@ def test_the_command_writes_the_file_and_lists_the_notes(
     out, err = capsys.readouterr()
     assert err == f"rov-fmu: warning: {wanted.warnings[0]}\n"
     assert out.endswith("\nWrote 'my rov.sdf'. Next: gz sim -r 'my rov.sdf'\n")
+
+
+def test_a_thruster_with_the_name_of_a_joint_is_refused() -> None:
+    """SDFormat allows each name once in a model: the joint of the thruster 1 is thruster_1_joint."""
+    vehicle = load_vehicle(SHIPPED["bluerov2"])
+    first, second, *others = vehicle.layout.thrusters
+    renamed = (first, replace(second, name=f"{first.name}_joint"), *others)
+    layout = replace(vehicle.layout, thrusters=renamed, mix={})
+    changed = replace(vehicle, rov=Rov(layout, vehicle.rov.coefficients))
+    with pytest.raises(InputError, match=rf"thruster\.{first.name}_joint: choose another name for Gazebo"):
+        gazebo_model(changed)
+    assert f"thruster_{first.name}_joint" in gazebo_model(vehicle).text

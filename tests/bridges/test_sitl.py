@@ -18,15 +18,15 @@ from time import process_time
 import numpy as np
 import pytest
 
-from rov_fmu.bridges.sitl import Connection, Setup
+from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, servo_packet
 from rov_fmu.cli import main
 from rov_fmu.engine.simulation import Array
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed
@@ -143,13 +143,17 @@ def test_a_repeated_frame_gets_the_same_bytes_without_a_step() -> None:
 
 
 def test_late_packets_do_not_move_the_vehicle_and_a_restart_begins_again() -> None:
-    connection = Connection(setup_of(z=1.0))
+    now = [0.0]
+    connection = Connection(setup_of(z=1.0), clock=lambda: now[0])
     for count in range(50):
         connection.answer(packet(400, count, [1900] * 16), HERE)
     assert connection.answer(packet(400, 45, NEUTRAL), HERE) == b""
     assert connection.answer(packet(400, 0, NEUTRAL), HERE) == b"", "perhaps only late"
     assert connection.flight.time == pytest.approx(50 / 400)
     assert stamp(connection.answer(packet(400, 50, NEUTRAL), HERE)) == pytest.approx(51 / 400)
+    assert connection.answer(packet(400, 0, NEUTRAL), THERE) == b"", "another autopilot, unless this one has ended"
+    now[0] += 5.0
+    assert connection.answer(packet(400, 0, NEUTRAL), ("192.0.2.1", 40000)) == b"", "from another host"
     again = parsed(connection.answer(packet(400, 0, NEUTRAL), THERE))
     assert again["timestamp"] == [1 / 400]
     assert again["position"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
@@ -182,9 +186,64 @@ def test_random_and_damaged_packets() -> None:
         assert not answer or all(np.isfinite(value).all() for value in parsed(answer).values())
     assert connection.traffic.ignored > 9000
     before = connection.flight.time
-    for _ in range(2):  # ArduPilot repeats a packet without a reply
-        answer = connection.answer(packet(400, 123, NEUTRAL), HERE)
+    answer = connection.answer(packet(400, 123, NEUTRAL), HERE)
     assert stamp(answer) == pytest.approx(before + 0.0025)
+    # Damaged copies of the next packet, of which some come twice.
+    assert connection.answer(packet(400, 124, NEUTRAL), HERE)
+    for n in range(300):
+        bit = chance.randrange(32)
+        for _ in range(1 + n % 2):
+            connection.answer(packet(400, 125 ^ 1 << bit, NEUTRAL), HERE)
+    assert connection.answer(packet(400, 125, NEUTRAL), HERE)
+
+
+def test_two_senders_and_old_files(tmp_path: Path) -> None:
+    """One sender is followed, no file is replaced, and the number of logs is bounded."""
+    for name in ("dive.csv", "dive_2.csv"):
+        (tmp_path / name).write_text("kept", encoding="utf-8")
+    hints: list[str] = []
+    connection = Connection(replace(setup_of(), log=tmp_path / "dive.csv"), hints.append)
+    for count in range(100):
+        assert connection.answer(packet(50, count, NEUTRAL), HERE)
+        assert connection.answer(packet(50, 0, NEUTRAL), THERE) == b""
+    for _ in range(MOST_LOGS + 5):  # restarts of the same sender
+        for count in (0, 0, *range(1, 20), 10**6):
+            connection.answer(packet(50, count, NEUTRAL), HERE)
+    connection.write_log()
+    assert {path.read_text(encoding="utf-8") for path in (tmp_path / "dive.csv", tmp_path / "dive_2.csv")} == {"kept"}
+    assert connection.logs == [tmp_path / f"dive_{n}.csv" for n in range(3, MOST_LOGS + 3)]
+    assert len(list(tmp_path.iterdir())) == MOST_LOGS + 2
+    assert [hint.partition(",")[0] for hint in hints] == ["packets of other senders", "a run has 20 logs with 1"]
+
+
+def test_the_duration_counts_from_the_start_and_waiting_gives_a_hint() -> None:
+    hints: list[str] = []
+    with socket(AF_INET, SOCK_DGRAM) as server:
+        server.bind(("127.0.0.1", 0))
+        connection = Connection(setup_of(), hints.append)
+        connection.serve(server, 0.2)
+        assert connection.traffic.frames == 0
+        (hint,) = hints
+        assert hint.startswith(f"waiting for packets of ArduSub to UDP port {server.getsockname()[1]}")
+    now = [0.0]
+    connection = Connection(setup_of(), clock=lambda: now[0])
+    for sender in (HERE, THERE):
+        for count in range(50):
+            connection.answer(packet(50, count, NEUTRAL), sender)
+        now[0] += 7.0
+    assert connection._time() == pytest.approx(1.0 + 7.0 + 1.0 + 7.0)
+
+
+def test_an_existing_log_is_replaced_only_with_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "dive.csv"
+    log.write_text("kept", encoding="utf-8")
+    command = ["sitl", "videoray", "--port", "0", "--duration", "0.05", "--log", str(log)]
+    assert main(command) == 2
+    expected = f"rov-fmu: --log {log}: the file exists; choose another name, or replace it with --force\n"
+    assert capsys.readouterr().err == expected
+    assert main([*command, "--force"]) == 0
+    assert log.read_text(encoding="utf-8") == "kept", "there was no row to write"
+    assert "No log was written" in capsys.readouterr().out
 
 
 # ---- Motion ----------------------------------------------------------------------------------------------------------

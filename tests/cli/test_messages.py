@@ -136,7 +136,7 @@ TYPED: dict[str, tuple[list[str], str]] = {
     ),
     "an autopilot's log for a ghost": (
         ["fly", "--against", "d.tlog"],
-        "and not the log of an autopilot or of ROS; `rov-fmu identify` reads it in a folder of tank tests, as log_*",
+        "and not the log of an autopilot, of ROS or of MATLAB; `rov-fmu identify` reads it in a folder of tank tests",
     ),
     "an FMU for a vehicle": (["build", "x.fmu"], "x.fmu: must be a vehicle file (TOML), and not an FMU"),
     "a plan for a vehicle": (
@@ -357,7 +357,6 @@ TABLES: dict[str, tuple[str, str, str]] = {
         f"but haeve {_NAMED}: the name of the file must be log_surge*.csv "
         "or log_heave*.csv or log_yaw*.csv; did you mean heave?",
     ),
-    "an empty log": ("log_heave.csv", "", "log_heave.csv: the file is empty"),
     "an empty table": ("steady_surge.csv", "\n \n", "steady_surge.csv: the file is empty"),
     "a table without a header": (
         "steady_surge.csv",
@@ -373,7 +372,7 @@ TABLES: dict[str, tuple[str, str, str]] = {
     "a column misspelt": (
         "steady_surge.csv",
         "comand [%],velocity [m/s]\n20,0.3\n",
-        "column 1 = 'comand [%]': there is no such column, but command [%], velocity [m/s]; did you mean command [%]?",
+        "column 3: 'command [%]' is missing; is it the column 'comand [%]'?",
     ),
     "semicolons below commas": (
         "steady_surge.csv",
@@ -396,7 +395,6 @@ TABLES: dict[str, tuple[str, str, str]] = {
         "command [%]\n",
         "of rear, top, surge, heave or yaw; did you mean steady?",
     ),
-    "an empty file": ("pool.csv", "", "pool.csv: the file is empty"),
 }
 
 

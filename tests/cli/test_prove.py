@@ -116,7 +116,6 @@ _FOREIGN: Files = {
         <TransientSimulation startTime="0" stopTime="1" stepSize="0.25"/>
         <Stimuli source="u.csv"/><References source="%79.csv#x"/>
       </Experiment>
-      <Experiment name="runs" stopTime="1"><Stimuli source="u.csv"/></Experiment>
     </Experiments>""",
     f"{FOLDER}/k.ssv": """<ssv:ParameterSet version="1.0" name="k"
         xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
@@ -138,7 +137,7 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> None:
     assert main(["prove", str(foreign)]) == 0
     found = [(f.experiment, f.variable, f.passed) for f in prove(foreign)]
-    assert found == [(x, v, True) for x in ("step", "draft") for v in ("y", "on")] + [("runs", "-", True)]
+    assert found == [(x, v, True) for x in ("step", "draft") for v in ("y", "on")]
     assert "missing" not in capsys.readouterr().out, "what FMPy and the FMU say stays out of the table"
 
 
@@ -149,6 +148,14 @@ def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> 
         ("my tests/y.csv", "time,y\n0,0\n3,2\n", "step inf 1.0e-06 FAIL y"),
         ("k.ssv", _FOREIGN[f"{FOLDER}/k.ssv"].replace('"2"', '"2.1"'), "step 5.0e-02 1.0e-06 FAIL y"),  # type: ignore[union-attr]
         ("my tests/u.csv", "time,u\n0,10\n", "step inf 1.0e-06 FAIL fmi2DoStep failed with status"),
+        (
+            "my tests/all.exp",
+            _FOREIGN[f"{FOLDER}/my tests/all.exp"].replace(  # type: ignore[union-attr]
+                "</Experiments>",
+                '<Experiment name="runs" stopTime="1"><Stimuli source="u.csv"/></Experiment></Experiments>',
+            ),
+            "runs inf 1.0e-03 FAIL has no expected results, so nothing is compared",
+        ),
     ],
 )
 def test_what_deviates_or_fails_is_printed(
@@ -217,6 +224,28 @@ def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: 
     assert out == ""
     where = f"rov-fmu: {fmu}: experiment 'surge_20_tuned': the FMU ended its process: "
     assert err in {f"{where}SIGBUS\n", f"{where}SIGSEGV\n"}
+
+
+_WAITS = {
+    "its constructor waits": "    def enter_initialization_mode(self):\n        __import__('time').sleep(60.0)\n",
+    "it takes all memory": "    def setup_experiment(self, *_):\n        self.all = bytearray(5_000_000_000)\n",
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
+def test_an_fmu_has_limits_of_time_and_memory(foreign: Path, tmp_path: Path, capsys: Capsys) -> None:
+    begun = time.monotonic()
+    for what, code in _WAITS.items():
+        fmu = tmp_path / "limited.fmu"
+        _changed(foreign, "resources/counter.py", lambda old, code=code: old + code.encode(), fmu)  # type: ignore[misc]
+        assert main(["prove", str(fmu), "--time-limit", "1"]) == 1, what
+        out, err = capsys.readouterr()
+        if "waits" in what:
+            reason = "experiment 'step': the FMU needs more than 1 s; --time-limit allows more"
+            assert (out, err) == ("", f"rov-fmu: {fmu}: {reason}\n")
+        else:
+            assert "FAIL" in out
+    assert time.monotonic() - begun < 60.0
 
 
 _HANGS = """
@@ -288,6 +317,16 @@ BAD: dict[str, tuple[Files, str]] = {
     "no expected results": ({_Y: None}, f"{_Y}: there is no such file in the FMU"),
     "an unknown variable": ({_Y: "time,q\n0,1\n"}, f"{_Y}: the FMU has no variable 'q'"),
     "an unknown input": ({_U: "time,q\n0,1\n"}, f"{_U}: the FMU has no variable 'q'"),
+    "nothing but the time": ({_Y: "time\n0\n1\n"}, f"{_Y}: has no columns beside the time"),
+    "a file of 30 MB": ({_Y: "time,y\n" + "0,0\n" * 7_500_000}, f"{_Y}: has 30 MB; at most 20 MB are read"),
+    "a tolerance that all meet": (
+        {_EXP: _exp('stopTime="1" tolerance="1e300">')},
+        f"{_EXP}: experiment 'a': tolerance = 1e+300: must be less than 1, or nothing would be compared",
+    ),
+    "experiments without end": (
+        {_EXP: "<Experiments>" + '<Experiment><References source="y.csv"/></Experiment>' * 1001 + "</Experiments>"},
+        f"{MANIFEST}: names 1001 experiments; at most 1000 are run",
+    ),
     "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}: line 2, column 'y' = 'a': must be a finite number"),
     "NaN": ({_Y: "time,y\n0,nan\n"}, f"{_Y}: line 2, column 'y' = 'nan': must be a finite number"),
     "semicolons": ({_Y: "time;y\n0,0;0,5\n"}, f"{_Y}: columns must be separated by commas, not by ';'"),

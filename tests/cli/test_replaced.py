@@ -8,8 +8,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.identify import identify as identification
-from rov_fmu.io.output import WriteError
-from rov_fmu.io.seal import check_replaced, sealed
+from rov_fmu.io.output import WriteError, check_replaced, sealed
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import REFIT, TESTS, without_progress
 from tests.folders import small_folder
@@ -86,9 +85,7 @@ def test_the_work_of_others_is_refused_before_anything_is_computed(
     else:
         own = _edited(folder / name)
     monkeypatch.setattr(identification, "identify", lambda *_: pytest.fail("it is computed before it is refused"))
-    monkeypatch.setattr(
-        "rov_fmu.tank.tank_tests.read_rows", lambda *_: pytest.fail("tests are read before it is refused")
-    )
+    monkeypatch.setattr("rov_fmu.tank.folder.read_rows", lambda *_: pytest.fail("tests are read before it is refused"))
     capsys.readouterr()
     assert _identify(tank_tests, folder) == 2
     out, err = capsys.readouterr()

@@ -11,7 +11,9 @@ from matplotlib.figure import Figure
 
 import rov_fmu
 from rov_fmu.cli import main
+from rov_fmu.interface.command_files import read_inputs
 from tests.commands import BARE
+from tests.tank.readers import test_mavlink
 from tests.vehicles import VIDEORAY
 
 Capsys = pytest.CaptureFixture[str]
@@ -60,6 +62,65 @@ def test_a_table_of_commands_gives_a_table_of_results(here: Path) -> None:
     assert rows[0] == ["time", *result.names]
     found = [[float(cell) for cell in row] for row in rows[1:]]
     assert found == [list(row) for row in zip(result.time, *result.values(), strict=True)]
+
+
+LOGS = {
+    "percent": ("log.csv", "time [s],u_l [%],u_r [%],surge velocity [m/s]\n5,30,30,0\n7.25,50,20,0.1\n10,0,0,0.2\n"),
+    "pulses": ("log.csv", "t;r [us];l [us]\n0;1620;1620\n2250;1580;1700\n5000;1500;1500\n"),
+    "aliases": ("log.csv", "sec,left,right\n0,30,30\n2.25,50,20\n5,0,0\n"),
+    "one axis": ("log_surge_1.csv", "Time [ms],Command [%],u [cm/s]\n0,30,0\n2250,35,1\n5000,0,2\n"),
+}
+"""The same commands in logs: the last one has those of surge."""
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_the_commands_of_a_log_are_read_as_identify_reads_them(name: str, here: Path, capsys: Capsys) -> None:
+    file, text = LOGS[name]
+    (here / file).write_text(text, encoding="utf-8")
+    columns = {"sec": "time [s]", "left": "u_l [%]", "right": "-u_r [%]", "t": "time [ms]"}
+    if name in ("pulses", "aliases"):
+        of_file = {
+            header: meant
+            for header, meant in columns.items()
+            if header in text.partition("\n")[0].replace(";", ",").split(",")
+        }
+        lines = "".join(f'"{header}" = "{meant}"\n' for header, meant in of_file.items())
+        (here / "rov.toml").write_text(f"[vehicle]\n[columns]\n{lines}", encoding="utf-8")
+    assert main(["simulate", "--input", file, "--step", "0.5", "-o", "result.csv"]) == 0
+    assert "warning" not in capsys.readouterr().err
+    rows = list(csv.reader((here / "result.csv").read_text(encoding="utf-8").splitlines()))
+    left, right = ([0.3, 0.35, 0], [0.3, 0.35, 0]) if name == "one axis" else ([0.3, 0.5, 0], [0.3, 0.2, 0])
+    sign = -1.0 if name == "aliases" else 1.0
+    inputs = {"time": [0, 2.25, 5], "u_l": left, "u_r": [sign * c for c in right]}
+    result = rov_fmu.load("videoray").simulate([0.5 * n for n in range(11)], inputs)
+    assert [float(cell) for cell in rows[-1]] == pytest.approx([float(v[-1]) for v in (result.time, *result.values())])
+
+
+@pytest.mark.parametrize(
+    ("logs", "header", "u"),
+    [
+        ("", "[us]", 0.25),
+        ("neutral = 1520\nspan = 320", "[us]", 0.25),
+        ("neutral = 1480", "[us]", 0.3),
+        ("span = 200", "[us]", 0.5),
+        ("neutral = 1400\nspan = 200", "[us 1500 400]", 0.25),
+    ],
+)
+def test_rov_toml_tells_the_pulses_of_the_columns(logs: str, header: str, u: float, here: Path) -> None:
+    (here / "rov.toml").write_text(f"[vehicle]\n[logs]\n{logs}\n", encoding="utf-8")
+    log = here / "log.csv"
+    log.write_text(f"time [s],u_t {header},voltage [V]\n0,1600,16\n5,1600,16\n", encoding="utf-8")
+    assert read_inputs(log, VIDEORAY.layout)["u_t"].tolist() == pytest.approx([u, u])
+
+
+def test_the_commands_of_an_autopilot_drive_a_simulation(here: Path) -> None:
+    test_mavlink.tlog(here / "dive.tlog", test_mavlink.dive())
+    assert main(["simulate", "bluerov2", "--input", "dive.tlog", "--step", "1", "-o", "result.csv"]) == 0
+    *_, last = csv.DictReader((here / "result.csv").read_text(encoding="utf-8").splitlines())
+    half = {f"u_{n}": [0.0, 0.5] for n in (5, 6)}
+    result = rov_fmu.load("bluerov2").simulate([0.0, 5.9], {"time": [0.0, 1.0], **half})
+    assert float(last["time"]) == pytest.approx(5.9)
+    assert float(last["z"]) == pytest.approx(result["z"][-1], rel=1e-3)
 
 
 def test_results_have_round_times_and_the_end_is_one_of_them(here: Path) -> None:
@@ -178,10 +239,11 @@ WRONG = {
     "another picture": (["--plot", "a.gif"], "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
     "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; put --plot without a file after VEH"),
     "a value after a blank": (["--set", "u_l", "0.3"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
-    "a unit": (
-        ["--input", "unit.csv"],
-        "unit.csv: column 'u_l [%]': must be 'u_l' without a unit; a command of 30 % is",
+    "a load with a unit": (
+        ["--input", "load.csv"],
+        "load.csv: column 'X_ext [N]': a log has no such input; a table without units may have",
     ),
+    "a log without commands": (["--input", "motion.csv"], "motion.csv: no commands of u_l, u_r, u_t were found"),
     "no folder": (["-o", "none/result.csv"], "none/result.csv: cannot be written: there is no folder none"),
     "its own input": (["--input", "commands.csv", "-o", "commands.csv"], "commands.csv: cannot be written: would"),
     "too fast": (["-o", "a.csv", "--plot", "a.png", "--set", "r=1e300", "--set", "u=1"], "the motion cannot be"),
@@ -195,7 +257,8 @@ def test_a_mistake_is_one_line_and_writes_nothing(case: str, here: Path, capsys:
     (here / "back.csv").write_text("time,u_l\n0,1\n\n2,1\n1,1\n", encoding="utf-8")
     (here / "nan.csv").write_text("time,u_l\n0,1\n1,nan\n", encoding="utf-8")
     (here / "long.csv").write_text("time,u_l\n0,1\n20000,1\n", encoding="utf-8")
-    (here / "unit.csv").write_text("time [s],u_l [%]\n0,30\n1,30\n", encoding="utf-8")
+    (here / "load.csv").write_text("time [s],u_l [%],X_ext [N]\n0,30,1\n1,30,1\n", encoding="utf-8")
+    (here / "motion.csv").write_text("time [s],depth [m]\n0,1\n1,1\n", encoding="utf-8")
     (here / "short.csv").write_text("time,u_l\n0,1\n", encoding="utf-8")
     before = {path.name: path.read_bytes() for path in here.iterdir()}
     arguments, expected = WRONG[case]

@@ -14,6 +14,7 @@ import pytest
 
 from examples.dive_log import CURRENT, LAG, bluerov2, dive, write_log
 from examples.tank_tests import DELAY, OTTER, bollard_pull, write_tests
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
@@ -24,7 +25,6 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.report.findings import accuracies
 from rov_fmu.report.plots.steps import tables_by_axis
 from rov_fmu.study import Results, study
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import REFIT, ROOT

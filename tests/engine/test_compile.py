@@ -1,6 +1,10 @@
 """The platforms that binaries are compiled for (rov_fmu/engine/compile.py)."""
 
 import platform
+import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -71,3 +75,52 @@ def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         module.compiler()
     with pytest.raises(module.BuildError, match="the package fmpy, which has the FMI headers, is not installed"):
         module.fmi_headers()
+
+
+@pytest.fixture
+def compiled_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A script that replaces the compiler, with a cache folder that nobody can make."""
+    script = tmp_path / "cc"
+    monkeypatch.setattr(module, "compiler", lambda: [str(script)])
+    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", "/proc/x/zig")
+    yield script
+    module._temporary_cache.cache_clear()
+
+
+def _write(script: Path, text: str) -> None:
+    script.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    script.chmod(script.stat().st_mode | stat.S_IXUSR)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")
+def test_without_a_place_for_its_cache_the_compiler_gets_a_temporary_one(compiled_by: Path) -> None:
+    _write(compiled_by, 'test -w "$ZIG_GLOBAL_CACHE_DIR" && echo "$ZIG_GLOBAL_CACHE_DIR" > module.wasm')
+    with pytest.warns(UserWarning, match=r"^/proc/x/zig: the compiler's cache cannot be written there: .* can name"):
+        cache = module.compile_module({}).decode().strip()
+    assert Path(cache).is_dir()
+    with pytest.warns(UserWarning, match="/proc/x/zig"):
+        assert module.compile_module({}).decode().strip() == cache, "one for the whole process"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")
+@pytest.mark.filterwarnings("ignore:/proc/x/zig")
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("sleep 60", "it did not end within 0.3 s. Its cache is in .*; ZIG_GLOBAL_CACHE_DIR can name another folder$"),
+        ("kill -XFSZ $$", "it ended with SIGXFSZ; perhaps because the shell limits the size of files .ulimit -f.$"),
+        ("exit 3", "it ended with exit code 3; perhaps because the shell limits the size of files .ulimit -f.$"),
+        ("echo warning; echo IO: No space left on device; exit 1", "could not be written completely, because the disk"),
+    ],
+)
+def test_why_a_compiler_failed(compiled_by: Path, script: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    import resource
+
+    _write(compiled_by, script)
+    monkeypatch.setattr(module, "_TIME_LIMIT", 0.3, raising=False)
+    limits = {resource.RLIMIT_FSIZE: (1000, 1000)}
+    none = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: limits.get(kind, none))
+    with pytest.raises(module.BuildError, match="^the compiler failed for the page's module: .*" + said) as error:
+        module.compile_module({})
+    assert len(str(error.value).splitlines()) == 1

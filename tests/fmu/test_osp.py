@@ -1,5 +1,6 @@
 """The OSP model description contains every input and output in the groups of OSP-IS 1.0.1."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -104,6 +105,20 @@ def test_moments_and_rotations_have_three_axes() -> None:
     assert found["current"] == {"V_N": "x", "V_E": "y", "V_D": "z"}
     assert found["angular_velocity"] == {"p": "x", "q": "y", "r": "z"}
     assert found["attitude"] == {"phi": "x", "theta": "y", "psi": "z"}
+
+
+def test_the_names_of_groups_differ_whatever_the_names_of_curves_and_thrusters_are() -> None:
+    """The torque of a curve `external` is in another group than the torque from outside."""
+    layout = VEHICLES["VideoRay"].layout
+    first, second = layout.curves
+    renamed = replace(
+        layout,
+        curves=(replace(first, name="external"), second),
+        thrusters=tuple(replace(t, curve={first.name: "external"}.get(t.curve, t.curve)) for t in layout.thrusters),
+    )
+    found = [group.get("name") for group in groups_of(renamed)]
+    assert len({*found}) == len(found)
+    assert {"external_torque_N_ext", "external_torque_tau_external"} <= {*found}
 
 
 def test_an_oblique_force_has_no_axis(heavy: Vehicle) -> None:

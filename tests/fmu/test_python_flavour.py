@@ -2,6 +2,9 @@
 
 import os
 import random
+import shutil
+import subprocess
+import sys
 import sysconfig
 import zipfile
 from contextlib import nullcontext
@@ -17,8 +20,11 @@ from fmpy.validation import validate_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import python_content
 from rov_fmu.fmu.python_flavour import python_sources
+from rov_fmu.fmu.slave import Rov
 from rov_fmu.fmu.variables import Variable, variables
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import ROOT
 from tests.conftest import Made
 from tests.fmi import WARNING, Message
 from tests.fmi2 import recording_callbacks
@@ -34,7 +40,6 @@ def python_fmu(made_once: Made) -> Path:
         assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
         fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
 
-    # a space is the only special character that PythonFMU's binary accepts in its path
     return made_once("python flavour", fill) / "videoray-python.fmu"
 
 
@@ -188,6 +193,41 @@ def test_both_flavours_tilt_the_same_way(tmp_path: Path, six_dir: Path) -> None:
         slave.freeInstance()
 
 
+def test_what_is_set_again_is_harmless_and_the_angles_replace_the_quaternion(tmp_path: Path) -> None:
+    vehicle = a_vehicle(SIX)
+    text = python_sources(vehicle, variables(SIX))["variables.json"]
+    (tmp_path / "variables.json").write_text(text, encoding="utf-8")
+    slave = Rov(instance_name="rov", resources=str(tmp_path))
+    place = {v.name: v.value_reference for v in variables(SIX)}
+
+    def put(**values: float) -> list[str]:
+        """Set variables, and return what is logged."""
+        slave.log_queue.clear()
+        slave.set_real([place[name] for name in values], list(values.values()))
+        return [message.msg for message in slave.log_queue]
+
+    def get(*names: str) -> list[float]:
+        return slave.get_real([place[name] for name in names])
+
+    assert put(psi_0=0.5) == []
+    expected = get(*QUATERNION)
+    (warning,) = put(eta=0.0, epsilon_1=0.0, epsilon_2=0.0, epsilon_3=0.0)
+    assert "eta = 0.0 is replaced by" in warning
+    assert get(*QUATERNION) == expected
+    slave.exit_initialization_mode()
+    slave.set_real([place["N_ext"]], [20.0])
+    assert slave.do_step(0.0, 1.0)
+    turned = get(*QUATERNION)
+    (warning,) = put(psi_0=0.5, m_rov=SIX["m_rov"])  # GEMSEO-FMU sets parameters again
+    assert "psi_0 must not be set after the initialization, but it has this value already" in warning
+    assert get(*QUATERNION) == turned != expected
+    (error,) = put(N_ext=0.0, psi_0=0.6)
+    assert error == "psi_0 must not be set after the initialization; it was not."
+    assert put(eta=1.0) == ["eta must not be set after the initialization; it was not."]
+    assert get("N_ext", "psi_0", *QUATERNION) == [20.0, 0.5, *turned]
+    assert put(alpha_r=0.5, N_ext=1.0) == []
+
+
 # start time, stop time, t and h of a step, and True if the step is accepted
 STOPS = [
     (0.0, 1.0, 0.9, 0.1 + 1.0e-9, True),
@@ -279,6 +319,49 @@ def _imported(importer: Path, folder: Path, **environment: str) -> Ended:
     library = folder / "binaries" / "linux64" / "videoray.so"
     resources = (folder / "resources").as_uri()
     return run_program(importer, library, description.guid, resources, env=os.environ | environment)
+
+
+FLY = """
+import sys, fmpy
+commands = {"u_l": 0.3, "u_r": 0.3}
+for folder in sys.argv[1:]:
+    result = fmpy.simulate_fmu(folder, start_values=commands, stop_time=1.0, output_interval=1.0, validate=False)
+    print(f"{result['u'][-1]:.6f}")
+"""
+
+
+@pytest.mark.long
+def test_every_path_of_the_resources_is_found(tmp_path: Path, python_dir: Path) -> None:
+    """A process of its own flies all of them, because PythonFMU's library crashes where it finds nothing."""
+    folders = [tmp_path / name for name in ("plain", "u ml\u00e4ut", "plus+x", "hash#x", "pct%20x", "quo'te", "p%te")]
+    for folder in folders:
+        shutil.copytree(python_dir, folder)
+    done = subprocess.run([sys.executable, "-c", FLY, *map(str, folders)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    first, *others = done.stdout.split()
+    assert float(first) > 0.1
+    assert others == [first] * 6
+
+
+@pytest.mark.long
+def test_resources_that_are_missing_are_named_and_no_crash(tmp_path: Path, python_dir: Path) -> None:
+    shutil.copytree(python_dir, tmp_path / "fmu")
+    (tmp_path / "fmu" / "resources").rename(tmp_path / "moved")
+    program = """
+import sys
+from pathlib import Path
+from tests.fmi2 import recording_callbacks
+from verification.references.fmpy_slave import fmpy_slave
+log = []
+try:
+    fmpy_slave(Path(sys.argv[1]), recording_callbacks(log))
+except Exception:
+    print(log[0].text)
+"""
+    command = [sys.executable, "-c", program, str(tmp_path / "fmu")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "fmi2Instantiate: the resource folder " in done.stdout
 
 
 def test_an_importer_that_is_not_a_python_process_preloads_libpython(

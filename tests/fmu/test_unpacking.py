@@ -131,3 +131,136 @@ def test_a_large_fmu_that_is_compressed_as_files_are_is_unpacked(tmp_path: Path)
 def test_an_archive_without_a_description_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"^a\.fmu: is not an FMU that FMPy can read: .*modelDescription.xml"):
         unpack_fmu(_archive(_member("resources/a")), Path("a.fmu"), tmp_path)
+
+
+_VARIABLES = """<ModelVariables>
+  <ScalarVariable name="p" valueReference="1" causality="parameter" variability="fixed">
+    <Real start="1" min="-INF" nominal="2"/></ScalarVariable>
+  <ScalarVariable name="y" valueReference="2" causality="output"><Real derivative="1"/></ScalarVariable>
+</ModelVariables>"""
+_OF_2 = f"""<fmiModelDescription fmiVersion="2.0" modelName="a" guid="a" generationDateAndTime="today">
+<CoSimulation modelIdentifier="a"/><DefaultExperiment stepSize="0.1"/>{_VARIABLES}
+<VendorAnnotations><Tool name="t"><Real nominal="x" valueReference="-1"/></Tool></VendorAnnotations>
+<ModelStructure><Outputs><Unknown index="2" dependencies=""/></Outputs></ModelStructure></fmiModelDescription>"""
+_OF_3 = """<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="a">
+<CoSimulation modelIdentifier="a"/><ModelVariables>
+<UInt64 name="n" valueReference="0" causality="structuralParameter" variability="fixed" start="2"/>
+<Float64 name="x" valueReference="7" start="1 2"><Dimension valueReference="0"/></Float64>
+<Int8 name="i" valueReference="9" variability="discrete" start="5"/></ModelVariables>
+<ModelStructure><Output valueReference="7" dependencies="9"/></ModelStructure></fmiModelDescription>"""
+_MANY = "".join(f'<ScalarVariable name="v{n}" valueReference="{n}"><Real/></ScalarVariable>' for n in range(100_001))
+WRONG: dict[str, tuple[str, str, str, str]] = {
+    "nominal": (_OF_2, 'nominal="2"', 'nominal="abc"', "variable 'p': nominal = 'abc': must be a finite number"),
+    "a huge exponent": (
+        _OF_2,
+        'nominal="2"',
+        'nominal="1e999"',
+        "variable 'p': nominal = '1e999': must be a finite number",
+    ),
+    "infinity": (_OF_2, 'nominal="2"', 'nominal="INF"', "variable 'p': nominal = 'INF': must be a finite number"),
+    "min": (_OF_2, 'min="-INF"', 'min="x"', "variable 'p': min = 'x': must be a finite number"),
+    "start": (_OF_2, 'start="1"', 'start="one"', "variable 'p': start = 'one': must be a finite number"),
+    "-1": (
+        _OF_2,
+        'ce="2"',
+        'ce="-1"',
+        "variable 'y': valueReference = '-1': must be a whole number from 0 to 4294967295",
+    ),
+    "a large reference": (_OF_2, 'ce="2"', 'ce="4294967296"', "variable 'y': valueReference = '4294967296': must be a"),
+    "no reference": (_OF_2, ' valueReference="2"', "", "variable 'y': valueReference is missing"),
+    "a derivative": (
+        _OF_2,
+        'derivative="1"',
+        'derivative="3"',
+        "variable 'y': derivative: 3: must be an index from 1 to 2",
+    ),
+    "a negative one": (
+        _OF_2,
+        'derivative="1"',
+        'derivative="-1"',
+        "variable 'y': derivative = '-1': must be a whole number",
+    ),
+    "an output": (_OF_2, 'index="2"', 'index="9"', "Unknown: index: 9: must be an index from 1 to 2"),
+    "dependencies": (
+        _OF_2,
+        'dependencies=""',
+        'dependencies="1 x"',
+        "Unknown: dependencies = 'x': must be a whole number",
+    ),
+    "a name twice": (_OF_2, 'name="y"', 'name="p"', "variable 'p': name = 'p': another variable has this name"),
+    "no name": (_OF_2, 'name="y" ', "", "variable 2: name is missing"),
+    "causality": (
+        _OF_2,
+        '"output"',
+        '"outputs"',
+        "variable 'y': causality = 'outputs': must be one of parameter, calculated",
+    ),
+    "no type": (
+        _OF_2,
+        '<Real derivative="1"/>',
+        "",
+        "variable 'y': must contain one of Real, Integer, Boolean, String, Enum",
+    ),
+    "stepSize": (_OF_2, '"0.1"', '"soon"', "DefaultExperiment: stepSize = 'soon': must be a finite number"),
+    "too many": (
+        _OF_2,
+        _VARIABLES,
+        f"<ModelVariables>{_MANY}</ModelVariables>",
+        "has more than 100000 variables, the most",
+    ),
+    "a long text": (
+        _OF_2,
+        '"today"',
+        f'"{"x" * 2_000_000}"',
+        "fmiModelDescription: generationDateAndTime: has 2000000 char",
+    ),
+    "an entity": (
+        _OF_2,
+        "<fmi",
+        '<!DOCTYPE a [<!ENTITY b "c">]><fmi',
+        "defines the entity 'b'; no model description needs",
+    ),
+    "another root": (_OF_2, "fmiModelDescription", "a", "must begin with <fmiModelDescription>, and not with <a>"),
+    "no version": (_OF_2, ' fmiVersion="2.0"', "", "fmiVersion is missing"),
+    "no XML": (
+        _OF_2,
+        "<CoSimulation",
+        "<CoSimulation <",
+        "not XML: not well-formed (invalid token): line 2, column 14",
+    ),
+    "a part of an array": (_OF_3, '"1 2"', '"1 b"', "variable 'x': start = 'b': must be a finite number"),
+    "a number of 8 bits": (
+        _OF_3,
+        '"5"',
+        '"128"',
+        "variable 'i': start = '128': must be a whole number from -128 to 127",
+    ),
+    "a dimension": (
+        _OF_3,
+        '<Dimension valueReference="0"',
+        '<Dimension valueReference="5"',
+        "variable 'x': valueReference: 5: must be",
+    ),
+    "an unknown output": (
+        _OF_3,
+        's="9"',
+        's="8"',
+        "Output: dependencies: 8: must be the value reference of a variable",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_attribute_is_one_line(case: str, tmp_path: Path) -> None:
+    text, old, new, reason = WRONG[case]
+    right, wrong = (_archive(_member("modelDescription.xml", t.encode())) for t in (text, text.replace(old, new)))
+    assert len(unpack_fmu(right, Path("a.fmu"), tmp_path / "right").modelVariables) >= 2
+    with pytest.raises(FileError) as error:
+        unpack_fmu(wrong, Path("a.fmu"), tmp_path / "wrong")
+    assert str(error.value).startswith(f"a.fmu: modelDescription.xml: {reason}")
+
+
+def test_a_large_description_is_not_read(tmp_path: Path) -> None:
+    large = _archive(_member("modelDescription.xml", b"<a>" + b" " * 50_000_000))
+    with pytest.raises(FileError, match=r"^a\.fmu: modelDescription\.xml: has 50 MB; at most 40 MB are read$"):
+        unpack_fmu(large, Path("a.fmu"), tmp_path)

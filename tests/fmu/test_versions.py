@@ -1,4 +1,4 @@
-"""The descriptions of both versions of FMI are valid and declare the same variables.
+"""The descriptions of both versions of FMI, and of one interface or both, are valid and declare the same variables.
 
 They differ in the value references, and in the elements that hold the unit and the bounds of a variable.
 """
@@ -10,9 +10,18 @@ import fmpy
 import pytest
 from lxml import etree
 
+import rov_fmu
+from rov_fmu.cli import main
+from rov_fmu.engine import compile as build_options
+from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
+from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.variables import variables
 from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import BARE
+from tests.fmi import CO_SIMULATION, INTERFACES, MODEL_EXCHANGE
+from tests.fmu.calls.conftest import WRAPPERS
 from tests.vehicles import SIX, VEHICLES, a_vehicle
 
 ROVS = VEHICLES | {"six axes": SIX}
@@ -180,3 +189,70 @@ def test_only_inputs_and_outputs_are_available_in_intermediate_update() -> None:
     root = described(VEHICLES["Heavy"], 3)
     updated = {v.get("name") for v in root.iter("Float64") if v.get("intermediateUpdate") == "true"}
     assert updated == {v.name for v in variables(VEHICLES["Heavy"]) if v.causality in ("input", "output")}
+
+
+# ---- rov-fmu build --interface ----
+
+KINDS = {"cs": (CO_SIMULATION, MODEL_EXCHANGE), "me": (MODEL_EXCHANGE, CO_SIMULATION)}
+"""The kind of instance that an FMU offers, and the one that it refuses."""
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_description_has_the_elements_of_the_interface_and_its_own_guid(fmi: int, vehicle: Vehicle) -> None:
+    contents = {name: native_content(vehicle, fmi=fmi, interface=name) for name in build_options.INTERFACES}
+    for name, kinds in build_options.INTERFACES.items():
+        root = etree.fromstring(contents[name].files["modelDescription.xml"])
+        assert tuple(one.tag for one in root if one.tag in ("ModelExchange", "CoSimulation")) == kinds
+    assert len({content.guid for content in contents.values()}) == 3
+    assert contents["both"] == native_content(vehicle, fmi=fmi)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("interface", KINDS)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_of_one_interface_runs_proves_itself_and_refuses_the_other(
+    fmi: int, interface: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bare.fmu"
+    options = ["--fmi", str(fmi), "--interface", interface, "--platform", "host", "-o", str(path)]
+    assert main(["build", str(BARE), *options]) == 0
+    assert "The FMU is valid. In a run, " in capsys.readouterr().out
+    assert main(["prove", str(path)]) == 0
+    name = {CO_SIMULATION: "co-simulation", MODEL_EXCHANGE: "model-exchange"}
+    offered, refused = KINDS[interface]
+    assert prove(path, name[offered])
+    assert main(["prove", str(path), "--interface", name[refused]]) == 2
+    assert f"has no {name[refused]}, only {name[offered]}\n" in capsys.readouterr().err
+    fmpy.extract(str(path), unzipdir=str(tmp_path / "bare"))
+    page = (tmp_path / "bare" / "documentation" / "index.html").read_text(encoding="utf-8")
+    assert f" · {INTERFACES[offered]} · version" in page
+    assert f"<dt>{INTERFACES[offered]}</dt>" in page
+    assert f"<dt>{INTERFACES[refused]}</dt>" not in page
+    (library,) = tmp_path.joinpath("bare", "binaries").glob("*/*")
+    fmu = WRAPPERS[fmi](tmp_path / "bare", library)
+    with fmu.instance(offered) as rov:
+        rov.start()
+    with pytest.raises(AssertionError, match=f"this FMU is for {INTERFACES[offered]} only"):
+        fmu.instance(refused)
+
+
+def test_an_interface_that_an_fmu_cannot_have_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for options, line in (
+        (["--backend", "pythonfmu", "--interface", "me"], "--interface me: PythonFMU makes Co-Simulation (cs) alone"),
+        (
+            ["--backend", "pythonfmu", "--interface", "both"],
+            "--interface both: PythonFMU makes Co-Simulation (cs) alone",
+        ),
+        (["--osp", "--interface", "me"], "--interface me: libcosim and the OSP tools, which --osp is for, run"),
+        (["--interface", "model-exchange"], "must be one of cs, me, both; did you mean me?"),
+    ):
+        assert main(["build", str(BARE), *options]) == 2
+        err = capsys.readouterr().err
+        assert line in err
+        assert err.count("\n") == 1
+    with pytest.raises(build_options.OptionError, match="there is no interface 'ms', only cs, me, both"):
+        rov_fmu.load(BARE).build("bare.fmu", interface="ms")
+    assert not [*tmp_path.iterdir()]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.effects.current import CurrentEast, CurrentNorth
 from rov_fmu.identify.effects.effect import Effect
 from rov_fmu.identify.effects.load import Load
@@ -19,7 +20,6 @@ from rov_fmu.identify.simulation.solver import settled, solve
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import Requests
-from rov_fmu.tank.recording import Recording
 from tests.dives import CURRENT, LAG, TRUTH, Dive, dive
 
 FILE = "dive.tlog"

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import strategies as st
 
 from rov_fmu.cli import main
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.tuning import read_points
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import AXES, HEAVE
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle

@@ -10,6 +10,8 @@ import pytest
 from scipy.stats import linregress
 
 from rov_fmu.identify import identify as module
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
@@ -24,8 +26,6 @@ from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.report import report_page
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

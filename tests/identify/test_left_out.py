@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify import identify as module
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.findings import FACTS
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
@@ -15,8 +17,6 @@ from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.simulation.limits import MotionError, NoFitError
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import load_tank_tests
 from tests.folders import ARM, BLUEROV2, FORCE, HEAD, MASS, SPEED, TURNS, folder_of
 from tests.recordings import PLANS, clean, write_log
 from tests.vehicles import VIDEORAY

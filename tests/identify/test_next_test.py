@@ -318,4 +318,4 @@ def test_a_wrong_limit_is_one_line(line: str, message: str, tmp_path: Path) -> N
 
 def test_percent_are_a_fraction(tmp_path: Path) -> None:
     tests = read(tmp_path, f'{HEAD}[known]\n{MASS}[limits]\ncommand_max = "60 %"\n', TESTS)
-    assert tests.given.description.tank_limits == TankLimits(command_max=0.6)
+    assert tests.given.description.tables.limits == TankLimits(command_max=0.6)

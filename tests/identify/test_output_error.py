@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.tables import TableForces
 from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust
@@ -15,7 +16,6 @@ from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, NOISE, PLANS, clean
 

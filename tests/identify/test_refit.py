@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.points.response_fit import fit_response
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import PAPER
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

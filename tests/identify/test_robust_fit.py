@@ -1,12 +1,15 @@
 """Outliers in a robust fit: only the sign of an outlier counts, not its distance."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
+from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -44,3 +47,26 @@ def test_outliers_lie_beyond_two_and_a_half_standard_deviations(vehicle: Vehicle
     (simulation,) = _fit(vehicle.rov, 0.0).simulations
     assert simulation.outliers / len(simulation.time) == pytest.approx(0.0124, abs=0.004)
     assert simulation.noise == pytest.approx(0.005, rel=0.03)
+
+
+@pytest.mark.parametrize("contaminated", [0.0, 0.05])
+def test_outliers_are_counted_by_the_deviation_that_is_shown(contaminated: float) -> None:
+    """Where the fit assumes less noise, such as in residuals with slow noise, normal residuals are no outliers."""
+    random = np.random.default_rng(7)
+    time, assumed, true = np.arange(20_000.0), 0.01, 0.023
+    residuals = random.normal(0.0, true, len(time))
+    jumps = random.random(len(time)) < contaminated
+    residuals[jumps] += random.choice([-10.0, 10.0], jumps.sum()) * true
+    none = np.zeros(len(time))
+    prepared, output = SimpleNamespace(recording=None, time=time, values=residuals), SimpleNamespace(values=none)
+    output.velocity = none
+    model: Any = SimpleNamespace(
+        count_of_tables=0, rows=[slice(0, len(time))], recordings=[[0]], data=[prepared], sigma=np.array([assumed])
+    )
+    model.run = lambda _: [output]
+    jacobian = np.ones((len(time), 1))
+    solution: Any = SimpleNamespace(x=np.zeros(1), residuals=residuals / assumed, jacobian=jacobian)
+    (found,) = ResidualAnalysis(model, solution, robust=True).simulations
+    assert found.noise == pytest.approx(true, rel=0.02 + 2.0 * contaminated)
+    assert found.outliers / len(time) == pytest.approx(0.0124 + jumps.mean(), abs=0.007)
+    assert found.outliers == np.sum(np.abs(found.residuals) > 2.5 * found.noise)

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.slips.search import Tables, beta_out_of_range, slips, weak_thrust
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests.pool import Run, run

@@ -1,20 +1,24 @@
 """`rov-fmu identify --inspect`: what logs contain, and a draft of rov.toml with which they are read."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tomlkit
 
 from rov_fmu.cli import main
+from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
+from rov_fmu.identify.findings import by_heading
 from rov_fmu.interface.inspect_command import write_draft
+from rov_fmu.io import csv_table
 from rov_fmu.io.output import WriteError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
-from tests.tank.formats import motion, test_mavlink, test_ulog
-from tests.tank.formats.motion import TIME
-from tests.tank.formats.test_bags import Ros, dive
+from tests.tank.readers import motion, test_mavlink, test_ulog
+from tests.tank.readers.motion import TIME
+from tests.tank.readers.test_bags import Ros, dive
 from tests.tank.test_several_files import table
 
 DEPTH: Array = motion.DEPTH
@@ -102,6 +106,21 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
     assert "attitude" not in draft, "there is no roll or pitch"
     assert "- Lux: 0 to 9.9" in rows
     assert '# "Lux" = "?"   # 0 to 9.9' in draft.splitlines(), "nothing suggests what it stands for"
+
+
+def test_on_a_terminal_no_line_is_wider_than_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Notes end between words, too: the one about the sources of the depth has more than 200 characters."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
+    path = bag(2, ".mcap")(tmp_path)
+    monkeypatch.chdir(path.parent)
+    assert main(["identify", "--inspect", path.name]) == 0
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+    notes = lines[lines.index("Notes:") :]
+    assert any(line.startswith("  ") for line in notes)
+    assert max(map(len, lines)) <= 80
 
 
 def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -272,6 +291,56 @@ def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, caps
     assert all(f"{tmp_path / 'rov.toml'}: " in line for line in told), "its tables are read with the draft as it is"
 
 
+MAKER = "PWM (µs),RPM,Power (W),Force (Kg f)\n1100,3000,400,-4\n1500,0,0,0\n1900,3000,400,5\n"
+"""A table as a maker publishes it."""
+TABLES = {
+    "thrust_t200.csv": (MAKER, ["force", "N", "3", "-", "-39.23", "49.03"]),
+    "steady_yaw.csv": (
+        "command [us],velocity [deg/s]\n1100,-40\n1900,50\n",
+        ["velocity", "deg/s", "2", "-", "-40", "50"],
+    ),
+    "time_constant_heave.csv": (
+        "command [us],time constant [ms]\n1100,900\n1900,800\n",
+        ["time constant", "s", "2", "-", "0.8", "0.9"],
+    ),
+}
+
+
+@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_alone_are_listed_as_they_will_be_read(
+    name: str, whole: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, row = TABLES[name]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    path, draft = tmp_path if whole else tmp_path / name, tmp_path / "rov.toml"
+    for n in range(2):  # without rov.toml, and with its draft
+        assert main(["identify", "--inspect", str(path)]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        rows = [re.split(" {2,}", line.strip()) for line in lines]
+        assert ["command", "1", row[2], "-", "-1", "1"] in rows
+        assert row in rows
+        assert any(line.startswith("Wrote ") for line in lines) == (n == 0)
+        if name == "thrust_t200.csv":
+            assert {"- RPM: 0 to 3000", "- PWM (µs) is taken as command [µs]"} <= {*lines}
+    columns = tomlkit.parse(draft.read_text(encoding="utf-8")).unwrap().get("columns", {})
+    assert columns == ({"PWM (µs)": "command [µs]", "Force (Kg f)": "force [Kgf]"} if text is MAKER else {})
+
+
+def test_a_table_with_a_mistake_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thrust_t200.csv").write_text("command [us],force [N]\n1100,-4\n2100,5\n", encoding="utf-8")
+    assert main(["identify", "--inspect", str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "line 3, column 'command [us]' = 2100: is beyond full thrust" in line
+
+
+def test_a_log_in_a_folder_may_have_the_name_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one_file(tmp_path).rename(tmp_path / "thrust_dive.csv")
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    assert "thruster 1" in capsys.readouterr().out
+    assert "[curves" not in (tmp_path / "rov.toml").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(("tables", "curve"), [({"thrust_main.csv": OWN["thrust_main_1.csv"]}, "main"), ({}, "all")])
 def test_thrusters_of_one_kind_have_its_curve(tables: Mapping[str, str | bytes], curve: str, tmp_path: Path) -> None:
     lines = pool_run(tmp_path, tables)
@@ -312,3 +381,147 @@ def test_what_is_no_log_is_one_line(
     assert found.err.startswith(f"rov-fmu: {tmp_path / name}")
     assert len(found.err.splitlines()) == 1
     assert not (tmp_path / "rov.toml").exists()
+
+
+def test_thousands_of_columns_take_time_in_proportion_and_are_not_all_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A header is not compared with all others: 4,000 headers are compared some 10 times each."""
+    compared: Counter[str] = Counter()
+    folded = csv_table._folded
+
+    def counted(text: str) -> str:
+        compared[text] += 1
+        return folded(text)
+
+    monkeypatch.setattr(csv_table, "_folded", counted)
+    titles = ["time [s]", "depth [m]", *(f"x{n}" for n in range(4000))]
+    table(tmp_path / "log.csv", ",".join(titles), *(DEPTH[:3] for _ in titles))
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    assert sum(compared.values()) < 20 * len(titles)
+    shown = capsys.readouterr().out
+    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    assert "depth" in shown
+    for text in (shown, draft):
+        assert "3900 more" in text
+        assert len(text.splitlines()) < 200
+
+
+def test_headers_with_control_characters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The terminal shows them escaped, each on one line. The draft keeps them, so its keys are those headers."""
+    odd = ["heading\t(deg)", "\x1b[31mred [V]", 'gyro\nbase = "x"', "\x9b2J\u202e\u2028b"]
+    titles = ",".join('"{}"'.format(title.replace('"', '""')) for title in odd)
+    header = f"time [s],{','.join(f'thr_{n}_pwm' for n in range(1, 7))},{titles}"
+    rows = [",".join([f"{0.1 * n:g}", *["1600"] * 6, *[f"{n}"] * 4]) for n in range(50)]
+    (tmp_path / "log.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    assert main(["identify", "--inspect", str(tmp_path / "log.csv")]) == 0
+    out = capsys.readouterr().out
+    assert all(character.isprintable() for line in out.split("\n") for character in line)
+    assert "\n- gyro\\nbase = " in out
+    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    columns = tomlkit.parse(draft.replace('# "', '"').partition("[columns]")[2]).unwrap()
+    assert {*odd} <= {*columns}
+
+
+# ---- Folders without rov.toml ----------------------------------------------------------------------------------------
+
+
+def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "My ROV (2)"
+    folder.mkdir()
+    one_file(folder)
+    draft = folder / "rov.toml"
+    assert main(["identify", str(folder)]) == 0
+    out = capsys.readouterr().out
+    assert "thruster 1" in out
+    assert out.endswith(
+        f"There is no {draft}, which gives the vehicle's name and everything that no test tells.\n"
+        f"Next: rov-fmu identify '{folder}' --draft writes a draft of it\n"
+    )
+    assert not draft.exists()
+    assert main(["identify", str(folder), "-o", str(tmp_path / "v.toml")]) == 2
+    assert f"{draft}: there is no such file" in capsys.readouterr().err
+    assert main(["identify", str(folder), "--draft"]) == 0
+    document = tomlkit.parse(draft.read_text(encoding="utf-8")).unwrap()
+    assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("My ROV (2)", "my_rov_2")
+    assert (document["base"], document["against"]) == ("bluerov2", "bluerov2")
+    written = draft.read_bytes()
+    capsys.readouterr()
+    assert main(["identify", str(folder), "--draft"]) == 2
+    assert "the file there is not replaced by a draft" in capsys.readouterr().err
+    assert draft.read_bytes() == written
+    assert {path.name for path in folder.iterdir()} == {"rov.toml", "log_a.csv"}
+
+
+UNREADABLE: dict[str, bytes] = {
+    "cut.mcap": b"\x89MCAP0\r\n\x01",
+    "empty.csv": b"",
+    "image.bin": b"\x89PNG\r\n\x1a\n\0\0",
+    "latin.csv": b"time [s],temp\xe9rature\n0,1\n",
+}
+
+
+@pytest.mark.parametrize("name", UNREADABLE)
+def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = one_file(tmp_path)
+    (tmp_path / name).write_bytes(UNREADABLE[name])
+    assert main(["identify", str(tmp_path), "--draft"]) == 0
+    (warning,) = capsys.readouterr().err.splitlines()
+    assert warning.startswith(f"rov-fmu: warning: {name}: left out, because it cannot be read: ")
+    tests = load_tank_tests(tmp_path)
+    assert {*tests.recordings} == {"heave"}
+    assert f"{name}: left out, because it cannot be read" in by_heading(tests.findings)["Warnings"][0]
+    log.unlink()
+    for arguments in ([str(tmp_path)], [str(tmp_path), "--inspect"]):
+        assert main(["identify", *arguments]) == 2
+        (error,) = [line for line in capsys.readouterr().err.splitlines() if str(tmp_path / name) in line]
+        assert error.startswith(f"rov-fmu: {tmp_path / name}")
+
+
+def test_headers_that_nothing_explains_are_listed_and_drafted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The clock counts ns since 1970; z points up, so y points to port; and forces are in N."""
+    table(tmp_path / "wrench.csv", "%time,field.force.x,field.force.z", 1.7e18 + 1e9 * TIME, 52.0 * TIME, -TIME)
+    titles = "%time,field.position.z,field.velocity.x,field.velocity.y,field.orientation.z,field.orientation.w"
+    table(tmp_path / "state.csv", titles, 1.7e18 + 1e9 * TIME, -DEPTH, TIME, TIME, TIME, TIME)
+    (tmp_path / "other.csv").write_text("a;b\n1;2\n3;4\n", encoding="utf-8")
+    assert main(["identify", "--draft", str(tmp_path)]) == 0
+    assert "\n- b: 2 to 4\n" in capsys.readouterr().out
+    document = tomlkit.parse((tmp_path / "rov.toml").read_text(encoding="utf-8")).unwrap()
+    assert document["columns"] == {
+        "%time": "time [ns]",
+        "field.position.z": "-depth [m]",
+        "field.velocity.x": "surge velocity [m/s]",
+        "field.velocity.y": "-sway velocity [m/s]",
+        "field.force.x": "u_x [N 600]",
+        "field.force.z": "u_z [N 10]",
+    }
+    assert document["dives"] == {"dive_1": {"files": ["wrench.csv", "state.csv"]}}
+
+
+def test_files_of_several_dives_are_paired_by_their_times(tmp_path: Path) -> None:
+    for n in (1, 2):
+        table(tmp_path / f"out_{n}.csv", "time [s],u_1 [%],u_2 [%]", TIME + 99 * n, 9 * TIME, -9 * TIME)
+        table(tmp_path / f"in_{n}.csv", "time [s],depth [m]", TIME + 99 * n + 2.0, DEPTH)
+    assert main(["identify", "--draft", str(tmp_path)]) == 0
+    document = tomlkit.parse((tmp_path / "rov.toml").read_text(encoding="utf-8")).unwrap()
+    assert document["dives"] == {f"dive_{n}": {"files": [f"out_{n}.csv", f"in_{n}.csv"]} for n in (1, 2)}
+
+
+def test_the_sources_and_the_ranges_of_arrays_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ros = Ros(2)
+    extra = [
+        ("/state", t, ros.message("std_msgs/msg/Float64MultiArray", data=np.array([t, 2.0 * t - 1.0]))) for t in TIME
+    ]
+    path = ros.write(tmp_path, [*dive(ros), *extra], ".mcap")
+    assert main(["identify", "--draft", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"\n- depth.* from /\S+, [0-9.]+ Hz", out)
+    assert "\n- /state.data[1]: -1 to 18.8\n" in out
+    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    assert '# "/state.data[1]" = "?"   # -1 to 18.8' in draft

@@ -213,6 +213,18 @@ def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleMode
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
 
 
+def test_a_pulse_of_zero_is_no_signal_and_acts_as_neutral_with_a_warning(videoray: VehicleModel) -> None:
+    pulses = replace(videoray, rov=pulsed(videoray.rov, (1100.0, 1500.0, 1900.0)))
+    assert pulses.layout.fraction_of(0.0) == 0.0
+    expected = "^u_l reaches 0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as"
+    with pytest.warns(UserWarning, match=expected) as caught:
+        found = pulses.simulate(TIMES, {"u_l": [1300.0, 0.0, 1900.0]})
+    assert len(caught) == 1
+    assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-0.5, 0.0, 1.0]})["u"].tolist()
+    forces = pulses.forces(dict.fromkeys(pulses.layout.commands, 0.0))
+    assert not np.any(pulses.rates(np.zeros(len(pulses.layout.state)), forces))
+
+
 # ---- Mistakes --------------------------------------------------------------------------------------------------------
 
 Call = Callable[[VehicleModel], object]
@@ -274,7 +286,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     ),
     "too fast": (
         lambda v: v.simulate(TIMES, start={"r": 1e300, "u": 1}),
-        r"the motion cannot be computed up to time\[1\] = 1 s: ",
+        r"the motion cannot be computed up to time\[1\] = 1 s: it overflows, or never settles and needs shorter steps",
     ),
     "unequal numbers": (
         lambda v: v.simulate_many(TIMES, {"u_l": [[1], [0.5]]}, coefficients={"a_d_u": [1, 2, 3]}),
@@ -295,6 +307,18 @@ WRONG: dict[str, tuple[Call, str]] = {
         "time, record: the result needs 8.8e.04 GB, which is more than the available memory",
     ),
 }
+
+
+def test_a_vehicle_that_turns_over_brings_a_warning() -> None:
+    heavy, ahead = rov_fmu.load("bluerov2_heavy"), {"u_1": -0.3, "u_2": -0.3, "u_3": 0.3, "u_4": 0.3}
+    times = np.linspace(0.0, 3.0, 301)
+    with pytest.warns(UserWarning, match=r"^BlueROV2 Heavy turns over at 1\.87 s: nothing holds it level") as caught:
+        found = heavy.simulate(times, ahead, record="u")
+    assert (found.names, len(caught), caught[0].filename) == (("u",), 1, __file__)
+    with pytest.warns(UserWarning, match="turns over at 1"):
+        heavy.simulate_many(times, {name: np.array([[x], [0.0]]) for name, x in ahead.items()}, record="u")
+    heavy.simulate(times, {name: 0.5 * x for name, x in ahead.items()})  # tilts
+    heavy.simulate(times, start={"phi_0": 3.0})  # begins on its back
 
 
 @pytest.mark.parametrize("case", WRONG)

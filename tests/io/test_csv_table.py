@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns
-from rov_fmu.tank.logs import read_log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.tank.logs import read_log
 
 TURNS = {"turn": 1.0, "deg": 360.0}
 BOUNDED, LEAST = Column(TURNS, minimum=0.5, maximum=2.0), Column(TURNS, least=0.25)

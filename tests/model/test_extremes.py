@@ -46,7 +46,7 @@ def step_them_all(folder: str) -> None:
             assert status in {OK, ERROR}, case
             assert all(map(math.isfinite, after)), case
             assert status == OK or after == before, case
-            assert seconds < 1.0, case
+            assert seconds < 10.0, case  # a million pieces take about a second
 
 
 def test_steps_of_absurd_size_end(videoray_dir: Path) -> None:

@@ -32,8 +32,13 @@ def pulses_of(rng: random.Random, rov: Rov) -> tuple[dict[str, float], dict[str,
     low, neutral, high = PULSE
     inputs = random_inputs(rng, rov)
     pulses = {name: rng.choice((0.0, neutral, *[rng.uniform(900.0, 2100.0)] * 8)) for name in rov.layout.commands}
-    fractions = {name: (x - neutral) / (high - neutral if x > neutral else neutral - low) for name, x in pulses.items()}
-    return inputs | pulses, inputs | fractions
+
+    def fraction(pulse: float) -> float:
+        if pulse == 0.0:  # there is no signal
+            return 0.0
+        return (pulse - neutral) / (high - neutral if pulse > neutral else neutral - low)
+
+    return inputs | pulses, inputs | {name: fraction(pulse) for name, pulse in pulses.items()}
 
 
 def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Rov) -> None:
@@ -80,9 +85,9 @@ def test_a_pulse_beyond_the_range_saturates() -> None:
     def thrust(pulse: float) -> dict[str, float]:
         return rov.commanded(rov.layout.usual_inputs | dict.fromkeys(rov.layout.commands, pulse))
 
-    assert thrust(0.0) == thrust(-5e3) == thrust(1100.0) != thrust(1101.0)
+    assert thrust(1.0) == thrust(-5e3) == thrust(1100.0) != thrust(1101.0)
     assert thrust(1e4) == thrust(1900.0) != thrust(1899.0)
-    assert thrust(0.0)["l"] < 0.0 < thrust(1e4)["l"]
+    assert thrust(1.0)["l"] < 0.0 < thrust(1e4)["l"]
 
 
 def test_v_ss_and_the_commands_of_an_axis_are_those_of_the_fractions(rov: Rov) -> None:

@@ -1,11 +1,38 @@
 """Checks that every page must pass, and readers of its text and tables."""
 
 import re
+from collections.abc import Callable
+from pathlib import Path
 
 from lxml import html
 
 from rov_fmu.fmu.variables import Variable
 from rov_fmu.report.templates import number, pretty_unit
+from tests.report.conftest import Visit
+
+_LONG_WORDS = """() => {
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const own = ".number, thead, .values b, .values span, .live";
+  let changed = 0;
+  while (texts.nextNode()) {
+    const text = texts.currentNode;
+    if (!text.textContent.trim() || text.parentElement.closest(`svg, math, script, style, ${own}`)) continue;
+    text.textContent = "https://example.org/" + "a".repeat(200);
+    changed += 1;
+  }
+  return changed;
+}"""
+"""Replaces all text of a page by a long word, except the texts that are our own."""
+
+
+def check_breaks_long_words(page: str, path: Path, visit: Callable[..., Visit]) -> None:
+    """Check in a browser that a page is not wider than a phone or a screen, whatever words others have put into it."""
+    path.write_text(page, encoding="utf-8")
+    for width in (390, 1280):
+        seen = visit(width=width).page
+        seen.goto(path.as_uri())
+        assert seen.evaluate(_LONG_WORDS) > 2
+        assert seen.evaluate("document.documentElement.scrollWidth") == width
 
 
 def text_of(page: str) -> str:

@@ -24,7 +24,15 @@ from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
-from tests.report.pages import check_is_whole, check_refers_to_itself_alone, row_of, rows, text_of
+from tests.report.conftest import Visit
+from tests.report.pages import (
+    check_breaks_long_words,
+    check_is_whole,
+    check_refers_to_itself_alone,
+    row_of,
+    rows,
+    text_of,
+)
 from tests.vehicles import SIX, VEHICLES, a_vehicle, pulsed
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
@@ -74,6 +82,11 @@ def test_the_page_is_whole_loads_nothing_and_is_small(page: str) -> None:
     plots = [svg for svg in root.iter("svg") if not svg.get("id")]  # the script fills those with an id
     assert (len(plots), len(list(root.iter("img")))) == (10, 2)
     assert len(page.encode()) - len(live_section(page).encode()) < 160_000  # 9 kB are the style of the live section
+
+
+def test_long_words_break(page: str, vehicle: Vehicle, tmp_path: Path, visit: Callable[..., Visit]) -> None:
+    check_breaks_long_words(page, tmp_path / "index.html", visit)
+    check_breaks_long_words(fly_page([Flown(vehicle, b"")]), tmp_path / "fly.html", visit)
 
 
 def live_section(page: str) -> str:

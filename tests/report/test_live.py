@@ -9,6 +9,7 @@ from math import ceil, exp, log
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rov_fmu.cli import main
@@ -17,6 +18,9 @@ from rov_fmu.fmu.variables import variables
 from rov_fmu.model.layout import HEAVE, Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.tank.clocks import restart_rows
+from rov_fmu.tank.columns import Names
+from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -967,6 +971,84 @@ def test_a_log_may_be_written_otherwise_and_have_other_columns(pages: Callable[[
     assert recording["left"] == 0
 
 
+STAMPS = [f"2026-07-01T23:59:5{n % 10},{25 * n:03}+02{':' * (n % 2)}00" for n in range(10)]
+WRITTEN = {
+    "dates": ["time [s];u_t [%];depth [m]", *(f"{stamp};{n};{n}" for n, stamp in enumerate(STAMPS))],
+    "dates of UTC": ["time [s],u_t [%],depth [m]", *(f"2026-02-28 23:59:{50 + n}.5,{n},{n}" for n in range(10))],
+    "rostopic": ["%time,u_t [%],-z [m]", *(f"{1_669_909_208_000_000_000 + 10**8 * n},{n},{-n}" for n in range(10))],
+    "pressure": ["time [s],t [us 1520 320],pressure [kPa]", *(f"{n},{1520 + n},{101.325 + n}" for n in range(10))],
+    "depth before pressure": ["time [s],-u_t [%],depth [cm],pressure [kPa]", *(f"{n},{n},{n},120" for n in range(10))],
+    "force": ["time [us],u_t [N.m 40],z [mm],voltage [V]", *(f"{10**6 * n},{n},{n},16" for n in range(10))],
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_a_log_is_read_as_identify_reads_it(name: str, page: Any, vehicle: Vehicle, tmp_path: Path) -> None:
+    log = tmp_path / "pool.csv"
+    log.write_text("\n".join(WRITTEN[name]), encoding="utf-8")
+    drop(page, log.name, log.read_bytes())
+    until(page, "live.flight.playback !== null")
+    recording = page.evaluate("live.flight.playback.recording")
+    (read,) = read_logs(log, vehicle.layout, Names())
+    depth = read.used("depth")
+    assert depth is not None
+    assert read.commands is not None
+    assert recording["times"] == pytest.approx(depth.time - depth.time[0], abs=1e-6)
+    command = read.commands.at(read.commands.rows)[:, read.commands.thrusters.index("t")]
+    assert [row["u_t"] for row in recording["commands"]] == pytest.approx(command)
+    assert command.any()
+    (signal,) = recording["signals"]
+    assert signal["values"] == pytest.approx(depth.values, abs=1e-9)
+
+
+def test_the_restarts_of_a_clock_are_those_that_identify_sees(page: Any) -> None:
+    """Random clocks: set back, set to 0, late rows, and rows in no order."""
+    rng = np.random.default_rng(5)
+    clocks = [np.arange(30.0)]
+    for _ in range(300):
+        pieces = [rng.integers(-40, 40) + np.sort(rng.integers(0, 40, rng.integers(1, 40))) for _ in range(4)]
+        clocks.append(np.concatenate(pieces).astype(float))
+    clocks += [rng.permutation(40).astype(float) for _ in range(20)]
+    found = page.evaluate(
+        "clocks => clocks.map((times) => restarts(times, live.vehicle.csv))", [times.tolist() for times in clocks]
+    )
+    restarting = 0
+    for times, one in zip(clocks, found, strict=True):
+        rows = restart_rows(times)
+        parts = np.split(times, rows)
+        late = sum(int((part < np.maximum.accumulate(part)).sum()) for part in parts)
+        assert one == {"starts": [0, *rows], "back": late}
+        restarting += bool(rows)
+    assert 50 < restarting < len(clocks) - 50
+
+
+def test_the_units_and_names_are_those_that_identify_reads(page: Any, vehicle: Vehicle, tmp_path: Path) -> None:
+    """The last rows come after the clock was set back, so they are another recording."""
+    titles = ["time [ms]", "Thruster, port [V]", "l [\N{MICRO SIGN}s 1500 -400]", "u_r [N 40]", "u_t [%]"]
+    titles += ["heave depth [cm]", "yaw rate [deg/s]", "HEADING [deg]", "surge speed [mm/s]", "Notes"]
+    header = ";".join(f'"{title}"' for title in titles)
+    cells = ((100 * n, 12.5, 1500 - n, -10, n, 2.5 * n, 1.5 * n, 15 * n, -n, "-") for n in range(30))
+    lines = [header, *(";".join(map(str, row)).replace(".", ",") for row in cells)]
+    lines += lines[1:13]
+    log = tmp_path / "pool.csv"
+    log.write_text("\n".join(lines), encoding="utf-8")
+    drop(page, log.name, log.read_bytes())
+    until(page, "live.flight.playback !== null")
+    recording = page.evaluate("live.flight.playback.recording")
+    read, _ = read_logs(log, vehicle.layout, Names())
+    assert recording["times"] == pytest.approx(np.arange(30) / 10)
+    assert read.commands is not None
+    commands = [[row[f"u_{name}"] for name in read.commands.thrusters] for row in recording["commands"]]
+    assert np.array(commands) == pytest.approx(read.commands.at(read.commands.rows))
+    signals = {(s["axis"], s["isPosition"]): s["values"] for s in recording["signals"]}
+    axes = [form.axis for form in vehicle.layout.axes]
+    expected = {(axes.index(c.quantity.axis), not c.quantity.is_velocity): c for c in read.channels if c.quantity.axis}
+    assert {"surge velocity", "yaw velocity", "depth", "heading"} == {c.quantity.name for c in read.channels}
+    for key, values in signals.items():
+        assert values == pytest.approx(expected[key].values, rel=1e-12)
+    assert recording["left"] == 12
+
+
 def test_a_log_of_one_axis_is_known_by_its_name(page: Any) -> None:
     rows = [f"{n / 5:g};{0 if n < 5 else 40};{0.01 * n:g}".replace(".", ",") for n in range(100)]
     drop(page, "log_heave_2.csv", "\n".join(["time [s];command [%];depth [cm]", *rows]).encode())
@@ -1001,7 +1083,13 @@ BAD = {
     "words": (b"time [s],u_l [%],depth [m]\nx,y,z\nx,y,z\n", "no two of its rows"),
     "many rows": (b"time [s],u_l [%],depth [m]\n" + b"0,1,0\n" * 200_001, "more than 200000 rows"),
     "huge": (b"time [s],u_l [%],depth [m]\n" + b"0,1,0\n" * 4_000_000, "larger than 20 MB"),
-    "fractions": (b"time [s],u_l [%],depth [m]\n0,0.2,0\n1,0.5,0\n", "no command passes 1 %"),
+    "fractions": (
+        b"time [s],u_l [%],depth [m]\n0,0.2,0\n1,0.5,0\n",
+        "no command exceeds 1 %. Are they fractions? Then write [1]",
+    ),
+    "fractional pulses": (b"time [s],u_l [us],depth [m]\n0,0.2,0\n1,0.5,0\n", "fractions under [us]? Write [1]"),
+    "pulses in percent": (b"time [s],u_l [us],depth [m]\n0,20,0\n1,50,0\n", "percent under [us]? Write [%]"),
+    "dates": (b"time [s],u_l [%],depth [m]\n2026-13-01 00:00,9,0\n1.2.2026,9,0\n", "no two of its rows"),
     "two logs": (b"time [s],u_l [%],depth [m]\n" + b"0,9,0\n1,9,0\n2,9,0\n" * 2, "its time goes back, and stays back"),
     "far": (b"time [s],u_l [%],depth [m]\n0,9,0\n1,9,1e308\n", "numbers that no vehicle reaches"),
     "twice": (b"time [s],u_l [%],depth [m],z [m]\n0,9,0,0\n1,9,1,1\n", "two of its columns tell the same of heave"),

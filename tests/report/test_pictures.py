@@ -21,7 +21,7 @@ from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.drawing import VIEWS, draw_icon, draw_thrusters, place, scenes
 from rov_fmu.report.plots.png import png_file
-from rov_fmu.report.plots.svg import inline_svg
+from rov_fmu.report.plots.svg import inline_svg, with_formulas
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
@@ -79,6 +79,35 @@ def test_the_same_bytes_whatever_matplotlib_is_set_to() -> None:
     with mpl.rc_context({"lines.linewidth": 5.0, "figure.dpi": 77, "savefig.dpi": 55, "font.size": 20.0}):
         assert pictures(VIDEORAY) == shipped("videoray")
         assert inline_svg("A plot", draw, (3.0, 2.0)) == plot
+
+
+@pytest.mark.parametrize(
+    "foreign", ["$_$", "$x^$", r"$\frac{$", "\x1b[31mred $", "\0$a_$", "Kälte $^$ 温度", "</text>$\\"]
+)
+def test_foreign_text_in_a_plot_is_no_markup(foreign: str) -> None:
+    def draw(figure: Figure) -> None:
+        ax = figure.subplots()
+        ax.plot([0.0, 1.0], label=foreign)
+        ax.set(title=foreign, xlabel=foreign)
+        ax.set_yticks([0.0, 1.0], [foreign, "$x$"])
+        with_formulas(ax.set_ylabel("$V_{ss}$"))
+        figure.legend(title=foreign)
+
+    found = etree.fromstring(inline_svg(foreign, draw, (6.0, 4.0)).encode(), etree.XMLParser(recover=True))
+    texts = [" ".join(text.split()) for text in found.xpath("//*[local-name()='text']/text()")]
+    shown = " ".join(re.sub("[\0\x1b]", "\N{REPLACEMENT CHARACTER}", foreign).split())
+    assert texts.count(shown) == 5, "the title, the label, the tick, and both texts of the legend"
+    assert "$x$" in texts
+    assert "$V_{ss}$" not in texts, "our own formula is one"
+
+
+def test_a_plot_that_cannot_be_drawn_costs_only_itself() -> None:
+    def fail(_: Figure) -> None:
+        raise OverflowError("too large <b>")
+
+    assert inline_svg("Speed <1>", fail, (3.0, 2.0)) == (
+        "<p>Speed &lt;1&gt;: this plot cannot be drawn: too large &lt;b&gt;</p>"
+    )
 
 
 @pytest.mark.parametrize("content_of", [native_content, python_content])

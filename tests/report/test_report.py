@@ -14,6 +14,7 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content, python_content
+from rov_fmu.identify.adapter.tank_tests import kind_of_data, load_tank_tests
 from rov_fmu.identify.findings import _SENTENCES, DOUBTS, FACTS, by_heading
 from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
@@ -27,7 +28,6 @@ from rov_fmu.report.overview import shown_prediction
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.templates import number, sentence, with_interval
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.tank_tests import kind_of_data, load_tank_tests
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import TESTS
@@ -35,7 +35,7 @@ from tests.folders import DOWN, SPEED, folder_of, pulled, read
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.recordings import PLANS, clean, write_log
 from tests.report.conftest import Visit
-from tests.report.pages import check_is_whole, check_refers_to_itself_alone, rows, text_of
+from tests.report.pages import check_breaks_long_words, check_is_whole, check_refers_to_itself_alone, rows, text_of
 
 report_page = partial(report.report_page, made=date(2026, 11, 23))
 PAGES = ["of_tables", "of_recordings"]
@@ -99,6 +99,12 @@ def test_the_page_is_whole_loads_nothing_and_answers_three_questions_first(page:
     assert not list(html.fromstring(page).iter("script"))
     assert sections(page)[:5] == ["overview", "predicts", "known", "next", "warnings"]
     assert "nan" not in re.findall(r"[a-z]+", text_of(page)), "a dash stands where there is no number"
+
+
+def test_long_words_break(
+    of_tables: Identification, pages: Mapping[int, str], tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    check_breaks_long_words(pages[id(of_tables)], tmp_path / "report.html", visit)
 
 
 @pytest.mark.long
@@ -263,8 +269,8 @@ def test_a_log_of_several_axes_is_a_dive_log(of_recordings: Identification) -> N
     dives = {
         axis: tuple(replace(r, file="dive.bin") for r in recordings) for axis, recordings in tests.recordings.items()
     }
-    assert kind_of_data(replace(tests, recordings=dives)) == "tank tests and a dive log"
-    assert kind_of_data(replace(tests, recordings=dives, thrust={})) == "a dive log"
+    assert kind_of_data(replace(tests, recordings=dives, dives=1)) == "tank tests and a dive log"
+    assert kind_of_data(replace(tests, recordings=dives, dives=1, thrust={})) == "a dive log"
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------

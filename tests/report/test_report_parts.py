@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings.held_out import HeldOut
@@ -21,7 +22,6 @@ from rov_fmu.report.plots.overview import plot_correlation
 from rov_fmu.report.plots.recordings import clearest_step, modelled, plot_recording, plot_step
 from rov_fmu.report.report import scatter
 from rov_fmu.report.templates import number, two_digits, with_error
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.build import build
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.study import Results, study
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.folders import FORCE, HEAD, MASS, SPEED, TAU, beside

@@ -1,6 +1,8 @@
 """The page about a study shows what is in its data frames."""
 
 import re
+import warnings
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +20,7 @@ from rov_fmu.study.results.page import study_page
 from rov_fmu.study.results.plots import Plot, draw_indices, in_rows
 from tests.folders import beside
 from tests.report.conftest import Visit
-from tests.report.pages import check_is_whole
+from tests.report.pages import check_breaks_long_words, check_is_whole
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +133,10 @@ def test_the_plots_fill_the_page_with_text_of_one_size(done: Path, visit: Callab
     assert not shown.problems()
 
 
+def test_long_words_break(done: Path, tmp_path: Path, visit: Callable[..., Visit]) -> None:
+    check_breaks_long_words((done / "study.html").read_text(encoding="utf-8"), tmp_path / "study.html", visit)
+
+
 def test_a_bar_is_an_index_with_its_interval() -> None:
     rows = [
         {"name": "a, b", "S1": 0.6, "S1_95": 0.1, "S1_tells": True, "ST": 0.7, "ST_95": 0.05, "ST_tells": True},
@@ -188,6 +194,53 @@ T = "Tau(u)"
     shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
     assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
     assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
+
+
+@pytest.mark.parametrize("size", [1e308, 3e-320])
+@pytest.mark.parametrize("sampler", ["saltelli", "grid"])
+def test_extreme_values_and_foreign_text_cost_neither_the_plots_nor_the_page(
+    sampler: str, size: float, foreign: Callable[..., Path], tmp_path: Path, scheduler: str
+) -> None:
+    """`wide` overflows in some runs, and y is infinite there."""
+    with zipfile.ZipFile(foreign()) as old, zipfile.ZipFile(tmp_path / "strange.fmu", "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(b'min="-10" max="10"', b'unit="$_$"').replace(
+                    b'start="0"/>', b'start="0" unit="$^{"/>'
+                )
+            new.writestr(name, content)
+    varied = {
+        "saltelli": f"b.uniform = [{-0.9 * size}, {0.9 * size}]\nu.uniform = [0.0, {size}]",
+        "grid": f"b.values = [{-0.9 * size}, 0.0, {0.9 * size}]\nu.values = [0.0, {size}]",
+    }
+    (tmp_path / "plan.toml").write_text(f"""fmu = "strange.fmu"
+stop_time = 2.0
+step = 0.5
+{"runs = 64" if sampler == "saltelli" else ""}
+sampler = "{sampler}"
+[set]
+fast = true
+[vary]
+{varied[sampler]}
+[keep]
+outputs = ["y"]
+[figures]
+"$_{{" = "u"
+"\\u001b[31m" = "b"
+wide = "y[-1]"
+""")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        arguments = [str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results"), "--scheduler", scheduler]
+        assert main(["study", *arguments]) == 0
+    page = html.parse(tmp_path / "results" / "study.html")
+    assert "cannot be drawn" not in page.xpath("string(//body)")
+    labels = {" ".join(text.split()) for text in page.xpath("//svg//text/text()")}
+    power = "10³⁰⁷" if size > 1.0 else "10⁻³⁰⁰"
+    assert {f"{power} $_$", f"{power} $^{{"} <= labels
+    numbers = [float(text.replace("−", "-")) for text in labels if re.fullmatch(r"−?\d+\.?\d*", text)]
+    assert len(numbers) > 10
 
 
 def test_the_page_shows_which_sobol_indices_are_uncertain(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.findings import DOUBTS, FACTS
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
@@ -14,7 +15,6 @@ from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle

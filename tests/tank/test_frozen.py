@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.findings import heading, sentences
-from rov_fmu.model.layout import HEAVE, YAW
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.frozen import without_frozen
-from rov_fmu.tank.logs import read_log
-from rov_fmu.tank.signals import Signal
+from rov_fmu.tank.log import Channel
+from rov_fmu.tank.quality import checked
 from rov_fmu.vehicle.shipped import PAPER
+from tests.tank.logs import channel, commands, log, read_log
 
 TIME: Array = np.arange(0.0, 60.0, 0.1)
 MOVING: Array = np.minimum(TIME, 20.0)
@@ -40,36 +39,36 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None, tmp_path: Path
     text += "".join(f"{t:.1f},{c},{c},{-c},{d:.3f},{h:.3f},{V:.2f}\n" for t, c, d, h, V in rows)
     path = tmp_path / "pool.csv"
     path.write_text(text, encoding="utf-8")
-    log = read_log(path, PAPER)
+    read = read_log(path, PAPER)
     start = "29.9" if value is None else "30"
-    assert sentences(log.findings) == (
+    assert sentences(read.findings) == (
         f"pool.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
         "log or the sensor stop? Their later values are left out",
     )
-    assert {heading(finding) for finding in log.findings} == {"Warnings"}
-    assert [recording.axis.name for recording in log.recordings] == ["heave", "yaw"]
-    for recording in log.recordings:
+    assert {heading(finding) for finding in read.findings} == {"Warnings"}
+    assert [recording.axis.name for recording in read.recordings] == ["heave", "yaw"]
+    for recording in read.recordings:
         assert recording.time[np.isfinite(recording.values)][-1] == pytest.approx(float(start) - 0.1)
         assert recording.time[-1] == pytest.approx(59.9)
         assert recording.context["voltage"][-1] == pytest.approx(15.4, abs=0.01)
 
 
-def signals(*values: Array) -> list[Signal]:
-    axes = ((HEAVE, "depth"), (YAW, "heading"), (YAW, "velocity"))
-    return [Signal(axis, name, TIME, some) for (axis, name), some in zip(axes, values, strict=False)]
+def channels(*values: Array) -> list[Channel]:
+    names = "depth", "heading", "yaw velocity"
+    return [channel(name, TIME, some) for name, some in zip(names, values, strict=False)]
 
 
 @pytest.mark.parametrize(
     "measured",
     [
-        signals(noisy(1, 0.01, 0.001), noisy(2, 0.01, 0.001)),
-        signals(frozen(noisy(1, 0.01, 0.001), 30.0), noisy(2, 0.01, 0.001)),
-        signals(frozen(noisy(1, 0.01, 0.001), 50.0), frozen(noisy(2, 0.01, 0.001), 50.0)),
-        signals(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 35.0)),
-        signals(0.05 * MOVING, -0.03 * MOVING, np.round(0.05 * MOVING, 2)),
-        signals(noisy(1, 0.001, 0.01), noisy(2, 0.001, 0.01)),
-        signals(frozen(noisy(1, 0.006, 0.01), 30.0), frozen(noisy(2, 0.006, 0.01), 30.0)),
-        signals(np.zeros_like(TIME), np.full_like(TIME, np.nan)),
+        channels(noisy(1, 0.01, 0.001), noisy(2, 0.01, 0.001)),
+        channels(frozen(noisy(1, 0.01, 0.001), 30.0), noisy(2, 0.01, 0.001)),
+        channels(frozen(noisy(1, 0.01, 0.001), 50.0), frozen(noisy(2, 0.01, 0.001), 50.0)),
+        channels(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 35.0)),
+        channels(0.05 * MOVING, -0.03 * MOVING, np.round(0.05 * MOVING, 2)),
+        channels(noisy(1, 0.001, 0.01), noisy(2, 0.001, 0.01)),
+        channels(frozen(noisy(1, 0.006, 0.01), 30.0), frozen(noisy(2, 0.006, 0.01), 30.0)),
+        channels(np.zeros_like(TIME), np.full_like(TIME, np.nan)),
         [],
     ],
     ids=[
@@ -84,7 +83,7 @@ def signals(*values: Array) -> list[Signal]:
         "none",
     ],
 )
-def test_sensors_that_may_be_right_are_used(measured: list[Signal]) -> None:
-    kept, findings = without_frozen("pool.csv", measured)
-    assert kept == measured
-    assert findings == []
+def test_sensors_that_may_be_right_are_used(measured: list[Channel]) -> None:
+    found = checked(log(commands(TIME, {"1": 0.0 * TIME}), *measured))
+    assert [*found.channels] == measured
+    assert found.findings == ()

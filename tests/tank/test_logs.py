@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.logs import Log, read_log
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import PAPER
+from tests.tank.logs import Read, read_log
 
 N = 40
 STEP = [0.3 * (n >= 10) for n in range(N)]
@@ -27,13 +27,13 @@ MIXED = Layout(
 )
 
 
-def read(folder: Path, header: str, rows: Sequence[str], axis: Axis | None = None, layout: Layout = PAPER) -> Log:
+def read(folder: Path, header: str, rows: Sequence[str], axis: Axis | None = None, layout: Layout = PAPER) -> Read:
     path = folder / "log.csv"
     path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     return read_log(path, layout, axis)
 
 
-def of_axis(log: Log, name: str) -> Recording:
+def of_axis(log: Read, name: str) -> Recording:
     (recording,) = (recording for recording in log.recordings if recording.axis.name == name)
     return recording
 
@@ -69,29 +69,35 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
 
 
 def test_a_log_without_fault_has_no_findings(tmp_path: Path) -> None:
-    assert read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).findings == ()
+    assert not read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).findings
 
 
-def test_two_logs_in_one_file_are_refused(tmp_path: Path) -> None:
+def test_two_logs_in_one_file_are_read_apart(tmp_path: Path) -> None:
     rows = [f"{n % 30},30,{n}" for n in range(60)]
-    with pytest.raises(DataFileError, match=r"line 32, column 'time \[s\]' = 0: the clock goes back by 29 s"):
-        read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    assert [one.file for one in log.logs] == ["log.csv", "log.csv (from 29 s)"]
+    assert [recording.values[[0, -1]].tolist() for recording in log.recordings] == [
+        pytest.approx([0.0, 0.29]),
+        pytest.approx([0.3, 0.59]),
+    ]
+    assert log.findings == [Finding("clock restarts", file="log.csv", names={"at": "29"})]
+
+
+def test_rows_in_no_order_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
         DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back and does not return"
     ):
         read(tmp_path, "time [s],command [%],depth [cm]", [f"{59 - n},30,{n}" for n in range(60)], HEAVE)
 
 
-def test_a_clock_that_is_set_back_is_refused(tmp_path: Path) -> None:
+def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     """After 30 s the clock is set back by 5 s, so the times of a twelfth of the rows come again."""
     times = [*np.arange(0.0, 30.0, 0.05), *np.arange(25.0, 55.0, 0.05)]
     rows = [f"{time:.2f},{30 * (n > 9)},{n}" for n, time in enumerate(times)]
-    with pytest.raises(DataFileError) as error:
-        read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert str(error.value) == (
-        f"{tmp_path / 'log.csv'}, line 602, column 'time [s]' = 25.00: the clock goes back by 4.95 s, and on from "
-        "there over times that were logged before: split the log before this line into two files"
-    )
+    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    assert [len(recording.time) for recording in log.recordings] == [600, 600]
+    assert log.recordings[1].values[0] == pytest.approx(6.0)
+    assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
 
 
 def test_a_few_rows_over_times_that_were_logged_before_are_sorted(tmp_path: Path) -> None:
@@ -115,9 +121,10 @@ def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "told"),
     [
-        (["0,30,1"] * 100, "1 samples of depth, at least 20 are needed"),
+        (["0,30,1"] * 100, "it has 1 sample of depth, and needs at least 20"),
         ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
-        ([f"{n},30,-" for n in range(N)], "0 samples of depth"),
+        ([f"{n},30,-" for n in range(N)], "it has 0 samples of depth, and needs at least 20"),
+        ([f"12.5.2026,30,{n}" for n in range(N)], r"both a time and a command: '12.5.2026' is no time in time \[s\]"),
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
         ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
     ],
@@ -155,7 +162,7 @@ def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
     assert heave.thrusters["t"] == pytest.approx([0.5] * 30 + [0.0] * 60)
     assert heave.thrusters["r"] == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
     assert {recording.command is None for recording in log.recordings} == {True}, "no axis was driven alone"
-    assert log.findings == ()
+    assert not log.findings
 
 
 def test_a_command_of_the_axis_where_the_thrusters_follow_its_pattern(tmp_path: Path) -> None:
@@ -183,11 +190,11 @@ def test_axes_that_the_thrusters_do_nothing_along_are_told(tmp_path: Path) -> No
     rows = [f"{n / 10},{STEP[n]},{STEP[n]},{n},{n},1.5" for n in range(N)]
     log = read(tmp_path, "time [s],u_l [1],u_r [1],surge distance [m],heading [deg],depth [m]", rows)
     assert [recording.axis for recording in log.recordings] == [SURGE]
-    assert log.findings == (
+    assert log.findings == [
         Finding("missing column", file="log.csv", names={"column": "u_t"}),
         Finding("constant motion", axis="heave", file="log.csv", names={"quantity": "depth"}),
         Finding("cancelling thrusters", axis="yaw", file="log.csv"),
-    )
+    ]
 
 
 def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) -> None:
@@ -226,7 +233,7 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 28]
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
     assert of_axis(log, "heave").thrusters["t"][[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
-    for kind in ("no pulse", "pulse beyond full thrust"):
+    for kind in ("no pulse", "beyond full thrust"):
         assert Finding(kind, file="log.csv", names={"column": "u_t"}, numbers={"count": 2}) in log.findings
 
 

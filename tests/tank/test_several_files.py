@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
-from tests.tank.formats import motion
-from tests.tank.formats.motion import TIME
+from tests.tank.readers import motion
+from tests.tank.readers.motion import TIME
 
 ROV = """base = "bluerov2"
 [vehicle]
@@ -140,7 +140,7 @@ def test_unknown_columns_are_named(folder: Path) -> None:
         ('[columns]\nDepthh = "depth [m]"', "rov.toml: columns.Depthh = 'depth [m]': no CSV file has such a column"),
         ('[columns]\nx = "dpeth [m]"', "rov.toml: columns.x = 'dpeth [m]': there is no such column, but"),
         ('[topics]\n"/d.data" = "depth [m]"', "rov.toml: topics./d.data = 'depth [m]': no log has such a topic"),
-        ('[columns]\nx = "-depth [m]"', "rov.toml: columns.x = '-depth [m]': there is no such column, but"),
+        ('[columns]\nx = "--depth [m]"', "rov.toml: columns.x = '--depth [m]': there is no such column, but"),
         ('[topics]\n"/d.data" = "depth"', "rov.toml: topics./d.data = 'depth': must be 'depth [m]' or"),
     ],
 )

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
 from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.tables import Row
-from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
+from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -99,8 +99,8 @@ def test_unknown_headers_of_a_table_are_named_beside_the_expected_ones(folder: P
         f"{folder / 'thrust_top_a.csv'}, line 1 = 'Throttle (%), Pull (kgf)': none of these headers is known; "
         f"the first line must have the headers command [%], force [N]{hint}"
     )
-    place = f"{folder / 'thrust_top_b.csv'}, line 1, column 2 = 'Pull (kgf)'"
-    assert other == f"{place}: there is no such column, but command [%], force [N]{hint}"
+    place = f"{folder / 'thrust_top_b.csv'}, line 1, column 3"
+    assert other == f"{place}: 'force [N]' is missing. The other columns are 'Pull (kgf)'{hint}"
 
 
 def test_columns_in_any_order_and_unit(folder: Path) -> None:
@@ -195,7 +195,7 @@ def test_a_vehicle_to_compare_with_is_a_file_in_the_folder(folder: Path, capsys:
     rov.write_text(text, encoding="utf-8")
     refused(folder, (f"{rov}: against = 'mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
     write_vehicle(load_vehicle(VIDEORAY), folder / "mine.toml")
-    against = load_tank_tests(folder).given.description.against
+    against = load_tank_tests(folder).given.description.tables.against
     assert against
     assert against.samefile(folder / "mine.toml")
 
@@ -228,6 +228,7 @@ STEADY, TAU, LOG = (
     "time [s],command [%],depth [m]\n",
 )
 BAD: list[tuple[str, str, str]] = [
+    ("steady_surge.csv", STEADY + "20,\udcb5\n", "UTF-8 | byte 30"),
     ("steady_surge.csv", STEADY + "20,fast\n", "line 2 | 'velocity [m/s]' = 'fast' | number"),
     ("steady_surge.csv", STEADY + "20,0.3\n-20,0.3\n", "line 3 | [m/s]' = 0.3 | sign"),
     ("steady_surge.csv", STEADY + "20,0\n", "line 2 | 'velocity [m/s]' = 0 | sign"),
@@ -238,22 +239,18 @@ BAD: list[tuple[str, str, str]] = [
     ("steady_surge.csv", "command [%],velocity\n20,0.3\n", "line 1 | column 2 = 'velocity' | [m/s]"),
     ("steady_surge.csv", "command [%],velocity [m/s],command [1]\n", "line 1 | column 3 | [1]' | twice"),
     ("steady_surge.csv", STEADY, "line 1 | no rows"),
-    ("steady_surge.csv", STEADY + "20,\udcb5\n", "UTF-8 | byte 30"),
     ("steady_surge.csv", STEADY + '20,"0.3\n', "line 2"),
     ("steady_yaw.csv", STEADY + "20,1\n", "line 1 | column 2 | 'velocity [rad/s]' or 'velocity [deg/s]'"),
     ("time_constant_yaw.csv", TAU + "20,-3\n", "line 2 | 'time constant [s]' = -3 | above 0"),
     ("time_constant_yaw.csv", TAU + "0,3\n", "line 2 | 'command [%]' = 0 | must not be 0, because nothing moves then"),
     ("thrust_rear.csv", "command [%],force [N]\n50,9\n-50,6\n", "line 3 | 'force [N]' = 6 | sign of the command"),
     ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0,30,0\n", "line 4 | 'time [s]' = 0: | goes back"),
-    ("log_heave.csv", LOG + "0,30,0\n0.1,30,\n0.2,30,\n", "1 samples of depth | 20"),
     ("log_heave.csv", LOG + "0,,0\n", "no row has both a time and a command"),
     ("log_heave.csv", "time [s],command [%]\n0,0\n", "line 1 | 'depth [m]' or 'velocity [m/s]'"),
     ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", "line 1 | 'depth [m]' or"),
     ("stedy_surge.csv", STEADY, "neither a log, which has a column 'time [s]' | steady_"),
     ("notes.csv", "day,weather\n1,rain\n", "neither a log, which has a column 'time [s]' | thrust_<curve>"),
     ("notes.csv", "day,weather\n1,rain\n", "of rear, top, surge, heave or yaw"),
-    ("pool.csv", "", "pool.csv: the file is empty"),
-    ("pool.csv", " \n\n", "pool.csv: the file is empty"),
     ("dive.csv", "time,u_l [%],depth [m]\n0,0,0\n", "line 1 | 'time': must be 'time [s]' or 'time [ms]'"),
     ("steady_sway.csv", STEADY, "no thruster of the vehicle drives sway"),
     ("steady_roll.csv", STEADY, "no thruster of the vehicle drives roll"),

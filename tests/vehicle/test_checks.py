@@ -270,7 +270,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
             **_NO_BOOST,
             **{f"thruster.{n}.position.value": [x, 0.0, 0.0] for n, x in (("1", 1), ("2", 1), ("3", 1), ("4", 1))},
         },
-        [("axes.yaw", "the thrusters cancel", "sway; correct a direction or a position, or remove this table")],
+        [("axes.sway", "the thrusters cancel", "yaw; correct a direction or a position, or remove this table")],
     ),
     "surge and sway in one": (
         {**_NO_BOOST, **{f"thruster.{n}.direction.value": [1, 1, 0] for n in "1234"}},

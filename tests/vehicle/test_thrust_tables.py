@@ -48,7 +48,7 @@ def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> Non
 
 
 def test_the_makers_table_is_continued_to_full_thrust() -> None:
-    found = read_thrust(Path("models/bluerov2/t200/t200_16_v.csv")).table("t200")
+    found = read_thrust(SHIPPED["bluerov2"].with_name("t200") / "t200_16_v.csv").table("t200")
     (first, second, *_), (*_, before, last) = found.commands, found.commands
     assert (first, second, before, last) == (-1.0, -0.99, 0.99, 1.0)
     assert found.force(1.0) == found.forces[-2] + 0.01 * found.slopes[-2]
@@ -203,6 +203,19 @@ def test_a_voltage_far_above_that_of_the_curves_gives_a_warning(folder: Path) ->
     higher = {"curves.main.tables": GONE, "curves.main.table": _FILES[0], "battery.voltage": quantity(24.5, "V")}
     path.write_text(changed(higher, TEXT), encoding="utf-8")
     expected = "battery.voltage.value = 24.5: is 1.53 times V_0 = 16 V of curves.bow: one of the two is probably wrong"
+    with pytest.warns(UserWarning, match=re.escape(expected)) as caught:
+        load_vehicle(path)
+    assert len(caught) == 1
+
+
+def test_thrust_that_does_not_rise_with_the_voltage_gives_a_warning(folder: Path) -> None:
+    """The table at the higher voltage is a copy of the other one."""
+    shutil.copy(folder / _FILES[0], folder / _FILES[1])
+    path = folder / "rov.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    expected = (
+        "curves.main.tables: at 16 V, full thrust is not stronger than at 12 V: is one table a copy of the other?"
+    )
     with pytest.warns(UserWarning, match=re.escape(expected)) as caught:
         load_vehicle(path)
     assert len(caught) == 1

@@ -87,8 +87,8 @@ PLANTED = {
     ),
     "what is warned of once is in the state": (
         "instance.c",
-        "    if (f->now.mode == INSTANTIATED) {\n        WARN",
-        "    if (f->now.mode == INSTANTIATED) {\n        f->now.time = 1.0;\n        WARN",
+        "    warn_in(f, INSTANTIATED, READ_EARLY);",
+        "    f->now.time = 1.0;\n    warn_in(f, INSTANTIATED, READ_EARLY);",
         "to read changes the instance",
     ),
     "the last byte of a state is not there": (
@@ -176,8 +176,8 @@ PLANTED_IN_HEAVY = {
     ),
     "a turn is counted too much": (
         "instance.c",
-        "        f->now.heading = heading;\n    }\n    return DONE;",
-        "        f->now.heading = heading + 7.0;\n    }\n    return DONE;",
+        "    f->now.heading = heading;\n    return DONE;",
+        "    f->now.heading = heading + 7.0;\n    return DONE;",
         "psi is .* beside|the heading jumps",
     ),
     "a lag overshoots": (
@@ -210,8 +210,8 @@ PLANTED_IN_FMI3 = {
     ),
     "an update may tune": (
         "instance.c",
-        "case INTERMEDIATE: return kind == INPUT;",
-        "case INTERMEDIATE: return kind == INPUT || kind == TUNABLE;",
+        "case INTERMEDIATE: return kind == INPUT &&",
+        "case INTERMEDIATE: return kind == TUNABLE || kind == INPUT &&",
         "fmi3SetFloat64: illegal in Intermediate Update Mode",
     ),
     "pieces are counted from the time": (

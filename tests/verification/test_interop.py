@@ -12,19 +12,27 @@ from math import nan
 from pathlib import Path
 
 import pytest
+from lxml import etree
 
+from rov_fmu.fmu.model_description import NATIVE, model_description
+from rov_fmu.fmu.variables import variables
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
 from verification.interoperability.__main__ import main
 from verification.interoperability.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
 from verification.interoperability.install import install
-from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre, ResultError
+from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, VEHICLES, Manoeuvre, ResultError
 from verification.interoperability.run import Verdict, build_fmu, run, without_places
 
 TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
 
 
-@pytest.fixture(scope="session", params=MANOEUVRES.values(), ids=list(MANOEUVRES))
+_SHIPPED = [name for name in MANOEUVRES if name in SHIPPED]
+
+
+@pytest.fixture(scope="session", params=[MANOEUVRES[name] for name in _SHIPPED], ids=_SHIPPED)
 def manoeuvre(request: pytest.FixtureRequest) -> Manoeuvre:
     found: Manoeuvre = request.param
     return found
@@ -39,9 +47,9 @@ def test_manoeuvre_shows_what_it_promises(manoeuvre: Manoeuvre) -> None:
     assert TIMES[0] == 0.0
     assert TIMES[-1] == 30.0
     assert {*starts, DETOUR} <= set(TIMES), "the inputs change, and the detour starts, at communication points"
-    assert not any(phases[0].values()), "it does not matter when an importer sets the first inputs"
+    assert phases[0] == layout.usual_inputs, "it does not matter when an importer sets the first inputs"
     for name in layout.inputs:
-        values = [inputs[name] for inputs in phases]
+        values = [inputs[name] - layout.inputs[name].start for inputs in phases]
         assert any(values), f"{name} is used"
         if name in layout.commands:
             changes = list(pairwise(values))
@@ -61,6 +69,29 @@ def test_there_is_a_manoeuvre_with_sway_lag_coupling_and_dead_band() -> None:
     dead = heavy.parameters["c_0_t200"]
     held = [heavy.inputs_at(time)[name] for time in heavy.phases for name in heavy.rov.layout.commands]
     assert any(0.0 < command < dead for command in held)
+
+
+@pytest.mark.long
+def test_a_vehicle_with_every_option_joins_the_importers_that_can_run_it() -> None:
+    every = MANOEUVRES["every_option"]
+    layout = every.rov.layout
+    assert len(layout.axes) == 6
+    assert all((layout.coupled, layout.cross, layout.restoring, layout.fins, layout.mix, layout.pulse, layout.lagging))
+    assert layout.has_dead_time
+    assert "voltage" in layout.inputs
+    assert any(curve.tables for curve in layout.curves)
+    test_manoeuvre_shows_what_it_promises(every)
+    left_out = {importer.title for importer in IMPORTERS if not importer.suits(layout)}
+    assert left_out == {"CasADi", "PathSim", "fmi-sim", "fmi-rs"}
+    assert {i.name for i in IMPORTERS if not i.suits(layout) and i.interface == "CS"} == {
+        "fmi-sim-cs",
+        "fmi-sim-cs-fmi3",
+    }
+    vehicle = load_vehicle(VEHICLES["every_option"])
+    root = etree.fromstring(model_description(vehicle, variables(vehicle.rov), guid="", interfaces=NATIVE[3], fmi=3))
+    discrete = [v for v in root.iter("Float64") if v.get("variability") == "discrete"]
+    assert {v.get("name") for v in discrete} == {*layout.commands, *layout.delayed}
+    assert not any(v.get("intermediateUpdate") for v in discrete)
 
 
 def test_files_say_the_same(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
@@ -322,7 +353,10 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
 
 @pytest.mark.interop
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+@pytest.mark.parametrize("manoeuvre", MANOEUVRES.values(), ids=list(MANOEUVRES))
 def test_importer(importer: Importer, fmu: Callable[[str, int], Path], manoeuvre: Manoeuvre) -> None:
+    if not importer.suits(manoeuvre.rov.layout):
+        pytest.skip("it sets no inputs in events, or sets them late")
     outcome = run(importer, fmu(manoeuvre.vehicle, importer.fmi), TOOLS, manoeuvre)
     if outcome.verdict is Verdict.NOT_RUN:
         pytest.skip(outcome.reason)

@@ -14,6 +14,7 @@ def test_every_file_has_tests() -> None:
     assert not [test for file in files for test in mutation.tests_of(file) if not (mutation.ROOT / test).exists()]
     tests = mutation.tests_of("rov_fmu/model/riccati.py")
     assert tests[0] == "tests/model/test_riccati.py", "those that import it are the first"
+    assert mutation.tests_of("rov_fmu/process.py"), "every file of the product has tests"
 
 
 @pytest.fixture
@@ -81,3 +82,36 @@ def test_survivors_are_those_that_no_test_notices(monkeypatch: pytest.MonkeyPatc
     text = (mutation.ROOT / file).read_text(encoding="utf-8")
     same = mutation.Mutant(file, 1, "", "", f"{text}\n")
     assert mutation.survivors([same, replace(same, text=f"{text}1 / 0\n")], jobs=1) == [same]
+
+
+def test_a_kept_mutant_is_found_where_its_line_is_today(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mutation, "ROOT", tmp_path)
+    monkeypatch.setattr(mutation, "FILES", ("*.py",))
+    (tmp_path / "a.py").write_text("x = 1\ny = 2\nx = 1\nz = 3\n")
+    rows = [mutation.kept(mutation.Mutant("a.py", n, "x = 1", "x = 2", "")) for n in (1, 3)]
+    assert [found.text for row in rows if (found := mutation.applied(row))] == [
+        "x = 2\ny = 2\nx = 1\nz = 3\n",
+        "x = 1\ny = 2\nx = 2\nz = 3\n",
+    ]
+    (tmp_path / "a.py").write_text("\nx = 1\nw = 2\nx = 1\nz = 3\n")
+    assert [mutation.applied(row) for row in rows] == [None, None], "in two places, with other neighbours"
+    (tmp_path / "a.py").write_text("a = 1\n")
+    (tmp_path / "b.py").write_text("y = 2\nx = 1\nz = 3\n")
+    moved = mutation.applied(rows[1])
+    assert moved is not None
+    assert (moved.file, moved.line, moved.text) == ("b.py", 2, "y = 2\nx = 2\nz = 3\n")
+
+
+@pytest.mark.long
+def test_verdicts_are_written_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = "rov_fmu/model/riccati.py"
+    monkeypatch.setattr(mutation, "tests_of", lambda _: ["tests/model/test_riccati.py"])
+    before = "from dataclasses import dataclass"
+    line = 1 + (mutation.ROOT / file).read_text(encoding="utf-8").splitlines().index(before)
+    mutants = [mutation.Mutant(file, line, before, after, "") for after in (f"{before}  # same", "1 / 0")]
+    rows = [*map(mutation.kept, mutants), mutation.kept(mutants[0]) | {"before": "no such line"}]
+    results = tmp_path / "results.csv"
+    done = mutation.run_kept(results, rows)
+    assert [row["verdict"] for row in done] == ["survived", "killed", "no longer applies"]
+    assert mutation.read_rows(results) == done
+    assert mutation.run_kept(results, rows) == done, "nothing is left to run"

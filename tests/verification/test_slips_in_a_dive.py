@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from examples.dive_log import bluerov2, dive
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.slips.search import slips
-from rov_fmu.tank.recording import Recording
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, table
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.references.vehicles import THRUST
 
 from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
 
@@ -28,7 +29,7 @@ _ROUND = 60  # s
 VEHICLES = {
     "bluerov2_heavy": SHIPPED["bluerov2_heavy"],
     "videoray": VIDEORAY,
-    "thrust": Path(__file__).with_name("thrust.toml"),
+    "thrust": THRUST,
     "bare": Path(__file__).with_name("bare.toml"),
 }
 """The vehicles: one with six axes, lag, reverse thrust and dead band; the default; one with all that thrust can depend

@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help=f"importer (see --list) or kit: {', '.join(KITS)}; what is named must "
         "run (default: all that are installed)",
     )
-    add("--vehicle", choices=MANOEUVRES, metavar="NAME", help=f"{' or '.join(MANOEUVRES)} (default: both)")
+    add("--vehicle", choices=MANOEUVRES, metavar="NAME", help=f"{' or '.join(MANOEUVRES)} (default: all)")
     add("--fmi", type=int, choices=VERSIONS, help="version of FMI (default: both)")
     add("--fmu", type=Path, metavar="FILE", help="FMU of that vehicle and version (default: built for this)")
     add("--install", action="store_true", help="install the kits instead of running (Linux)")
@@ -71,6 +71,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         vehicles = [options.vehicle] if options.vehicle else MANOEUVRES
         built = cache(partial(build_fmu, folder=Path(folder)))
         for vehicle, importer in product(vehicles, importers):
+            if not importer.suits(MANOEUVRES[vehicle].rov.layout):
+                continue
             fmu = options.fmu or built(vehicle, importer.fmi)
             with console.status(f"{importer.title}, FMI {importer.fmi}.0, {importer.interface}: {vehicle}"):
                 outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))

@@ -6,6 +6,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rov_fmu.model.layout import Layout
+
 VERSIONS = (2, 3)
 """The versions of FMI."""
 HERE = Path(__file__).parent
@@ -51,11 +53,18 @@ class Importer:
     """The programs of the system that it needs besides those of its kit."""
     fmi: int = 2
     """The version of the FMU that it loads."""
+    has_discrete_inputs: bool = True
+    """False for an importer that does not set inputs that change in events at their time. A vehicle with a dead time
+    needs them: Model Exchange has to have events at the jumps, and fmi-sim sets such an input one row too late."""
 
     @property
     def version(self) -> str:
         """The pinned version."""
         return pinned(*self.pin)
+
+    def suits(self, layout: Layout) -> bool:
+        """Return True when it can fly a vehicle in its mode."""
+        return self.has_discrete_inputs or not layout.has_dead_time
 
     def is_installed(self, tools: Path) -> bool:
         """Return True when this version is installed among the tools."""
@@ -118,6 +127,10 @@ def _both(*importers: Importer) -> Iterator[Importer]:
         yield from (importer, replace(importer, name=f"{importer.name}-fmi3", fmi=3))
 
 
+def _without_events(importer: Importer) -> Importer:
+    return replace(importer, has_discrete_inputs=False)
+
+
 def _source(name: str, *options: str) -> tuple[str, ...]:
     return ("java", *options, "-cp", f"{{tools}}/java/{name}/*", f"{{runners}}/{name}/Fly.java")
 
@@ -156,9 +169,9 @@ IMPORTERS = (
     *_both(_python("ecos-cs", "Ecos", "CS", "ecospy")),
     _python("ecos-ssp", "Ecos", "CS, SSP", "ecospy"),
     *_both(
-        _python("casadi-me", "CasADi", "ME, DaeBuilder, CVODES", "casadi", SOLVER),
+        _without_events(_python("casadi-me", "CasADi", "ME, DaeBuilder, CVODES", "casadi", SOLVER)),
         _python("pathsim-cs", "PathSim", "CS", "pathsim-fmi"),
-        _python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER),
+        _without_events(_python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER)),
     ),
     _python("jaxonomy", "Jaxonomy", "CS", "jaxonomy"),
     _python("cofmupy", "CoFmuPy", "CS", "cofmupy", requirements="requirements-cofmupy.txt"),
@@ -204,23 +217,33 @@ IMPORTERS = (
         None,
     ),
     *_both(
-        Importer(
-            "fmi-sim-cs", "fmi-sim", "CS", "rust", (_CARGO, "fmi-sim"), _FMI_SIM, ("sh", "{runners}/fmi_sim.sh", "cs")
+        _without_events(
+            Importer(
+                "fmi-sim-cs",
+                "fmi-sim",
+                "CS",
+                "rust",
+                (_CARGO, "fmi-sim"),
+                _FMI_SIM,
+                ("sh", "{runners}/fmi_sim.sh", "cs"),
+            )
         ),
-        Importer(
-            "fmi-sim-me",
-            "fmi-sim",
-            "ME, forward Euler",
-            "rust",
-            (_CARGO, "fmi-sim"),
-            _FMI_SIM,
-            ("sh", "{runners}/fmi_sim.sh", "me"),
-            EULER,
-            EULER_LAGGING,
+        _without_events(
+            Importer(
+                "fmi-sim-me",
+                "fmi-sim",
+                "ME, forward Euler",
+                "rust",
+                (_CARGO, "fmi-sim"),
+                _FMI_SIM,
+                ("sh", "{runners}/fmi_sim.sh", "me"),
+                EULER,
+                EULER_LAGGING,
+            )
         ),
     ),
     _rust("fmi-rs-cs", "fmi-rs", "CS, Event Mode", fmi=3),
-    _rust("fmi-rs-me", "fmi-rs", "ME, forward Euler", EULER, EULER_LAGGING, fmi=3),
+    _without_events(_rust("fmi-rs-me", "fmi-rs", "ME, forward Euler", EULER, EULER_LAGGING, fmi=3)),
     _rust("fmu-runner", "fmu-runner", "CS, state restored"),
 )
 

@@ -21,11 +21,15 @@ from itertools import cycle
 from math import isfinite
 from pathlib import Path
 
+from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.layout import AXES
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.references.vehicles import EVERY_OPTION
 
+VEHICLES = {**SHIPPED, "every_option": EVERY_OPTION}
+"""The vehicle files by name."""
 POINTS_A_SECOND = 10
 STEP = 1.0 / POINTS_A_SECOND
 TIMES = [n / POINTS_A_SECOND for n in range(301)]
@@ -42,11 +46,12 @@ class Manoeuvre:
     """The manoeuvre of a vehicle."""
 
     vehicle: str
-    """The name of a vehicle that ships."""
+    """The name of a vehicle of VEHICLES."""
     parameters: Mapping[str, float]
     """The parameters that differ from the vehicle file."""
     phases: Mapping[float, Mapping[str, float]]
     """The inputs from each time (s) on. The name of an axis stands for a command to all thrusters that drive it.
+    Commands are fractions, also if the vehicle takes pulse widths.
 
     The first phase has no inputs, so that it does not matter when an importer sets the first inputs.
     """
@@ -54,7 +59,7 @@ class Manoeuvre:
     @cached_property
     def rov(self) -> Rov:
         """The vehicle with its own parameters."""
-        return load_vehicle(SHIPPED[self.vehicle]).rov
+        return load_vehicle(VEHICLES[self.vehicle]).rov
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -64,17 +69,21 @@ class Manoeuvre:
     def inputs_at(self, time: float) -> dict[str, float]:
         """Return all inputs of the step that starts at a time."""
         layout = self.rov.layout
-        inputs = dict.fromkeys(layout.inputs, 0.0)
+        inputs = layout.usual_inputs | dict.fromkeys(layout.commands, 0.0)
         for name, value in self.phases[max(start for start in self.phases if start <= time)].items():
+            if name == "voltage":
+                inputs[name] = value
+                continue
             parts = layout.signs(AXES[name]) if name in AXES else {name: 1.0}
             inputs |= {part: round(inputs[part] + sign * value, 9) for part, sign in parts.items()}
-        return inputs
+        return inputs | {name: layout.command_of(inputs[name]) for name in layout.commands}
 
     def write_files(self, folder: Path) -> None:
         """Write the files that the runners read."""
         layout = self.rov.layout
         _write(folder / "parameters.csv", ("name", "value"), self.parameters.items())
-        _write(folder / "detour.csv", ("name", "value"), zip(layout.commands, cycle((1.0, -1.0)), strict=False))
+        ends = cycle(map(layout.command_of, (1.0, -1.0)))
+        _write(folder / "detour.csv", ("name", "value"), zip(layout.commands, ends, strict=False))
         (folder / "outputs.txt").write_text("".join(f"{name}\n" for name in self.outputs))
         _write(
             folder / "manoeuvre.csv",
@@ -94,11 +103,12 @@ class Manoeuvre:
         """The time and the outputs at each communication point by `rov_fmu.model.rov`."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
         state: Mapping[str, float] = rov.layout.at_rest
+        line = DelayLine(rov.layout)
         rows = []
         for time in TIMES:
             if time > 0.0:
-                state = rov.step(inputs, state, STEP)
-            rows.append({"time": time, **state, **rov.calculated(inputs, state)})
+                state = line.step(rov, inputs, state, time - STEP, STEP)
+            rows.append({"time": time, **state, **rov.calculated({**inputs, **line.delayed}, state)})
             inputs = self.inputs_at(time)
         return rows
 
@@ -193,5 +203,47 @@ _HEAVY = Manoeuvre(
     },
 )
 
-MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY)}
+_EVERY_OPTION = Manoeuvre(
+    "every_option",
+    {
+        "m_rov": 21.0,
+        "a_d_v": 80.0,
+        "B": 206.5,
+        "W": 206.0,
+        "T_d": 0.17,
+        "d_pair": 5.0,
+        "lift_rudder": 8.0,
+        "beta_u": 0.9,
+    },
+    {
+        0.0: {},
+        1.0: {"u_ahead": 0.4, "u_down": 0.3, "u_rudder": 0.3, "u_turn": 0.1, "u_side": 0.2, "u_plane": 0.2},
+        4.0: {
+            "u_ahead": 0.3,
+            "u_down": 0.2,
+            "u_rudder": 0.1,
+            "u_turn": 0.05,
+            "u_side": 0.1,
+            "u_plane": 0.1,
+            "voltage": 13.0,
+        },
+        8.0: {
+            "u_ahead": 0.5,
+            "u_down": -0.5,
+            "u_rudder": -0.7,
+            "u_turn": -0.3,
+            "u_side": -0.6,
+            "u_plane": -0.5,
+            "voltage": 15.5,
+        },
+        11.0: {"u_ahead": -0.5, "u_down": 0.4, "u_turn": 0.4, "u_side": 0.7, "K_ext": 1.5, "M_ext": 2.0},
+        14.0: {"u_ahead": -0.3, "u_rudder": 0.5, "u_plane": 0.6, "K_ext": -2.0, "M_ext": -3.0, "voltage": 17.0},
+        17.0: {"u_ahead": 0.6, "u_turn": -0.2, **_LOADS_OF_SIX},
+        21.0: {"u_ahead": 1.0, "u_down": 1.0, "u_rudder": 1.2, **_LOADS_OF_SIX},
+        25.0: {"u_side": 0.3, "u_plane": -0.2, "voltage": 14.0, **_CURRENT},
+        28.0: _CURRENT,
+    },
+)
+
+MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY, _EVERY_OPTION)}
 """The manoeuvres by the name of the vehicle."""

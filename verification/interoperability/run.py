@@ -12,11 +12,10 @@ from functools import partial
 from pathlib import Path
 
 from rov_fmu.build import build
-from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 from .importers import HERE, Importer
-from .manoeuvre import Manoeuvre, ResultError
+from .manoeuvre import VEHICLES, Manoeuvre, ResultError
 
 ROOT = HERE.parents[1]
 TIMEOUT = 300.0
@@ -51,8 +50,8 @@ class Outcome:
 
 
 def build_fmu(vehicle: str, fmi: int, folder: Path) -> Path:
-    """Build the FMU of a vehicle that ships, for this machine. Raises BuildError."""
-    return build(load_vehicle(SHIPPED[vehicle]), folder / f"{vehicle}{fmi}.fmu", platforms=["host"], fmi=fmi).path
+    """Build the FMU of a vehicle, for this machine. Raises BuildError."""
+    return build(load_vehicle(VEHICLES[vehicle]), folder / f"{vehicle}{fmi}.fmu", platforms=["host"], fmi=fmi).path
 
 
 def run(importer: Importer, fmu: Path, tools: Path, manoeuvre: Manoeuvre) -> Outcome:

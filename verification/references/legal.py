@@ -38,6 +38,10 @@ def table(fmi: int) -> list[list[str]]:
 
 def legal_modes(kind: int, fmi: int = 2) -> Mapping[str, tuple[str, ...]]:
     """Return the functions of a kind of instance with the modes in which each is legal (names of instance.h)."""
+    return _marked(kind, fmi, "xe+")
+
+
+def _marked(kind: int, fmi: int, wanted: str) -> Mapping[str, tuple[str, ...]]:
     columns, calls = _TABLES[fmi]
     first = 0 if kind == MODEL_EXCHANGE else _MODEL_EXCHANGE_COLUMNS
     without_events = fmi == 3 and kind == CO_SIMULATION
@@ -46,9 +50,14 @@ def legal_modes(kind: int, fmi: int = 2) -> Mapping[str, tuple[str, ...]]:
         legal[name] = tuple(
             mode
             for mode, mark in zip(columns[kind], marks[first : first + len(columns[kind])], strict=True)
-            if mark != "." and not (without_events and (mark == "e" or mode == "EVENT"))
+            if mark in wanted and not (without_events and (mark == "e" or mode == "EVENT"))
         )
     return {name: modes for name, modes in legal.items() if modes}
+
+
+def tolerated_modes(kind: int, fmi: int = 2) -> Mapping[str, tuple[str, ...]]:
+    """Return the functions with the modes in which only importers call them (marked +), and the FMU warns once."""
+    return _marked(kind, fmi, "+")
 
 
 def legal_header(fmi: int = 2) -> str:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, Axis
-from rov_fmu.tank.recording import Recording
 
 
 class Current(Effect):

@@ -7,11 +7,11 @@ from functools import cached_property
 from math import inf
 from typing import Any, ClassVar
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import NO_REQUESTS, Requests
-from rov_fmu.tank.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)

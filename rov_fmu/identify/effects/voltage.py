@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.model.layout import coefficient_name
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from math import hypot, isnan, nan, sqrt
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import WINDOW, kernel, robust_deviation, velocity, without_spikes
 from rov_fmu.model.riccati import RISE
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import WINDOW, kernel, robust_deviation, velocity, without_spikes
 
 _SAME_COMMAND = 0.005  # fraction of the full command
 _LEAST = 20

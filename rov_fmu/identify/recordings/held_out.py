@@ -7,6 +7,8 @@ from math import inf
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import velocity
 from rov_fmu.identify.effects.effect import Effect, Setting, delay_of
 from rov_fmu.identify.least_squares import covariance, estimate
 from rov_fmu.identify.recordings.prediction_errors import Errors, Key, errors_of, joined
@@ -15,8 +17,6 @@ from rov_fmu.identify.simulation.prepared import PreparedRecording, undivided
 from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.identify.simulation.solver import settled, solve
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import velocity
 
 _AHEAD = 10.0
 """How far ahead the short predictions reach, s."""

@@ -17,6 +17,8 @@ from math import inf
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import robust_deviation, white_noise
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.attitude import Attitude
 from rov_fmu.identify.effects.current import Current, CurrentNorth, is_in_flow
@@ -44,8 +46,6 @@ from rov_fmu.model.layout import AXES, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import NO_REQUESTS, Requests
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import robust_deviation, white_noise
 
 _BEYOND_DOUBT = 100.0
 """Effects with a larger Wald statistic need no confirmation by held-out predictions."""

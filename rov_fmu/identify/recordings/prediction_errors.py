@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 
+from rov_fmu.identify.adapter.smoothing import WINDOW, kernel, sensor_noise, velocity, without_spikes
 from rov_fmu.identify.simulation.prepared import PreparedRecording
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.smoothing import WINDOW, kernel, sensor_noise, velocity, without_spikes
 
 Span = Literal["10 s", "whole recording"]
 """How far ahead the motion is predicted."""

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import robust_deviation
 from rov_fmu.identify.effects.effect import Effect
 from rov_fmu.identify.least_squares import Solution, covariance
 from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
@@ -12,8 +14,6 @@ from rov_fmu.identify.points.step_responses import correlation_time
 from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.identify.simulation.solver import HUBER
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import robust_deviation
 
 _LEAST_FREEDOM = 8.0
 """The least number of degrees of freedom, unless the samples are fewer: the spectrum of slow noise has more."""
@@ -36,7 +36,7 @@ class Simulation:
     correlation_time: float
     """The correlation time of the noise in samples; 1 for white noise."""
     outliers: int
-    """The number of samples beyond 2.5 standard deviations, which count less than their square."""
+    """The number of samples beyond 2.5 of these standard deviations. They count less than their square."""
 
     @property
     def residuals(self) -> Array:
@@ -94,9 +94,11 @@ class ResidualAnalysis:
             self.meat += part.T @ (part * weights[:, None])
             cost.append(float(losses[rows].sum()))
             self.degrees_of_freedom += len(time) / correlation
-            outliers, noise = int((np.abs(r[rows]) > HUBER).sum()), sigma * robust_deviation(r[rows])
+            # `sigma` leaves out slow noise and uncertain switches, which the deviation of the residuals contains
+            deviation = robust_deviation(r[rows])
+            outliers = int((np.abs(r[rows]) > HUBER * max(deviation, 1.0)).sum())
             self.simulations.append(
-                Simulation(d.recording, time, measured, modelled, velocity, noise, correlation, outliers)
+                Simulation(d.recording, time, measured, modelled, velocity, sigma * deviation, correlation, outliers)
             )
         samples = len(r) - len(self.x)
         self.degrees_of_freedom = max(self.degrees_of_freedom, min(_LEAST_FREEDOM, samples))

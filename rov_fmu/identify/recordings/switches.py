@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rov_fmu.identify.adapter.smoothing import without_spikes
 from rov_fmu.identify.effects.effect import delay_of
 from rov_fmu.identify.least_squares import basis, scaled
 from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
@@ -17,7 +18,6 @@ from rov_fmu.identify.simulation.linear_response import LONGEST, LinearResponse
 from rov_fmu.identify.simulation.prepared import PreparedRecording, switched_rows
 from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.smoothing import without_spikes
 
 _TESTED = 60
 """The number of switches of a recording that the test uses, strongest first."""

@@ -5,6 +5,7 @@ from math import exp, log
 
 import numpy as np
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.dead_band import DeadBand
 from rov_fmu.identify.effects.effect import Effect, Setting
@@ -15,7 +16,6 @@ from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import REVERSE, Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
 
 _LEAST_BETA = 1e-3
 _DRAG = 20.0

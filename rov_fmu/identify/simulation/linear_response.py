@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_banded
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.simulation.prepared import switched_rows
 from rov_fmu.model.layout import REVERSE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
 
 _MOST = 300
 """At most this many switches of a recording count as uncertain: the strongest ones."""

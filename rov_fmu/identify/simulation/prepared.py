@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import velocity, without_spikes
 from rov_fmu.identify.effects.attitude import Attitude
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array, Flags
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import velocity, without_spikes
 
 _FEW = 500
 """The number of samples of a thinned recording."""

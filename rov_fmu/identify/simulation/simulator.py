@@ -16,6 +16,7 @@ from rov_fmu.identify.points.tables import Table
 from rov_fmu.identify.simulation.flight import Flight, unmixed
 from rov_fmu.identify.simulation.limits import MotionError
 from rov_fmu.identify.simulation.prepared import PreparedRecording
+from rov_fmu.model.layout import REVERSE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import is_factor
@@ -134,7 +135,7 @@ class Simulator:
         if n >= len(self.names):
             return self.extras[n - len(self.names)].of in {*curves, *(axis.name for axis in axes)}
         concerned = (*curves, *(axis.velocity for axis in axes))
-        return any(self.names[n].removesuffix("_reverse").endswith(f"_{of}") for of in concerned)
+        return self.names[n].endswith(tuple(f"_{of}{end}" for of in concerned for end in ("", REVERSE)))
 
     def rov(self, x: Array) -> Rov:
         """Return the vehicle with the coefficients and extras of x."""

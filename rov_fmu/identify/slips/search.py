@@ -11,13 +11,13 @@ from math import inf, isfinite, nan
 import numpy as np
 from scipy.optimize import nnls
 
+from rov_fmu.identify.adapter.recording import Recording, signal_name
 from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.identify.slips.explanation import CERTAIN, FASTEST, LIKELY, Evidence, Explanation, Files, contradict
 from rov_fmu.identify.slips.single_recording import Alone, alone
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording, signal_name
 
 Tables = Mapping[str, Sequence[tuple[float, float]]]
 """Rows of a command and a number, by file."""

@@ -12,6 +12,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 
+from rov_fmu.engine.compile import INTERFACES
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import REPORT
 from rov_fmu.fmu.reference_results import TOLERANCE
@@ -32,7 +33,7 @@ from rov_fmu.report.plots.steps import (
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.report.plots.svg import LIGHT, image, inline_svg
+from rov_fmu.report.plots.svg import LIGHT, image, inline_svg, with_formulas
 from rov_fmu.report.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -49,17 +50,22 @@ _PICTURES = {
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2, module: bytes | None = None) -> dict[str, bytes]:
+def documentation(
+    vehicle: Vehicle, *, native: bool, fmi: int = 2, interface: str = "both", module: bytes | None = None
+) -> dict[str, bytes]:
     """Return the page and the pictures by their path in the FMU. Raises FileError."""
-    text = documentation_page(vehicle, native=native, fmi=fmi, module=module)
+    text = documentation_page(vehicle, native=native, fmi=fmi, interface=interface, module=module)
     return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
 
 
-def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, module: bytes | None = None) -> str:
+def documentation_page(
+    vehicle: Vehicle, *, native: bool = True, fmi: int = 2, interface: str = "both", module: bytes | None = None
+) -> str:
     """Return the page as HTML, for the native FMU of a version of FMI or for the FMU in pure Python.
 
-    `module` is the model as WebAssembly; without it the page has no live section. The page of a vehicle without a data
-    folder has no tables and no measurements. Raises FileError.
+    `interface` is one of INTERFACES; the FMU in pure Python has only Co-Simulation, whatever it says. `module` is the
+    model as WebAssembly; without it the page has no live section. The page of a vehicle without a data folder has no
+    tables and no measurements. Raises FileError.
     """
     rov, layout = vehicle.rov, vehicle.layout
     tables = tables_by_axis(vehicle)
@@ -77,10 +83,12 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
         is_tuned=_is_tuned(rov),
         native=native,
         fmi=fmi,
+        kinds=INTERFACES[interface if native else "cs"],
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))],
         reversing=_reversing,
-        settable=[v.name for v in variables(rov) if v.name in layout.state and v.start is not None] + [*layout.initial],
+        settable=[v.name for v in variables(rov) if v.name in layout.state and v.initial == "exact"]
+        + [*layout.initial],
         other_axes=listed(name for name in _AXES if name not in layout.kinds).capitalize(),
         coupled=listed(equations.coupled(layout)),
         has_full_mass=any(line.coupled for line in shown.motion),
@@ -256,7 +264,7 @@ def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], tabl
     if differs_by_direction(rov, axis):
         steps += [Step(-step.command) for step in steps]
     draw_steps(ax, axis, steps, [(rov, "-")])
-    ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left")
+    with_formulas(ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left"))
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:

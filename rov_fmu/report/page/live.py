@@ -20,6 +20,8 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import number, page, pretty_unit
+from rov_fmu.tank.catalogue import as_json
+from rov_fmu.tank.readers.tables import rules_of_page
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
@@ -125,6 +127,7 @@ def _data(flown: Flown) -> dict[str, Any]:
         "states": len(layout.state),
         "commands": list(layout.commands),
         "mixed": bool(layout.mix),
+        "csv": rules_of_page(),
         "axes": [_axis(rov, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
         "thrusters": [
             _thruster(rov, thruster, label) for thruster, label in zip(layout.thrusters, _labels(rov), strict=True)
@@ -151,6 +154,7 @@ def _axis(rov: Rov, axis: Axis, keys: str) -> dict[str, Any]:
         "external": axis.external,
         "position": position,
         "positionUnit": axis.position_unit,
+        "quantities": as_json(axis),
         "signs": rov.layout.signs(axis),
         "shares": _shares(rov, axis),
         "keys": keys,

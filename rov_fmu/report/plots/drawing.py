@@ -12,7 +12,7 @@ from matplotlib.path import Path
 from rov_fmu.model.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.labels import AROUND, Place, Space
-from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.plots.svg import LIGHT, with_formulas
 
 Point = tuple[float, float, float]
 
@@ -194,7 +194,7 @@ def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
     if down is SWAY and rov.layout.has_arm:
         _draw_arm(ax, _armed(rov), size)
     for text, at, color in scene.labels:
-        ax.text(*at, text, color=LIGHT[color], zorder=8, ha="center", va="center")
+        with_formulas(ax.text(*at, text, color=LIGHT[color], zorder=8, ha="center", va="center"))
     ax.set(aspect="equal", xlim=scene.limits[0], ylim=scene.limits[1])
     ax.grid(visible=False)
     ax.spines[:].set_visible(False)

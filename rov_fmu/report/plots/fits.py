@@ -14,7 +14,7 @@ from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
 from rov_fmu.report.findings import Known
 from rov_fmu.report.plots.residuals import finish_residuals, with_residuals
 from rov_fmu.report.plots.steps import Step, draw_steps, evenly
-from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.report.templates import pretty_unit, text
 from rov_fmu.tank.arrays import Array, Flags
 
@@ -110,7 +110,7 @@ def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> N
         steps.append(Step(command, V_ss, Tau))
     ax: Axes = figure.subplots()
     draw_steps(ax, result.axis, steps, [(results.vehicle.rov, "-")])
-    ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left")
+    with_formulas(ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left"))
 
 
 def plot_known(figure: Figure, found: Sequence[Known]) -> None:
@@ -159,7 +159,7 @@ def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:
 
 def _finish(above: Axes, below: Axes | None, title: str, x: str, y: str) -> None:
     """Add title, labels and legend."""
-    above.set_title(title, loc="left")
+    with_formulas(above.set_title(title, loc="left"))
     (below or above).set_xlabel(x)
     above.locator_params(nbins=6)
     if below:

@@ -22,7 +22,7 @@ from rov_fmu.io.output import Output, check_targets, folder_made, write_whole
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
-from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text
+from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -200,7 +200,8 @@ def _steps(ax: Axes, k: Rov, table: ResponseTable) -> None:
         ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
     finish(ax, "", "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
     if axis is SURGE:  # inside the plot the legend would hide the curves
-        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(looks), columnspacing=1.0)
+        legend = ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(looks), columnspacing=1.0)
+        with_formulas(*legend.get_texts())
 
 
 def _curve(ax: Axes, scale: float, end: float, curve: tuple[float, float], dashes: str, color: str, label: str) -> None:

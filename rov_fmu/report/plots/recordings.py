@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.identify.adapter.smoothing import velocity, without_spikes
 from rov_fmu.identify.driving import thrust_along
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
@@ -15,10 +16,9 @@ from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.residuals import finish_residuals, with_residuals
-from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.report.templates import text
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.smoothing import velocity, without_spikes
 
 _BINS = 300
 """The parts of a recording in which residuals are summarised; more of them cannot be seen in the plot."""
@@ -52,7 +52,7 @@ def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -
     parts = np.array_split(np.arange(len(simulation.time)), min(_BINS, len(simulation.time)))
     low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
     below.fill_between([simulation.time[part[0]] for part in parts], low, high, color=LIGHT["orange"], linewidth=0.6)
-    above.set_ylabel(f"${axis.velocity}$ ({axis.unit})")
+    with_formulas(above.set_ylabel(f"${axis.velocity}$ ({axis.unit})"))
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
     above.locator_params(nbins=6)
     below.set_xlabel("time (s)")
@@ -167,7 +167,7 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
         ax.plot(*_thin(time[near] - step.at, v[near]), color=LIGHT[color], linewidth=width, alpha=alpha, label=label)
     ax.margins(y=0.14)
     ax.set(xlim=(low, high), xlabel="time after the change of the command (s)")
-    ax.set_ylabel(f"${axis.velocity}$ ({axis.unit})")
+    with_formulas(ax.set_ylabel(f"${axis.velocity}$ ({axis.unit})"))
     ax.locator_params(nbins=6)
     _legend(ax)
 

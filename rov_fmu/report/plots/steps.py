@@ -13,7 +13,7 @@ from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.riccati import RISE
 from rov_fmu.model.rov import Rov
-from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -68,14 +68,13 @@ def finish(
     ax: Axes, title: str, x: str, y: str = "", where: Literal["upper left", "lower right"] = "upper left"
 ) -> None:
     """Add labels, title and legend. The axes begin at 0, unless a value is negative."""
-    ax.set(xlabel=x, ylabel=y)
+    with_formulas(ax.set_xlabel(x), ax.set_ylabel(y), ax.set_title(title, loc="left"))
     ax.set_xlim(left=0.0)
     if ax.dataLim.y0 >= 0.0:
         ax.set_ylim(bottom=0.0)
     ax.locator_params(nbins=6)
-    ax.set_title(title, loc="left")
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc=where)
+        with_formulas(*ax.legend(loc=where).get_texts())
 
 
 def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:

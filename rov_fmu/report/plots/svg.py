@@ -2,7 +2,9 @@
 
 import base64
 import re
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -16,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.style import context
 from matplotlib.text import Text
 
+from rov_fmu.io.messages import brief
 from rov_fmu.io.picture import read_svg
 
 PALETTE = {
@@ -40,6 +43,7 @@ _STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "mathtext.fontset": "dejavusans",
+    "text.parse_math": False,  # names and units may come from anyone; `with_formulas` marks our own formulas
     "font.size": 9.5,
     "axes.facecolor": "none",
     "axes.titlesize": 10.5,
@@ -63,6 +67,8 @@ _STYLE: Any = {
     "legend.fontsize": 8.5,
     "legend.handlelength": 1.8,
 }
+_NO_XML = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]|\xef\xbf[\xbe\xbf]")
+"""The characters of a text that XML does not allow."""
 _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
 
 Draw = Callable[[Figure], None]
@@ -71,9 +77,14 @@ Draw = Callable[[Figure], None]
 def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str = "") -> Markup:
     """Return a plot as part of a page, with a label for screen readers. The colours of the palette become the page's.
 
-    Two plots of a page must differ in their label or in their salt, because their ids follow from these.
+    Two plots of a page must differ in their label or in their salt, because their ids follow from these. A plot that
+    cannot be drawn becomes a line with the reason, because the rest of the page does not depend on it.
     """
-    svg = svg_file(draw, size, salt=label + salt, background="none", margin=0.02)
+    try:
+        svg = svg_file(draw, size, salt=label + salt, background="none", margin=0.02)
+    except Exception as error:  # Matplotlib raises any kind
+        reason = brief(str(error) or type(error).__name__)
+        return Markup("<p>{}: this plot cannot be drawn: {}</p>").format(label, reason)
     head = f'role="img" aria-label="{escape(label)}">'
     svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)
     svg = svg.replace(f"font-family:{_FONTS};", "")
@@ -93,6 +104,12 @@ def with_even_text(draw: Draw, size: float = _STYLE["font.size"]) -> Draw:
     return drawn
 
 
+def with_formulas(*texts: Text) -> None:
+    """Let Matplotlib set what stands between dollar signs as a formula. All other text is drawn as it is."""
+    for text in texts:
+        text.set_parse_math(True)
+
+
 def image(label: str, path: Path) -> Markup:
     """Return a foreign SVG file as an image, in which no script runs and no link works. Raises FileError.
 
@@ -107,7 +124,7 @@ def svg_file(
 ) -> str:
     """Return a figure (size in inches) as SVG, independent of the user's settings of Matplotlib."""
     svg = saved(draw, size, background=background, margin=margin, salt=salt, format="svg", metadata={"Date": None})
-    return _without_ballast(svg).replace("'DejaVu Sans'", _FONTS)
+    return _without_ballast(_NO_XML.sub("\N{REPLACEMENT CHARACTER}".encode(), svg)).replace("'DejaVu Sans'", _FONTS)
 
 
 def saved(
@@ -127,12 +144,20 @@ def saved(
     """
     file = BytesIO()
     margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
-    with context(["default", _STYLE, {"svg.hashsalt": salt, **margins, **style}]):
+    with context(["default", _STYLE, {"svg.hashsalt": salt, **margins, **style}]), without_font_warnings():
         figure = Figure(figsize=size, layout="constrained", facecolor=background)
         draw(figure)
         _arrange(figure, how["format"])
         figure.savefig(file, **how)
     return file.getvalue()
+
+
+@contextmanager
+def without_font_warnings() -> Iterator[None]:
+    """Print no warning about characters in foreign text that the font of a plot does not have."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
+        yield
 
 
 def _arrange(figure: Figure, form: str) -> None:

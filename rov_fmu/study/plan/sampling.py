@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import log
+from math import isinf, log
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from rov_fmu.study.plan.plan import Plan, Varied
 from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
 
 Array = npt.NDArray[np.float64]
+_LARGEST = float(np.finfo(float).max)
 _Draw = Callable[[int, int], Array]
 """A function of the first run and the one after the last; it returns a row of numbers in 0 ... 1 for each run."""
 
@@ -53,8 +54,9 @@ class Design:
         found = np.empty_like(drawn)
         found[:, :together] = self._known.drawn(drawn[:, :together])
         for n, (name, varied) in enumerate(self._varied.items(), together):
-            found[:, n] = _values(varied, self._variables[name], drawn[:, n])
-        return found
+            with np.errstate(over="ignore"):
+                found[:, n] = _values(varied, self._variables[name], drawn[:, n])
+        return np.clip(found, -_LARGEST, _LARGEST)
 
 
 def _runs(plan: Plan, groups: int) -> int:
@@ -76,6 +78,8 @@ def _values(varied: Varied, variable: Variable, drawn: Array) -> Array:
         low, high = varied.uniform
         if variable.is_whole:  # every whole number is equally likely
             return np.minimum(np.floor(low + drawn * (high - low + 1.0)), high)
+        if isinf(high - low):
+            return low + drawn * high - drawn * low
         return low + drawn * (high - low)
     if varied.normal:
         middle, sd = varied.normal.mean, varied.normal.sd

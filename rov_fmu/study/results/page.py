@@ -13,7 +13,6 @@ from rov_fmu.io.output import Output
 from rov_fmu.report.templates import number, page
 from rov_fmu.study.results.plots import (
     Plot,
-    axis_label,
     draw_band,
     draw_distribution,
     draw_indices,
@@ -21,7 +20,7 @@ from rov_fmu.study.results.plots import (
     in_rows,
     indices_height,
 )
-from rov_fmu.study.results.results import QUANTILES, Results
+from rov_fmu.study.results.results import QUANTILES, Results, scale_of, statistics
 from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
@@ -120,23 +119,23 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
             "plot": None,
             "is_still": False,
         }
-    quantiles = np.quantile(there, QUANTILES).tolist()
-    sd = float(there.std(ddof=1)) if there.size > 1 else None
-    found |= {"quantiles": quantiles, "mean": float(there.mean()), "sd": sd}
+    quantiles, mean, sd = statistics(there, QUANTILES)
+    found |= {"quantiles": quantiles, "mean": mean, "sd": sd}
     if _is_constant(there):
         return {**found, "plot": None, "is_still": True}
     if grid:
         draw = partial(draw_lines, name=name, results=results, grid=grid)
         label = f"{name} over {' and '.join(grid)}"
     else:
-        draw = partial(draw_distribution, values=there, quantiles=quantiles, label=axis_label("", unit))
+        draw = partial(draw_distribution, values=there, quantiles=quantiles, unit=unit)
         label = f"Distribution of {name}"
     return {**found, "plot": Plot(label, draw, name, found["expression"]), "is_still": False}
 
 
 def _is_constant(values: Any) -> bool:
     """True when values are practically constant."""
-    return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
+    scaled = values / scale_of(values)
+    return bool(np.ptp(scaled) <= _CONSTANT * np.abs(scaled).max())
 
 
 def _band(results: Results, output: str) -> Plot:
@@ -191,7 +190,7 @@ def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], resu
         "planned": f"{kind}: {', '.join(some)}",
         "others": others,
         "least": float(values.min()),
-        "median": float(np.median(values)),
+        "median": statistics(values, [0.5])[0][0],
         "greatest": float(values.max()),
         "unit": results.units[name],
         "description": results.descriptions[name],

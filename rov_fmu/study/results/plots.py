@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from rov_fmu.report.plots.steps import LINES, evenly
-from rov_fmu.report.plots.svg import LIGHT, Draw, inline_svg, with_even_text
+from rov_fmu.report.plots.svg import LIGHT, Draw, inline_svg, with_even_text, with_formulas
 from rov_fmu.report.templates import number, pretty_unit
-from rov_fmu.study.results.results import QUANTILES, Results
+from rov_fmu.study.results.results import Results, scale_of
 
 _WIDTHS = {3: 3.7, 2: 5.68, 1: 11.6}
 """The width of a plot in inches by the number of plots in its row. The widths make the text equally large in all plots
@@ -72,22 +72,24 @@ def _counts(plots: int) -> list[int]:
     return [3] * (plots - 2 * pairs) + [2] * (2 * pairs)
 
 
-def axis_label(name: str, unit: str) -> str:
-    """Return a name with its unit; either of them may be missing."""
-    if unit in ("", "1"):
-        return name
-    return f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
+def axis_label(name: str, unit: str, scale: float = 1.0) -> str:
+    """Return a name with its unit, in which values are a power of ten smaller; either of them may be missing."""
+    parts = [number(scale) if scale != 1.0 else "", "" if unit == "1" else pretty_unit(unit)]
+    words = " ".join(filter(None, parts))
+    return f"{name} ({words})" if name and words else name or words
 
 
-def draw_distribution(figure: Figure, values: Any, quantiles: list[float], label: str) -> None:
+def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit: str) -> None:
     """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
     ax = figure.subplots()
-    low, median, high = quantiles[0], quantiles[len(quantiles) // 2], quantiles[-1]
+    scale = scale_of(values)
+    values = values / scale
+    low, median, high = (quantiles[n] / scale for n in (0, len(quantiles) // 2, -1))
     ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     shares = np.full(len(values), 100.0 / len(values))
     ax.hist(values, bins=min(_BINS, max(5, round(len(values) ** 0.5))), weights=shares, color=LIGHT["blue"], alpha=0.75)
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(xlabel=label, ylabel="runs (%)")
+    ax.set(xlabel=axis_label("", unit, scale), ylabel="runs (%)")
     _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 
 
@@ -96,17 +98,20 @@ def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str])
     ax = figure.subplots()
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
+    scale, across = scale_of(runs[name]), scale_of(runs[along])
     lines = [("", runs)]
     for other in others:
         some = evenly(np.unique(runs[other]).tolist())
         lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
     for (label, line), color in zip(lines, LINES, strict=False):
         marker = "o" if len(line) <= _MARKED else ""
-        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
+        x, y = line[along] / across, line[name] / scale
+        ax.plot(x, y, color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
     for other in others:
         title = axis_label(other, results.units[other])
         figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    ax.set(xlabel=axis_label(along, results.units[along]), ylabel=axis_label("", results.figure_units[name]))
+    label = axis_label("", results.figure_units[name], scale)
+    ax.set(xlabel=axis_label(along, results.units[along], across), ylabel=label)
     _set_ticks(ax)
 
 
@@ -114,11 +119,13 @@ def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     """Draw the median of an output over time, and the bands between its quantiles."""
     ax = figure.subplots()
     t = bands.index.to_numpy()
-    low, below, median, above, high = (bands[q].to_numpy(float) for q in QUANTILES)
+    values = bands.to_numpy(float)
+    scale = scale_of(values)
+    low, below, median, above, high = np.where(np.isfinite(values), values / scale, np.nan).T
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
-    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
+    ax.set(xlabel="time (s)", ylabel=axis_label("", unit, scale))
     _set_ticks(ax)
 
 
@@ -149,7 +156,8 @@ def draw_indices(figure: Figure, rows: Sequence[dict[str, Any]]) -> None:
     ax.axvline(0.0, color=LIGHT["muted"], linewidth=0.8)
     ax.set_xlabel("share of the variance")
     looks = [Patch(color=LIGHT[color], alpha=0.75, label=label) for color, label in _KINDS.items()]
-    figure.legend(handles=looks, loc="outside upper right", ncols=2, handlelength=1.0, columnspacing=1.2)
+    legend = figure.legend(handles=looks, loc="outside upper right", ncols=2, handlelength=1.0, columnspacing=1.2)
+    with_formulas(*legend.get_texts())
 
 
 def _name_lines(name: str) -> list[str]:

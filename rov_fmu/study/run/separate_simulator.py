@@ -6,7 +6,8 @@ from typing import Any
 import fmpy
 import numpy.typing as npt
 
-from rov_fmu.engine.child_process import ChildError, ChildProcess
+from rov_fmu.fmu.proof import DISK, MEMORY
+from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
 from rov_fmu.study.plan.model import Model
 from rov_fmu.study.run.simulator import LoadError, Manoeuvre, RunError, Simulator
 
@@ -25,7 +26,7 @@ class SeparateSimulator:
             found: dict[str, npt.NDArray[Any]] = self._child.call("run", list(values))
         except ChildError as error:
             self._child = self._start()
-            raise RunError(str(error)) from error
+            raise RunError(self._reason(error)) from error
         return found
 
     def reset(self) -> None:
@@ -48,9 +49,15 @@ class SeparateSimulator:
 
     def _start(self) -> ChildProcess:
         try:
-            return ChildProcess(_simulator, *self._arguments, time_limit=self._time_limit)
+            return ChildProcess(
+                _simulator, *self._arguments, limits=Limits(time=self._time_limit, memory=MEMORY, disk=DISK)
+            )
         except ChildError as error:
-            raise LoadError(str(error)) from error
+            raise LoadError(self._reason(error)) from error
+
+    def _reason(self, error: ChildError) -> str:
+        exceeds_time = isinstance(error, LimitError) and error.limit == "time"
+        return f"the FMU {f'did not return within time_limit = {self._time_limit:g} s' if exceeds_time else error}"
 
 
 def _simulator(folder: str, model: Model, manoeuvre: Manoeuvre) -> Simulator:

@@ -7,7 +7,7 @@ import signal
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Lock, Thread, current_thread, get_ident, main_thread
@@ -21,6 +21,8 @@ import pyarrow.parquet as pq
 from distributed import Worker
 from distributed.diagnostics.plugin import WorkerPlugin
 
+from rov_fmu.fmu.proof import DISK
+from rov_fmu.io.child_process import Limits
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.plan.model import Model
 from rov_fmu.study.run.separate_simulator import SeparateSimulator
@@ -146,15 +148,18 @@ class Delivery(WorkerPlugin):
 
     def setup(self, worker: Worker) -> None:
         """Prepare a worker; Dask calls this when the worker starts."""
+        self._limited = ExitStack()
         if self._own and current_thread() is main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the process that started the workers handles Ctrl-C
             warnings.simplefilter("ignore", RuntimeWarning)  # from NumPy: a NaN becomes the reason of its run
+            self._limited.enter_context(Limits(disk=DISK).applied())  # Dask itself limits the memory
         _POOLS[self.name] = InstancePool(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
 
     def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (Dask passes it)
         """Clean up; Dask calls this when the study ends."""
         if pool := _POOLS.pop(self.name, None):
             pool.close()
+        self._limited.close()
 
 
 def try_out(key: str, rows: Array, separate: bool) -> Trial:

@@ -1,10 +1,13 @@
 """The attitude of a vehicle with six axes in the FMU: its parameters, the quaternion, and the count of turns."""
 
 import random
+import shutil
 from collections.abc import Sequence
 from ctypes import c_bool, c_int, pointer
 from math import cos, pi, sin
+from pathlib import Path
 
+import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_model_description
@@ -19,6 +22,7 @@ from tests.fmi import (
     MODEL_EXCHANGE,
     OK,
     STEP,
+    WARNING,
     AnyInstance,
     Fmu,
     reals,
@@ -74,6 +78,43 @@ def test_the_attitude_begins_at_its_parameters(fmu: Fmu) -> None:
         assert rov.get(ANGLES) == pytest.approx([0.3, -0.8, -9.0], abs=1e-15)
         rov.expect("Reset")
         assert rov.get(ANGLES) == [0.0, 0.0, 0.0]
+
+
+def test_a_quaternion_before_the_start_is_a_guess_that_the_angles_replace(fmu: Fmu) -> None:
+    variables = [fmu.variables[name] for name in QUATERNION]
+    assert [(v.causality, v.initial, float(v.start)) for v in variables] == [
+        ("output", "approx", start) for start in (1.0, 0.0, 0.0, 0.0)
+    ]
+    assert {*QUATERNION} <= {unknown.variable.name for unknown in fmu.description.initialUnknowns}
+    with fmu.instance() as rov, fmu.instance() as usual:
+        for _ in range(2):  # again after a reset
+            assert rov.set(dict.fromkeys(QUATERNION, 0.0)) == OK  # by CasADi
+            assert rov.set({**START, "eta": 0.5}) == OK
+            assert rov.set({"epsilon_2": 2.0}) == OK
+            (warning,) = [m.text for m in rov.log if m.status == WARNING]
+            assert "eta = 0 is replaced by 1, because phi_0, theta_0 and psi_0 determine" in warning
+            assert rov.set({"eta": float("nan")}) == DISCARD
+            assert usual.set(START) == OK
+            assert rov.save() == usual.save()
+            for instance in (rov, usual):
+                instance.reach(STEP)
+            assert rov.save() == usual.save()
+            assert rov.get(ANGLES) == pytest.approx([*START.values()], abs=1e-15)
+            for instance in (rov, usual):
+                instance.expect("Reset")
+                instance.log.clear()
+
+
+def test_casadi_starts_at_the_attitude(fmu: Fmu, tmp_path: Path) -> None:
+    casadi = pytest.importorskip("casadi")
+    shutil.copytree(fmu.folder, tmp_path / "rov")  # CasADi unpacks nothing from a folder
+    rov = casadi.DaeBuilder("rov", str(tmp_path / "rov"), {})
+    start = dict(zip(rov.x(), rov.start(rov.x()), strict=True))
+    assert [start[name] for name in QUATERNION] == [1.0, 0.0, 0.0, 0.0]
+    model = rov.create("model", ["x", "u"], ["ode", "y"])
+    rates, outputs = model(casadi.DM(list(start.values())), casadi.DM(rov.start(rov.u())))
+    assert np.isfinite(rates.full()).all()
+    assert np.isfinite(outputs.full()).all()
 
 
 @pytest.mark.parametrize("mode", [INITIALIZATION, STEP])

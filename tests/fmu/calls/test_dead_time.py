@@ -2,7 +2,8 @@
 
 import ctypes
 import random
-from ctypes import c_bool, c_double, pointer
+from ctypes import c_bool, c_double, c_int, pointer
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 from fmpy import read_model_description
 from fmpy.fmi2 import fmi2EventInfo
 from fmpy.validation import validate_model_description
+from lxml import etree
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.fmu.model_description import DEAD_TIME_NOTE
 from rov_fmu.model.delay import MOST_WAITING
 from tests.fmi import CONTINUOUS, ERROR, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, reals
 from tests.fmu.calls.conftest import WRAPPERS
@@ -57,6 +60,16 @@ def test_the_description_is_valid_and_no_rate_depends_on_a_command(fmu: Fmu) -> 
     assert known.isdisjoint(ROV.layout.commands)
     assert "X_ext" in known
     assert "voltage" in known
+
+
+def test_a_tool_is_told_that_commands_change_only_in_events(fmu: Fmu) -> None:
+    assert fmu.description.description.endswith(DEAD_TIME_NOTE)
+    root = etree.parse(fmu.folder / "modelDescription.xml").getroot()
+    updated_inside = {v.get("name") for v in root.iter("Float64") if v.get("intermediateUpdate") == "true"}
+    if fmu.VERSION == 3:  # FMI 3.0.1, section 2.4.7: only continuous-time variables
+        assert root.find("ModelExchange").get("needsCompletedIntegratorStep") == "true"
+        assert updated_inside == {*fmu.inputs, *fmu.outputs} - {*ROV.layout.commands}
+        assert updated_inside
 
 
 def test_steps_of_any_length_are_those_of_the_engine(fmu: Fmu) -> None:
@@ -147,9 +160,7 @@ def test_changes_arrive_as_time_events_in_model_exchange(fmu: Fmu) -> None:
         rov.expect("ExitInitializationMode")
         assert updated(rov) == 2.0 + T_d
         rov.expect("EnterContinuousTimeMode")
-        assert rov.set({"u_l": 0.2}) == ERROR
-        assert "u_l must not be set in Continuous-Time Mode" in rov.log[-1].text
-        assert rov.set({"X_ext": 1.0}) == OK
+        assert rov.set({"u_l": 0.2, "X_ext": 1.0}) == OK
         rov.expect("SetTime", 2.0 + 0.5 * T_d)
         rov.expect("EnterEventMode")
         assert rov.set({"u_l": -0.5}) == OK
@@ -161,6 +172,104 @@ def test_changes_arrive_as_time_events_in_model_exchange(fmu: Fmu) -> None:
         rov.expect("SetTime", 2.0 + 1.5 * T_d)
         assert updated(rov) is None
         assert delayed(rov) == DELAYED | {"delayed_u_l": -0.5}
+
+
+def completed(rov: AnyInstance) -> bool:
+    """Complete a step of an integrator, and return True when Event Mode has to follow."""
+    kind = c_int if rov.fmu.VERSION == 2 else c_bool
+    event, end = kind(-1), kind(-1)
+    rov.expect("CompletedIntegratorStep", 1, pointer(event), pointer(end))
+    assert not end.value
+    return bool(event.value)
+
+
+@dataclass
+class Commands:
+    """What a vehicle with a dead time does with commands in Model Exchange, written out separately."""
+
+    set_now: dict[str, float]
+    acting: dict[str, float]
+    sent: list[tuple[float, dict[str, float]]] = field(default_factory=list)
+    """The commands that have not arrived, with the time at which each arrives."""
+
+    def send(self, t: float) -> bool:
+        """Send the commands that stand at a time, if they differ from those sent before."""
+        if self.set_now == self.last:
+            return False
+        self.sent = [*(at for at in self.sent if at[0] < t + T_d), (t + T_d, dict(self.set_now))]
+        return True
+
+    @property
+    def last(self) -> dict[str, float]:
+        return self.sent[-1][1] if self.sent else self.acting
+
+    def update(self, t: float) -> None:
+        """An event: commands are sent, and others arrive."""
+        self.send(t)
+        for arrival, commands in list(self.sent):
+            if arrival <= t:
+                self.acting, self.sent = commands, self.sent[1:]
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 10))])
+def test_only_commands_that_stand_when_a_step_is_complete_are_sent(fmu: Fmu, seed: int) -> None:
+    """A solver tries steps, rejects some, completes others, and goes back to events inside them."""
+    rng = random.Random(seed)
+    rest = dict.fromkeys(ROV.layout.commands, 0.0)
+    expected = Commands(dict(rest), dict(rest))
+
+    def put() -> None:
+        chosen = {name: rng.choice((0.0, 0.5, rng.uniform(-1.0, 1.0))) for name in rng.sample(list(rest), 2)}
+        assert rov.set(chosen) == OK
+        expected.set_now |= chosen
+
+    def check() -> None:
+        assert list(delayed(rov).values()) == list(expected.acting.values())
+        assert rov.get(list(rest)) == list(expected.set_now.values())
+
+    def event(t: float) -> None:
+        rov.expect("EnterEventMode")
+        expected.set_now = dict(expected.last)
+        check()
+        for _ in range(rng.choice((1, 1, 2))):
+            if rng.random() < 0.3:
+                put()
+            following = updated(rov)
+            expected.update(t)
+            assert following == (pytest.approx(expected.sent[0][0], rel=1e-12) if expected.sent else None)
+            check()
+        rov.expect("EnterContinuousTimeMode")
+
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        assert rov.initialize() == OK
+        rov.expect("ExitInitializationMode")
+        assert updated(rov) is None
+        rov.expect("EnterContinuousTimeMode")
+        begin = 0.0
+        for n in range(150):
+            for tried in range(rng.choice((1, 1, 2, 4))):  # only the last step is not rejected
+                t = begin + (0.5**tried) * rng.uniform(1e-3, 0.06)
+                rov.expect("SetTime", t)
+                while rng.random() < 0.6:
+                    put()
+                check()
+            if rng.random() < 0.1:  # an event before the step is complete
+                t = begin
+                rov.expect("SetTime", t)
+                event(t)
+                continue
+            due = bool(expected.sent) and expected.sent[0][0] <= t
+            assert completed(rov) == (expected.send(t) or due), n
+            check()
+            if rng.random() < 0.1:
+                assert rov.load(rov.save()) == OK
+            if rng.random() < 0.3:
+                t = rng.choice((t, rng.uniform(begin, t)))
+                rov.expect("SetTime", t)
+                event(t)
+            begin = t
+        warnings = [m for m in rov.log if m.status == WARNING]
+        assert sum("is sent when the integrator completes its step" in m.text for m in warnings) == 1
 
 
 @pytest.mark.parametrize("mode", [INITIALIZATION, EVENT, CONTINUOUS])

@@ -375,13 +375,87 @@ def test_an_instance_can_be_reset_and_freed_in_every_mode(fmu: Fmu, kind: int, m
 
 
 @pytest.mark.parametrize("kind", MODES)
-def test_initialization_is_refused_without_an_experiment(fmu2: fmi2.Fmu, kind: int) -> None:
-    with fmu2.instance(kind) as rov:
-        rov.setup()
+def test_initialization_without_an_experiment_begins_at_0_with_one_warning(fmu2: fmi2.Fmu, kind: int) -> None:
+    with fmu2.instance(kind) as rov, fmu2.instance(kind) as usual:
+        assert rov.setup(3.0, 5.0) == OK
         rov.expect("Reset")  # the experiment is forgotten, too
-        assert rov.call("fmi2EnterInitializationMode") == ERROR
-        assert "fmi2SetupExperiment" in rov.log[-1].text
-        assert rov.mode() == INSTANTIATED
+        rov.expect("fmi2EnterInitializationMode")
+        (warning,) = _warnings(rov)
+        assert warning.startswith("fmi2EnterInitializationMode: done without fmi2SetupExperiment")
+        assert usual.initialize() == OK
+        assert _warnings(usual) == []
+        assert rov.save() == usual.save()
+        for instance in (rov, usual):
+            instance.expect("ExitInitializationMode")
+        if kind == CO_SIMULATION:
+            assert rov.step(0.0, 100.0) == OK
+            assert rov.time() == 100.0
+        assert _warnings(rov) == []
+
+
+def test_every_function_in_a_mode_that_only_importers_use_warns_once(fmus: dict[int, Fmu]) -> None:
+    def check(case: tuple[int, int, str, str]) -> None:
+        version, kind, function, column = case
+        mode = MODE_OF_COLUMN[column]
+        with fmus[version].instance(kind) as rov:
+            rov.reach(mode)
+            arguments = good_arguments(rov)[function]
+            _warnings(rov)
+            for _ in range(1 if function.endswith("Terminate") else 3):
+                rov.expect(function, *arguments)
+            (warning,) = _warnings(rov)
+            assert warning.startswith(f"{function}: done, although the standard does not allow this call in {mode}")
+
+    cases = [
+        (version, kind, function, column)
+        for version, kinds in ((2, (MODEL_EXCHANGE, CO_SIMULATION)), (3, (MODEL_EXCHANGE, CO_SIMULATION, WITH_EVENTS)))
+        for kind in kinds
+        for function, columns in legal.tolerated_modes(kind, version).items()
+        for column in columns
+    ]
+    assert len({function for _, _, function, _ in cases}) == 9
+    assert failures(cases, check) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode"),
+    [(CO_SIMULATION, STEP), (WITH_EVENTS, STEP), (MODEL_EXCHANGE, EVENT), (MODEL_EXCHANGE, CONTINUOUS)],
+)
+def test_a_value_that_a_variable_has_already_is_set_with_one_warning(
+    fmus: dict[int, Fmu], kind: int, mode: str
+) -> None:
+    for fmu in fmus.values():
+        if kind == WITH_EVENTS and fmu.VERSION == 2:
+            continue
+        with fmu.instance(kind) as rov:
+            assert rov.set({"m_rov": 7.0, "u": 0.5}) == OK
+            rov.reach(mode)
+            fixed = [name for name in fmu.parameters if fmu.variables[name].variability == "fixed"]
+            fixed += [name for name in fmu.states if name not in fmu.settable(mode)]
+            before = rov.save()
+            for _ in range(2):
+                assert rov.set({"u_l": 0.0, **dict(zip(fixed, rov.get(fixed), strict=True))}) == OK
+            (warning,) = _warnings(rov)
+            assert warning.startswith(
+                f"{fmu.name('SetFloat64')}: m_rov must not be set in {mode}, but it has this value"
+            )
+            assert rov.save() == before
+            assert rov.set({"u_l": 0.5, "I_r": 0.5}) == ERROR
+            assert rov.set({"der(u)": rov.get(["der(u)"])[0]}) == ERROR
+            assert rov.save() == before
+
+
+def test_an_input_of_an_intermediate_update_may_come_with_fixed_parameters(fmu3: fmi3.Fmu) -> None:
+    with new(fmu3, CO_SIMULATION, INTERMEDIATE) as rov:
+        reach(rov, INTERMEDIATE)
+        mass = rov.get(["m_rov"])[0]
+
+        def act() -> None:
+            assert rov.set({"m_rov": mass, "u_l": 0.25}) == OK
+            assert rov.set({"m_rov": mass + 1.0}) == ERROR
+
+        inside(rov, INTERMEDIATE, act)
+        assert rov.get(["u_l"]) == [0.25]
 
 
 def test_a_step_that_overflows_leads_to_error_mode_with_the_state_from_before(fmu: Fmu) -> None:

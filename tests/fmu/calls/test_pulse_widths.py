@@ -4,12 +4,15 @@ import random
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy import read_model_description
+from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_model_description
 
 from rov_fmu.cli import main
@@ -19,10 +22,12 @@ from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmu.terminals import terminals
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi2
 from tests.conftest import Made, unzipped
-from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, Fmu
+from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, Message
+from tests.fmi2 import recording_callbacks
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.model.test_thrust_effects import immediate
 from tests.vehicles import THRUST_EFFECTS, pulsed
@@ -32,6 +37,20 @@ PULSE = (1100.0, 1480.0, 1900.0)
 DELAYED = load_vehicle(THRUST_EFFECTS)
 FRACTIONS = replace(DELAYED, identifier="fractions", rov=immediate(DELAYED.rov))
 PULSES = replace(FRACTIONS, identifier="pulses", rov=pulsed(FRACTIONS.rov, PULSE))
+
+
+def _with_another_range(rov: Rov) -> Rov:
+    """Return a vehicle whose curve bow has tables at 14 and 20 V; those of main are at 12 and 16 V."""
+    main = rov.layout.curves_by_name["main"]
+    tables = tuple(
+        replace(table, name=f"thrust_bow_{n}", voltage=voltage)
+        for n, (table, voltage) in enumerate(zip(main.tables, (14.0, 20.0), strict=True))
+    )
+    curves = (replace(curve, tables=tables) if curve.name == "bow" else curve for curve in rov.layout.curves)
+    return Rov(replace(rov.layout, curves=tuple(curves)), rov.coefficients)
+
+
+RANGES = replace(PULSES, identifier="ranges", rov=_with_another_range(PULSES.rov))
 COMMANDS = [*FRACTIONS.layout.commands]
 STATES = [*FRACTIONS.layout.state]
 
@@ -51,8 +70,9 @@ def fmus(request: pytest.FixtureRequest, made_once: Made) -> Pair:
 
 
 def fractions_of(pulses: dict[str, float]) -> dict[str, float]:
-    """Return the commands that stand for pulse widths."""
+    """Return the commands that stand for pulse widths. A pulse of 0 is no signal."""
     low, neutral, high = PULSE
+    pulses = {name: x or neutral for name, x in pulses.items()}
     return {name: (x - neutral) / (high - neutral if x > neutral else neutral - low) for name, x in pulses.items()}
 
 
@@ -124,14 +144,46 @@ def test_derivatives_in_model_exchange_are_those_of_the_fractions(fmus: Pair) ->
         assert rov.derivatives(["der(w)"], "u_top") == [0.0]
 
 
-def test_a_warning_names_the_end_of_the_range_that_a_command_is_beyond(fmus: Pair) -> None:
-    with fmus[0].instance() as rov:
-        rov.start({"u_l": 0.0, "u_r": 2500.0, "voltage": 8.0})
-        texts = [message.text for message in rov.log if message.status == WARNING]
-    for text, expected in zip(
-        texts, ("u_l = 0 saturates at 1100", "u_r = 2500 saturates at 1900", "voltage = 8 saturates at 12"), strict=True
+def warnings_of(log: list[Message]) -> list[str]:
+    """Return the warnings without the function that each begins with."""
+    return [message.text.rpartition(": ")[2] for message in log if message.status == WARNING]
+
+
+BEYOND = [
+    "it acts as neutral; logged once.",
+    "u_r = 2500 saturates at 1900; logged once.",
+    "u_l = 500 saturates at 1100; logged once.",
+    "voltage = 13 saturates at 14 for the thrust curve bow; logged once.",
+    "voltage = 8 saturates at 12 for the thrust curve main; logged once.",
+]
+
+
+def test_a_warning_names_the_end_of_the_range_and_the_thrust_curve(made_once: Made) -> None:
+    """The voltages of the two curves are 12 to 16 V and 14 to 20 V. Each warning is given once."""
+
+    def say(rov: AnyInstance) -> list[str]:
+        rov.start({**dict.fromkeys(COMMANDS, 0.0), "u_r": 2500.0, "voltage": 16.0})
+        for values in ({"u_l": 500.0}, {"voltage": 13.0}, {"u_r": 0.0, "voltage": 8.0}, {"voltage": 25.0}):
+            assert rov.set(values) == OK
+        assert "u_l = 0 means that there is no signal: it acts as neutral; logged once." in rov.log[0].text
+        return warnings_of(rov.log)
+
+    for version, wrapper in WRAPPERS.items():
+        made = made_once(f"ranges{version}", partial(unzipped, RANGES, fmi=version))
+        with wrapper(made).instance() as rov:
+            assert say(rov) == BEYOND
+
+
+def test_the_python_flavour_gives_the_same_warnings(tmp_path: Path) -> None:
+    log: list[Message] = []
+    slave, place = python_slave(RANGES, tmp_path, recording_callbacks(log))
+    for values in (
+        {**dict.fromkeys(COMMANDS, 0.0), "u_r": 2500.0, "voltage": 16.0},
+        *({"u_l": 500.0}, {"voltage": 13.0}, {"u_r": 0.0, "voltage": 8.0}, {"voltage": 25.0}),
     ):
-        assert expected in text
+        slave.setReal([place[name] for name in values], [*values.values()])
+    slave.freeInstance()
+    assert [text.replace(".0 ", " ") for text in warnings_of(log)] == BEYOND
 
 
 @pytest.mark.long
@@ -155,20 +207,25 @@ def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
         assert rov.get(delayed) == [1900.0, *[PULSE[1]] * (len(COMMANDS) - 1)]
 
 
+def python_slave(vehicle: Vehicle, folder: Path, callbacks: Any = None) -> tuple[FMU2Slave, dict[str, int]]:
+    """Return an instance of a vehicle's Python flavour, and its value references."""
+    for name, data in python_content(vehicle).files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+    keep_loaded(folder)
+    place = {v.name: v.valueReference for v in read_model_description(str(folder)).modelVariables}
+    return fmpy_slave(folder, callbacks), place
+
+
 def test_the_python_flavour_waits_at_neutral_for_the_dead_time(tmp_path: Path) -> None:
     vehicle = replace(DELAYED, identifier="delayed_pulses", rov=pulsed(DELAYED.rov, PULSE))
-    for name, data in python_content(vehicle).files.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_bytes(data)
-    keep_loaded(tmp_path)
-    place = {v.name: v.valueReference for v in read_model_description(str(tmp_path)).modelVariables}
+    slave, place = python_slave(vehicle, tmp_path)
     acting, states = [place[f"delayed_{name}"] for name in COMMANDS], [place[name] for name in STATES]
     commands, times = commands_of(random.Random(3)), 0.04 * np.arange(31)
     rows = [next(commands)[0] for _ in times]
     tables = {name: np.array([row[name] for row in rows]) for name in COMMANDS}
     names = [*STATES, *(f"delayed_{name}" for name in COMMANDS)]
     in_c = simulate(vehicle.rov, times, tables, names, workers=1).values[:, 0].T
-    slave = fmpy_slave(tmp_path)
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
     slave.exitInitializationMode()

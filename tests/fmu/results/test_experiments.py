@@ -1,6 +1,7 @@
 """Reading the experiments in an FMU: defaults, limits and mistakes (rov_fmu/fmu/experiments.py)."""
 
 import zipfile
+from array import array
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -130,12 +131,14 @@ def test_a_mistake_is_one_line(given: dict[str, Any], reason: str, tmp_path: Pat
 )
 def test_the_deviation_is_the_largest(at: tuple[float, ...], expected: tuple[float, ...], deviation: float) -> None:
     run, values = np.array([0.0, 1.0, 2.0, 2.0, 3.0]), [0.0, 10.0, 20.0, -5.0, 30.0]
-    assert _deviation(run, values, at, expected) == pytest.approx(deviation, abs=1e-12)
-    assert _deviation(run, [*values[:4], np.nan], (3.0,), (30.0,)) == np.inf
+    assert _deviation(run, values, array("d", at), array("d", expected)) == pytest.approx(deviation, abs=1e-12)
+    assert _deviation(run, [*values[:4], np.nan], array("d", (3.0,)), array("d", (30.0,))) == np.inf
 
 
 def test_stimuli_become_rows_and_a_deviation_equal_to_the_tolerance_passes() -> None:
-    columns = Series({"t": [0.0, 1.0], "u": [2.0, 3.0], "v": [4.0, 5.0]})
+    columns = Series(
+        {name: array("d", values) for name, values in {"t": (0.0, 1.0), "u": (2.0, 3.0), "v": (4.0, 5.0)}.items()}
+    )
     signals = _signals(columns)
     assert signals is not None
     assert (signals.dtype.names, signals.tolist()) == (("time", "u", "v"), [(0.0, 2.0, 4.0), (1.0, 3.0, 5.0)])

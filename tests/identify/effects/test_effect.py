@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.effects.advance import Advance
 from rov_fmu.identify.effects.attitude import Attitude
 from rov_fmu.identify.effects.catalogue import EFFECTS
@@ -18,7 +19,6 @@ from rov_fmu.identify.recordings.recordings_fit import FittedEffect
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, Axis
 from rov_fmu.report.findings import acting, verdict
 from rov_fmu.tank.description import Requests
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.diagnostics import on_voltage
 from rov_fmu.identify.effects.advance import Advance
 from rov_fmu.identify.effects.attitude import Attitude
@@ -17,8 +19,6 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.model.layout import HEAVE, SURGE
 from rov_fmu.tank.description import Requests
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
 from tests.identify.scenarios.catalogue import SCENARIOS

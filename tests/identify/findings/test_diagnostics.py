@@ -11,6 +11,7 @@ from scipy.stats import f as f_distribution
 from scipy.stats import t as student
 
 from rov_fmu.identify import diagnostics
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.diagnostics import on_axis, on_delay, on_forces, on_thrust, on_voltage
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
@@ -26,7 +27,6 @@ from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import Requests
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import THRUST_EFFECTS, VIDEORAY
 

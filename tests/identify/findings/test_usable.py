@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify import usable
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.usable import UnusableError, check_push, check_recording, check_slips, is_pushed
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
 from tests.folders import FORCE, HEAD, MASS, SPEED, read
 from tests.vehicles import VIDEORAY
 

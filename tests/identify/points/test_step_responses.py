@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.points.step_responses import StepResponse, correlation_time, steps
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, PLANS, clean
 

@@ -7,6 +7,8 @@ from math import degrees
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import sensor_noise
 from rov_fmu.identify.diagnostics import on_axis
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identification import AxisResult
@@ -22,8 +24,6 @@ from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import sensor_noise
 from tests.recordings import NOISE, PLANS, clean
 from tests.vehicles import VIDEORAY
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.adapter.smoothing import sensor_noise
 from rov_fmu.identify.effects.dead_band import DeadBand
 from rov_fmu.identify.effects.delay import Delay
 from rov_fmu.identify.effects.effect import Effect, Setting
@@ -23,8 +25,6 @@ from rov_fmu.identify.recordings.selection import earn_their_place, likely
 from rov_fmu.identify.simulation.prepared import PreparedRecording, prepare
 from rov_fmu.identify.together import Together
 from rov_fmu.model.layout import HEAVE, SURGE, Axis
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.smoothing import sensor_noise
 from tests.vehicles import VIDEORAY
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.pool import run

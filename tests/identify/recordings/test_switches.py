@@ -5,13 +5,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.switches import _LARGEST, _gains, _share, _whitened, _without_fit
 from rov_fmu.identify.simulation.linear_response import LinearResponse
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
 
 LEVELS = (0.0, 0.5, 0.2, 0.7, -0.4, 0.6, 0.0, -0.6, 0.3, -0.3)

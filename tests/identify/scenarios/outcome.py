@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.effects import catalogue as effects
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.io.messages import FileError
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.tank_tests import load_tank_tests
 from tests.folders import HEAD, folder_of
 from tests.identify.scenarios.catalogue import Logs, Scenario, Sensor, voltage
 from tests.recordings import PLANS

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings import output_error
 from rov_fmu.identify.recordings.recordings_fit import estimate_of
 from rov_fmu.model.layout import HEAVE, YAW
-from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.identify.scenarios.catalogue import COMPLETE, DEPTH, HEADING, INCOMPLETE, SCENARIOS, Logs, Scenario, Sensor

@@ -6,13 +6,13 @@ from math import inf, log10, nan, pi
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.identify.slips import search
 from rov_fmu.identify.slips.explanation import Evidence, Explanation, Files, contradict, proportions
 from rov_fmu.identify.slips.search import _given, _table, _wrong_time_constants, slips, weak_thrust
 from rov_fmu.identify.slips.single_recording import Alone, alone
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.tank.recording import Recording
 from tests.recordings import PLANS, clean
 from tests.vehicles import HEAVY, VIDEORAY
 

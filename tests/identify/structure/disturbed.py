@@ -9,9 +9,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
+from rov_fmu.identify.adapter.recording import Recording, command_of
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.signals import command_of
 from tests.pool import NOISE, PATTERNS
 from tests.recordings import PLANS
 from tests.vehicles import VIDEORAY

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.identify.diagnostics import on_coupling
 from rov_fmu.identify.findings import sentences
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 

@@ -7,7 +7,6 @@ import pytest
 from rov_fmu.model.attitude import (
     QUATERNION,
     angle_formulas,
-    followed,
     quaternion_formulas,
     quaternion_rates,
     rotation_formulas,
@@ -84,38 +83,3 @@ def test_an_angle_is_unwrapped_to_the_nearest(angle: float, near: float, expecte
 
 def test_an_angle_beyond_all_numbers_is_none() -> None:
     assert all(isnan(unwrapped(*pair)) for pair in ((nan, 0.0), (0.0, inf), (inf, 0.0)))
-
-
-def test_an_angle_is_followed_through_more_than_a_turn_and_halves_the_time_only_where_it_must() -> None:
-    asked: list[float] = []
-
-    def at(rate: float) -> float:
-        asked.clear()
-
-        def angle(t: float) -> float:
-            asked.append(t)
-            return unwrapped(rate * t, 0.0)
-
-        return followed(angle, 0.0, 1.0, 0.0)
-
-    assert at(1.0) == 1.0
-    assert asked == [1.0]  # a change of 1 rad is near enough
-    assert at(-1.5) == -1.5
-    assert asked == [1.0, 0.5, 1.0]
-    assert at(2.5) == pytest.approx(2.5, rel=1e-15)
-    assert asked == [1.0, 0.5, 0.25, 0.5, 1.0, 0.75, 1.0]
-
-
-def test_an_angle_that_jumps_is_halved_a_limited_number_of_times() -> None:
-    asked: list[float] = []
-
-    def jump(t: float) -> float:
-        asked.append(t)
-        return 0.0 if t < 0.3 else 2.0
-
-    assert followed(jump, 0.0, 1.0, 0.0, depth=3) == 2.0
-    assert asked == [1.0, 0.5, 0.25, 0.5, 0.375, 0.5, 1.0]
-    asked.clear()
-    assert followed(jump, 0.0, 1.0, 0.0) == 2.0
-    assert min(abs(t - 0.3) for t in asked) < 2.0**-39
-    assert len(asked) == 1 + 2 * 40  # the whole, and two halves in each of 40 levels

@@ -61,18 +61,17 @@ static void call_fmi2SetupExperiment(slot *s)
     const double start = simple ? 0.0 : take_real(), stop = stops ? take_real() : 0.0;
     const bool good = isfinite(start) && (!stops || stop >= start);
     if (CALL(s, good, true, SetupExperiment, s->f, take_bool(), take_real(), start, stops, stop)) {
-        s->at = (expected){.type = s->at.type, .mode = s->at.mode, .experiment_defined = true, .time = start,
+        s->at = (expected){.type = s->at.type, .mode = s->at.mode, .time = start,
                            .stop_defined = stops, .stop = stop};
     }
 }
 
-CALL_THAT_LEADS(EnterInitializationMode, s->at.experiment_defined, INITIALIZATION)
+CALL_THAT_LEADS(EnterInitializationMode, true, INITIALIZATION)
 
 /* Enter Initialization Mode. */
 static void begin(slot *s)
 {
     fmi2SetupExperiment(s->f, fmi2False, 0.0, 0.0, fmi2False, 0.0);
-    s->at.experiment_defined = true;
     call_fmi2EnterInitializationMode(s);
 }
 

@@ -169,7 +169,7 @@ static void enter_initialization(slot *s, double start, bool stops, double stop)
 {
     const bool good = isfinite(start) && (!stops || stop >= start);
     if (CALL(s, good, true, EnterInitializationMode, s->f, false, 0.0, start, stops, stop)) {
-        s->at = (expected){.type = s->at.type, .mode = INITIALIZATION, .experiment_defined = true, .time = start,
+        s->at = (expected){.type = s->at.type, .mode = INITIALIZATION, .time = start,
                            .stop_defined = stops, .stop = stop};
     }
 }

@@ -18,9 +18,11 @@ static void PLAY(CompletedIntegratorStep)(slot *s)
     boolean event = true, stop = true, *const asked = given ? &event : NULL;
     verdict wanted = legal(s, WHICH(CompletedIntegratorStep), given);
     wanted = wanted == ALLOWED && HAS_ATTITUDE && !is_moderate(s->f) ? EITHER : wanted;
-    const bool accepted = CALL_AS(s, wanted, HAS_ATTITUDE, CompletedIntegratorStep, s->f, take_bool(), asked, &stop);
-    PROPERTY(event == !accepted && stop == !accepted, "an event %d or an end %d", event, stop);
+    const bool changes = HAS_ATTITUDE || HAS_DEAD_TIME;
+    const bool accepted = CALL_AS(s, wanted, changes, CompletedIntegratorStep, s->f, take_bool(), asked, &stop);
+    PROPERTY((event == !accepted || HAS_DEAD_TIME) && stop == !accepted, "an event %d or an end %d", event, stop);
     if (accepted) {
+        check_sent(s, true);
         check_heading(s->f, before(s)->now.heading);
     }
 }

@@ -5,7 +5,7 @@ from zipfile import ZipFile
 
 import casadi as ca
 
-from verification.interoperability.runners.flight import AT_START, FMU, OUTPUTS, Step, fly, parameters
+from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, fly, parameters
 
 ZipFile(FMU).extractall("unzipped")
 rov = ca.DaeBuilder("rov", "unzipped", {})
@@ -15,7 +15,7 @@ model = rov.create("model", ["x", "u"], ["ode", "y"])
 x, u = ca.MX.sym("x", rov.nx()), ca.MX.sym("u", rov.nu())
 dae = {"x": x, "u": u, "ode": model(x, u)[0]}
 integrate = ca.integrator("advance", "cvodes", dae, 0.0, 0.1, {"reltol": 1e-9, "abstol": 1e-10})
-now = {"x": ca.DM([AT_START.get(name, 0.0) for name in rov.x()]), "u": ca.DM.zeros(rov.nu())}
+now = {"x": ca.DM(rov.start(rov.x())), "u": ca.DM(rov.start(rov.u()))}
 heading = [0.0]
 
 

@@ -1,0 +1,303 @@
+"""From the topics of a log to channels: units, frames, attitude and pressure, and which of several sources is used.
+
+Every reader of a format returns topics. Here the catalogue says what their fields measure, and the rules about sources
+are applied:
+
+- A name with a word such as `setpoint` or `desired` is no measurement.
+- If the log has several vehicles, one is used.
+- Of several senders of the same message, the one that sends the commands is used.
+- Of several sources of a quantity, the first in the catalogue that has enough samples and changes is used. Of several
+  barometers, it is the one that changes most.
+- A velocity in a frame of the earth is rotated into the body frame by the attitude, and left out without one.
+"""
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.catalogue import (
+    ATMOSPHERE,
+    EULER,
+    MESSAGES,
+    NED,
+    NOT_MEASURED,
+    POSITION,
+    PRESSURE_GRADIENT,
+    QUANTITIES,
+    QUATERNION,
+    RATES,
+    VELOCITY,
+    Message,
+    Quantity,
+    words_of,
+)
+from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Source
+
+_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""Turns east, north, up into north, east, down."""
+_FLU = np.diag([1.0, -1.0, -1.0])
+"""Turns forward, left, up into forward, starboard, down."""
+_COMPARED, _LEAST_COMPARED = 1.0, 8
+"""The time over which the changes of a position are compared with a velocity, s, and the least number of changes."""
+_CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
+"""A velocity contradicts the positions if the root mean square of the difference is more than the first share of the
+motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
+_HULL = 0.02, 0.05
+"""A barometer is inside the hull if the depth that follows from it changes by less than the first number, m, and if its
+pressure differs from that of the atmosphere by less than the second share."""
+_EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
+"""Words in the names of frames that are fixed to the earth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """The messages of one kind by one sender, with numbers as they stand in the log."""
+
+    source: Source
+    time: Array
+    """n: s, ascending, all different."""
+    fields: Mapping[str, Array]
+    """n each: the numbers by their place in a message, such as `pose.pose.position.x` or `channels[0]`. They are NaN
+    where the sender marks them as unknown."""
+    unused: str = ""
+    """Why the reader says that it must not be used; empty if it may be."""
+
+    def full_fields(self) -> Iterator[tuple[str, Array]]:
+        """Yield the fields with the name of the topic, as rov.toml names them."""
+        return ((f"{self.source.topic}.{field}".removeprefix("."), values) for field, values in self.fields.items())
+
+
+@dataclass(frozen=True, eq=False)
+class _Measurement:
+    """What an entry of the catalogue found in a topic: n x k numbers in SI units."""
+
+    message: Message
+    topic: Topic
+    values: Array
+    unused: str
+    """Why the topic is not used; empty if it may be."""
+
+
+def channels_of(
+    topics: Sequence[Topic], sender: Source | None, others: Collection[str] = (), named: Sequence[Channel] = ()
+) -> list[Channel]:
+    """Return all channels of the topics, with the reason for each that is not used; preferred ones come first.
+
+    `sender` is the source of the commands, and `others` are the names of other vehicles that have commands. `named` are
+    the channels that rov.toml names, which are preferred to all others.
+    """
+    measurements = [*_measurements(topics, sender, others)]
+    attitude = _attitude(measurements)
+    channels = [*named]
+    for measurement in measurements:
+        is_velocity = measurement.message.gives == VELOCITY
+        reason = measurement.unused or (_contradiction(measurement, measurements) if is_velocity else "")
+        channels += _channels(replace(measurement, unused=reason), attitude)
+    return with_one_source(channels)
+
+
+def _measurements(topics: Sequence[Topic], sender: Source | None, others: Collection[str]) -> Iterator[_Measurement]:
+    """Yield what the catalogue knows, in the order of its preference."""
+    for message in MESSAGES:
+        found = []
+        for topic in topics:
+            name, kind = topic.source.topic, topic.source.kind
+            is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
+            if is_meant and {*message.fields} <= topic.fields.keys():
+                values = np.column_stack([topic.fields[field] for field in message.fields])
+                reason = _reason_against(topic, topics, sender, others)
+                known = np.where(values == message.unknown, np.nan, values * message.factor)
+                found.append(_Measurement(message, topic, known, reason))
+        if message.gives in ("depth", "pressure"):  # of several barometers, the one in the water changes most
+            found.sort(key=lambda measurement: -spread(measurement.values))
+        yield from found
+
+
+def _reason_against(topic: Topic, topics: Sequence[Topic], sender: Source | None, others: Collection[str]) -> str:
+    """Return why a topic is not used: it is no measurement, or of another vehicle or part; or an empty text."""
+    own = topic.source
+    if topic.unused:
+        return topic.unused
+    if words := NOT_MEASURED & words_of(own.topic):
+        return f"its name has the word {min(words)}, so it is no measurement of the vehicle"
+    if own.vehicle in others:
+        return f"it is of {own.vehicle}, another vehicle"
+    if sender and sender.part.startswith("component") and own.part != sender.part:
+        sent = {(other.source.kind, other.source.vehicle, other.source.part) for other in topics}
+        if (own.kind, own.vehicle, sender.part) in sent:
+            return f"{sender.part}, which sent the commands, sent it too"
+    return ""
+
+
+def with_one_source(channels: Sequence[Channel]) -> list[Channel]:
+    """Mark all channels of a quantity but one as unused: the first with enough samples that change, or else the first.
+
+    A position is preferred to the velocity of the same axis, so the two have sources of their own.
+    """
+    chosen: dict[str, Channel] = {}
+    for channel in sorted(channels, key=lambda c: c.count < LEAST_SAMPLES or not spread(c.values)):
+        if not channel.unused:
+            chosen.setdefault(channel.quantity.name, channel)
+    return [
+        channel
+        if channel.unused or channel is (used := chosen[channel.quantity.name])
+        else replace(channel, unused=f"{used.source} is used")
+        for channel in channels
+    ]
+
+
+# ---- Attitude and frames ---------------------------------------------------------------------------------------------
+
+
+Attitude = tuple[Array, Rotation]
+"""Times, and the rotations from the body (forward, starboard, down) to north-east-down."""
+
+
+def _attitude(measurements: Iterable[_Measurement]) -> Slerp | None:
+    """Return the attitude that is preferred, for interpolation."""
+    found = (_attitude_of(m) for m in measurements if not m.unused)
+    return next((Slerp(*attitude) for attitude in found if len(attitude[0]) >= LEAST_SAMPLES), None)
+
+
+def _attitude_of(measurement: _Measurement) -> Attitude:
+    """Return the attitude at the times at which a measurement knows it: at none if it is of something else."""
+    gives, values, time = measurement.message.gives, measurement.values, measurement.topic.time
+    known = np.isfinite(values).all(axis=1) & (gives in (EULER, QUATERNION))
+    if gives == QUATERNION:
+        known &= np.linalg.norm(values, axis=1) > 0.5
+    if gives != QUATERNION or not known.any():
+        return time[known], Rotation.from_euler("ZYX", np.reshape(values[known, ::-1], (-1, 3)))
+    earth, body = _frames(measurement)
+    rotation = Rotation.from_quat(values[known], scalar_first=True).as_matrix()
+    return time[known], Rotation.from_matrix(earth @ rotation @ body)
+
+
+def _frames(measurement: _Measurement) -> tuple[Array, Array]:
+    """Return two matrices: from the earth frame of a message to north, east, down, and from its body frame to forward,
+    starboard, down."""
+    if measurement.message.frame:
+        return np.eye(3), np.eye(3)
+    earth, body = measurement.topic.source.frames
+    earth_words, body_words = words_of(earth), words_of(body)
+    is_frd = bool(body_words & {"ned", "frd"}) or ("ned" in earth_words and "flu" not in body_words)
+    is_ned = "ned" in earth_words or (not earth and is_frd)
+    return np.eye(3) if is_ned else _ENU, np.eye(3) if is_frd else _FLU
+
+
+def _is_of_earth(measurement: _Measurement) -> bool:
+    """Return True for a velocity in a frame that is fixed to the earth."""
+    if measurement.message.frame:
+        return measurement.message.frame == NED
+    return bool(words_of(measurement.topic.source.frames[1]) & _EARTH_WORDS)
+
+
+def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement]) -> str:
+    """Return the reason against a velocity that contradicts the positions in the same messages, or an empty text.
+
+    The changes of the position over some time are compared with the integral of the velocity, both north, east and
+    down. Noise of the position is no contradiction: the velocity must agree with it in another frame, or after another
+    scale, sign or order of its components.
+    """
+    from scipy.integrate import cumulative_trapezoid  # imported here because it is slow
+
+    same = {m.message.gives: m for m in measurements if m.topic is velocity.topic}
+    position, quaternion, time = same.get(POSITION), same.get(QUATERNION), velocity.topic.time
+    if not position or not quaternion or len(time) < LEAST_SAMPLES:
+        return ""
+    known, rotation = _attitude_of(quaternion)
+    if len(known) < len(time) or not np.isfinite(np.hstack([velocity.values, position.values])).all():
+        return ""
+    earth, body = _frames(velocity)
+    ends = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], _COMPARED)))
+    moved = np.diff((position.values @ earth.T)[ends], axis=0)
+    rates = {"the body": rotation.apply(velocity.values @ body.T), "the earth": velocity.values @ earth.T}
+    paths = (cumulative_trapezoid(values, time, axis=0, initial=0.0) for values in rates.values())
+    travelled = dict(zip(rates, (np.diff(path[ends], axis=0) for path in paths), strict=True))
+    stated, other = sorted(rates, reverse=_is_of_earth(velocity))
+    error = _size(travelled[stated] - moved)
+    if error <= max(_CONTRADICTS * _size(moved), _LEAST_ERROR):
+        return ""
+    against = "it contradicts the positions in the same messages"
+    if _size(travelled[other] - moved) < _EXPLAINED * error:
+        return f"{against}, unless it is in a frame of {other}, not of {stated}"
+    mapped = travelled[stated] @ np.linalg.lstsq(travelled[stated], moved, rcond=None)[0]
+    is_explained = len(moved) >= _LEAST_COMPARED and _size(mapped - moved) < _EXPLAINED * error
+    return f"{against} by its scale, signs or axes" if is_explained else ""
+
+
+def _size(vectors: Array) -> float:
+    """Return the root mean square of all components."""
+    return float(np.sqrt(np.mean(np.square(vectors))))
+
+
+# ---- Channels --------------------------------------------------------------------------------------------------------
+
+
+def _channels(measurement: _Measurement, attitude: Slerp | None) -> Iterator[Channel]:
+    """Yield the channels of a measurement."""
+    gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
+    earth, body = _frames(measurement)
+    unused = measurement.unused
+    if gives == POSITION:
+        yield from _of_position(topic, values @ earth.T, unused)
+    elif gives in (EULER, QUATERNION):
+        time, rotation = _attitude_of(measurement)
+        angles = rotation.as_euler("ZYX")[:, ::-1].T if len(time) else ()
+        for axis, column in zip((ROLL, PITCH, YAW), angles, strict=False):
+            yield Channel(QUANTITIES[axis.position], topic.source, time, column, unused=unused)
+    elif gives in (VELOCITY, RATES):
+        if not _is_of_earth(measurement):
+            values = values @ body.T
+        elif attitude:
+            at = attitude(np.clip(topic.time, *attitude.times[[0, -1]]))
+            values = at.inv().apply(values @ earth.T)
+        else:
+            frame = topic.source.frames[1] or "the earth"
+            unused = unused or f"its frame is {frame}, and the log has no attitude to rotate it into that of the body"
+        axes = (SURGE, SWAY, HEAVE) if gives == VELOCITY else (ROLL, PITCH, YAW)
+        for axis, column in zip(axes, values.T, strict=True):
+            yield Channel(QUANTITIES[f"{axis.name} velocity"], topic.source, topic.time, column, unused=unused)
+    else:
+        yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused)
+
+
+def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel]:
+    """Yield the depth, and the horizontal distance from the first place, from n x 3 positions north, east and down."""
+    yield Channel(QUANTITIES[HEAVE.position], topic.source, topic.time, position[:, 2], unused=unused)
+    there = np.isfinite(position[:, :2]).all(axis=1)
+    if there.any():
+        distance = np.hypot(*(position - position[there][0])[:, :2].T)
+        yield Channel(QUANTITIES["distance"], topic.source, topic.time, distance, unused=unused)
+
+
+def of_scalar(quantity: Quantity, source: Source, time: Array, values: Array, unused: str = "") -> Iterator[Channel]:
+    """Yield a channel, and the depth that a pressure implies in fresh water."""
+    yield Channel(quantity, source, time, values, unused=unused)
+    if quantity.name == "pressure":
+        depth, reason = (values - ATMOSPHERE) / PRESSURE_GRADIENT, unused or _reason_against_pressure(values)
+        yield Channel(QUANTITIES["depth"], source, time, depth, unused=reason, derived_from="pressure")
+
+
+def _reason_against_pressure(values: Array) -> str:
+    """Return why no depth follows from pressures in Pa, or an empty text."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return ""
+    low, high = float(known.min()), float(known.max())
+    if high < 0.01 * ATMOSPHERE:
+        return (
+            f"its pressures of {low:.4g} ... {high:.4g} are below 1 % of an atmosphere, so they are not in Pa. Name "
+            'their unit in rov.toml, such as "pressure [kPa]"'
+        )
+    change, from_air = (high - low) / PRESSURE_GRADIENT, abs(high / ATMOSPHERE - 1.0)
+    if change < _HULL[0] and from_air < _HULL[1]:
+        return (
+            f"its pressure changes by only {1000.0 * change:.2g} mm of water and is that of the air, so the barometer "
+            "seems to be inside the hull"
+        )
+    return ""

@@ -1,0 +1,89 @@
+"""Clocks: where a clock restarted, the times of messages without one, and the values that hold at a time."""
+
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rov_fmu.tank.arrays import Array
+
+Name = TypeVar("Name")
+Number = TypeVar("Number", bound=np.generic)
+
+LEAST_AFTER = 10
+"""The least number of messages in a row after a restart. Fewer messages are only out of order."""
+AGAIN = 0.5
+"""The least number of earlier messages that have times in the range of these messages, as a share of their number."""
+_OTHER_CLOCK = 1.0
+"""If the times of messages and of their arrival differ by more than this, they come from different clocks, s."""
+
+
+def restarts(stamps: Iterable[Array]) -> list[float]:
+    """Return the arrival times from which clocks restart, s, ascending.
+
+    `stamps` has n x 2 times of each topic: of the message, and of its arrival, in the order of arrival. A restart is
+    between two messages of each topic that shows it, and what several topics show at once is one restart.
+    """
+    intervals = []
+    for pairs in stamps:
+        stamp, arrival = pairs[np.isfinite(pairs).all(axis=1)].T
+        intervals += [(float(arrival[row]), float(arrival[row - 1])) for row in restart_rows(stamp)]
+    times: list[float] = []
+    for last, first in sorted(intervals):
+        if not times or first > times[-1]:
+            times.append(last)
+    return times
+
+
+def restart_rows(time: Array) -> list[int]:
+    """Return the rows from which times go on that are earlier than those before.
+
+    Messages that only arrived late fill a gap between earlier ones. After a restart, times occur a second time, or are
+    all earlier than before. `restarts` of fmu_src/live/recording.js must do the same.
+    """
+    if not len(time):
+        return []
+    goes_on = np.append(False, (time < np.maximum.accumulate(time))[1:] & (np.diff(time) >= 0.0))
+    edges = np.flatnonzero(np.diff(goes_on, prepend=False, append=False))
+    for start, end in (edges.reshape(-1, 2) - (1, 0)).tolist():  # the first row goes back, the others go on
+        before, last = time[:start], time[end - 1]
+        again = ((before >= time[start]) & (before <= last)).sum() >= AGAIN * (end - start)
+        if end - start >= LEAST_AFTER and (again or last < before.min()):
+            return [start, *(start + row for row in restart_rows(time[start:]))]
+    return []
+
+
+def usual_delay(pairs: Array) -> float:
+    """Return the median time from a message to its arrival, s, from n x 2 times of both.
+
+    It is 0 where the two have the same clock, which is not that of a simulation.
+    """
+    delays = pairs[:, 1] - pairs[:, 0]
+    delay = float(np.median(delays[np.isfinite(delays)])) if np.isfinite(delays).any() else 0.0
+    return delay if abs(delay) > _OTHER_CLOCK else 0.0
+
+
+def ascending(time: Array, *values: Array) -> tuple[Array, ...]:
+    """Return times in order, and the values with them; the last finite value counts where a time is repeated."""
+    times, place = np.unique(time, return_inverse=True)
+    merged = np.full((len(values), len(times)), np.nan)
+    for row, column in zip(merged, values, strict=True):
+        there = np.isfinite(column)
+        row[place[there]] = column[there]
+    return times, *merged
+
+
+def held(time: Array, values: NDArray[Number], at: Array) -> NDArray[Number]:
+    """Return the values that hold at some times, each until the next one. The first one holds before it, too."""
+    if np.array_equal(time, at):
+        return values
+    return values[np.maximum(np.searchsorted(time, at, side="right") - 1, 0)]
+
+
+def in_rows(series: Mapping[Name, tuple[Array, Array]]) -> tuple[Array, dict[Name, Array]]:
+    """Return the times of all series, from the first one at which each has a value, and the values that hold then."""
+    clocks = {id(time): time for time, _ in series.values()}  # the columns of a table share one array of times
+    rows = np.unique(np.concatenate([*clocks.values()]))
+    rows = rows[rows >= max(time[0] for time, _ in series.values())]
+    return rows, {name: held(time, values, rows) for name, (time, values) in series.items()}

@@ -1,0 +1,325 @@
+"""The commands of the thrusters, from the outputs of an autopilot or of other programs.
+
+Which outputs are meant, and what their numbers mean, is known from the log where it has parameters:
+
+    motor n            the output that SERVOx_FUNCTION or PWM_MAIN_FUNCx assigns to it; otherwise output n
+    range of pulses    neutral and span in [logs] of rov.toml; otherwise MOT_PWM_MIN and MOT_PWM_MAX about 1500 us, or
+                       SERVOx_MIN, SERVOx_TRIM and SERVOx_MAX; otherwise 1500 us and 400 us
+    direction          MOT_n_DIRECTION, and SERVOx_REVERSED
+
+Each parameter has the value that was valid at the time of the output. ArduPilot applies the range and the direction of
+servo x to a motor only if MOT_PWM_TYPE is 8 (PWMRange) or 9 (PWMAngle), and uses MOT_PWM_MIN and MOT_PWM_MAX otherwise
+(`AP_Motors::rc_write` and `AP_Motors6DOF::calc_thrust_to_pwm`). A log that does not tell MOT_PWM_TYPE may be of either.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import AfterValidator
+
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
+from rov_fmu.io.messages import listed, shown
+from rov_fmu.io.toml_file import Strict
+from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.catalogue import NOT_COMMANDED, OUTPUTS, Output, words_of
+from rov_fmu.tank.channels import Topic
+from rov_fmu.tank.clocks import ascending, held
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Source
+from rov_fmu.vehicle.quantity import Finite
+
+PULSE_RANGE = 800.0, 2200.0
+"""The range of pulses that speed controllers get, µs."""
+_LONGEST_PULSE = 1e4
+_MOST_MOTORS = 12
+"""The largest number of motors that an autopilot drives."""
+_BY_SERVO = 8.0, 9.0
+"""The values of MOT_PWM_TYPE with which the parameters of the servo define the range and the direction of a motor."""
+_ARDUPILOT_MOTOR, _PX4_MOTOR = 32, 100
+"""The function of output x that drives motor n is n more than this."""
+
+
+def _check_pulse(value: float | None) -> float | None:
+    if value is not None and not 0.0 < value <= _LONGEST_PULSE:
+        raise ValueError(f"must be the width of a pulse in us, above 0 and at most {_LONGEST_PULSE:g}")
+    return value
+
+
+_Pulse = Annotated[Finite | None, AfterValidator(_check_pulse)]
+
+
+class LogKeys(Strict):
+    """The table [logs] of rov.toml: what the logs of a folder do not tell."""
+
+    vehicle: str = ""
+    """Which of several vehicles in a log: the number of the MAVLink system, or the ROS namespace."""
+    outputs: str = ""
+    """The topic with the commands of the thrusters."""
+    neutral: _Pulse = None
+    """The pulse that stops a thruster, µs."""
+    span: _Pulse = None
+    """The distance from the neutral pulse to full thrust, µs."""
+
+
+NO_KEYS = LogKeys()
+Series = tuple[Array, Array]
+"""Times (s, ascending) and values."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """The parameters of an autopilot, with the times at which they were told."""
+
+    told: Mapping[str, tuple[Array, ...]] = field(default_factory=dict)
+    """Times (s, ascending) and values, by name."""
+    used: set[str] = field(default_factory=set)
+    """The names of those whose values were asked for."""
+
+    @classmethod
+    def of_pairs(cls, told: Mapping[str, Sequence[tuple[float, float]]], delay: float = 0.0) -> "Parameters":
+        """Return parameters that were told at times that are late by a delay, s, with these values."""
+        columns = {name: np.array(pairs, float).T for name, pairs in told.items()}
+        return cls({name: ascending(time - delay, values) for name, (time, values) in columns.items()})
+
+    def at(self, name: str, time: Array, default: float = 0.0) -> Array:
+        """Return the values that were valid at some times; before the first one was told, it holds already."""
+        if name not in self.told:
+            return np.full(len(time), default)
+        self.used.add(name)
+        times, values = self.told[name]
+        return held(times, values, time)
+
+    def last(self, name: str) -> float | None:
+        """Return the last value, or None."""
+        return float(self.told[name][1][-1]) if name in self.told else None
+
+    def functions(self, pattern: str) -> Iterator[tuple[re.Match[str], float]]:
+        """Yield the match of each name with a pattern, and the last value."""
+        for name in self.told:
+            if match := re.fullmatch(pattern, name):
+                yield match, self.last(name) or 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Outputs:
+    """The outputs of one sender: a time series for each number."""
+
+    rule: Output
+    source: Source
+    """The source, or the first one where each thruster has its own."""
+    series: Mapping[int, Series]
+    """Times (s) and numbers by the number of the output, from 1."""
+
+    @property
+    def used(self) -> list[int]:
+        """The outputs that ever have a pulse or a finite number other than 0."""
+        return [
+            n for n, (_, values) in self.series.items() if (np.isfinite(values) & ~np.isin(values, NO_OUTPUT)).any()
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class Commanded:
+    """The commands of a log, and who sent them."""
+
+    series: Mapping[str, Series] = field(default_factory=dict)
+    """The commands of each thruster, not yet limited to ±1, by its name; empty where the log has none."""
+    sender: Source | None = None
+    other_vehicles: Collection[str] = ()
+    """The other vehicles that have commands."""
+    findings: Sequence[Finding] = ()
+
+
+def commands_of(
+    path: Path, topics: Sequence[Topic], thrusters: Sequence[str], parameters: Parameters, keys: LogKeys
+) -> Commanded:
+    """Return the commands of the thrusters, which are numbered from 1 if they have no names. Raises DataFileError."""
+    candidates = [*_candidates(topics)]
+    own = _named(path, "outputs", keys.outputs, candidates, lambda o: o.source.topic)
+    own = _named(path, "vehicle", keys.vehicle, own, lambda o: o.source.vehicle)
+    messages = Counter[str]()
+    for outputs in own:
+        messages[outputs.source.vehicle] += sum(len(time) for time, _ in outputs.series.values())
+    if not messages:
+        return Commanded()
+    ((vehicle, _),) = messages.most_common(1)
+    own = [outputs for outputs in own if outputs.source.vehicle == vehicle]
+    best = _best(own, len(thrusters), parameters)
+    numbers = _motors(best, len(thrusters), parameters)
+    names = thrusters or [str(n) for n in range(1, len(numbers) + 1)]
+    if missing := [name for name, number in zip(names, numbers, strict=True) if number not in best.series]:
+        count = f"{shown(best.source.topic)} has {len(best.series)} outputs"
+        raise DataFileError(f"{path}: no output of thruster {listed(missing)}: {count}")
+    vehicles = {outputs.source.vehicle for outputs in candidates}
+    findings = [*_choice(path, best, own, sorted(vehicles))]
+    series, meanings = _fractions(path, best, dict(zip(names, numbers, strict=True)), parameters, keys)
+    return Commanded(series, best.source, vehicles - {vehicle}, [*findings, *meanings])
+
+
+def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
+    """Yield findings about the outputs and the vehicle that are used, if there are others."""
+    if len(vehicles) > 1:
+        yield _finding(path, "several vehicles", vehicles=listed(vehicles), vehicle=best.source.vehicle)
+    others = [str(outputs.source) for outputs in own if outputs is not best]
+    if others or best.source.topic != best.source.kind:  # a message of an autopilot without rivals explains itself
+        left = f"; not used: {listed(dict.fromkeys(others))}" if others else ""
+        yield _finding(path, "source of commands", source=str(best.source), others=left)
+
+
+def _finding(path: Path, kind: str, **names: str) -> Finding:
+    return Finding(kind, file=path.name, names=names)
+
+
+# ---- Which outputs ---------------------------------------------------------------------------------------------------
+
+
+def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
+    """Yield all outputs that may be those of the thrusters, in the order of the catalogue's preference.
+
+    The number of an output is that of its field, or that of the topic where each thruster of a vehicle has its own.
+    """
+    for rule in OUTPUTS:
+        found: dict[str | Topic, dict[int, tuple[Topic, Array]]] = {}
+        for topic in topics:
+            name, kind = topic.source.topic, topic.source.kind
+            match = re.search(rule.topic, name)
+            if not match or not re.fullmatch(rule.kind, kind) or NOT_COMMANDED & words_of(name):
+                continue
+            for place, values in topic.fields.items():
+                if of_field := re.fullmatch(rule.field, place):
+                    key, numbered = (topic.source.vehicle, match) if match.groups() else (topic, of_field)
+                    found.setdefault(key, {})[int(numbered[1])] = topic, values
+        for by_number in found.values():
+            ordered = [by_number[n] for n in sorted(by_number)]
+            series = {n: (topic.time, values) for n, (topic, values) in enumerate(ordered, start=1)}
+            yield _Outputs(rule, ordered[0][0].source, series)
+
+
+def _named(
+    path: Path, key: str, wanted: str, candidates: Sequence[_Outputs], name_of: Callable[[_Outputs], str]
+) -> Sequence[_Outputs]:
+    """Return the outputs that a key of [logs] names, or all without a name. Raises DataFileError."""
+    found = [outputs for outputs in candidates if wanted in ("", name_of(outputs))]
+    if candidates and not found:
+        known = listed(dict.fromkeys(shown(name_of(outputs)) for outputs in candidates))
+        raise DataFileError(f"{path}: [logs] names the {key} {shown(wanted)}, but the log has {known}")
+    return found
+
+
+def _best(candidates: Sequence[_Outputs], thrusters: int, parameters: Parameters) -> _Outputs:
+    """Return the outputs of one vehicle that drive the motors: those that fit best, and change most."""
+    same = [outputs for outputs in candidates if outputs.rule is candidates[0].rule]
+    module = _motor_module(parameters)
+    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, _activity(o)))
+
+
+def _activity(outputs: _Outputs) -> float:
+    """Return how much the outputs change."""
+    return sum(spread(values) for _, values in outputs.series.values())
+
+
+def _motor_module(parameters: Parameters) -> str:
+    """Return the instance of PX4's outputs that drives the motors, by the functions of the outputs, or `none`.
+
+    The first instance is of the MAIN outputs, if any of these has a function, and the next one of the AUX outputs.
+    """
+    drives: dict[str, bool] = {}
+    for match, function in parameters.functions(r"PWM_(MAIN|AUX)_FUNC\d+"):
+        if function:
+            drives[match[1]] = drives.get(match[1], False) or 0 < function - _PX4_MOTOR <= _MOST_MOTORS
+    driving = [drives[module] for module in sorted(drives, reverse=True)]
+    return f"instance {driving.index(True)}" if any(driving) else "none"
+
+
+def _motors(outputs: _Outputs, thrusters: int, parameters: Parameters) -> list[int]:
+    """Return the number of the output of each motor, in the order of the motors."""
+    assigned: dict[int, int] = {}
+    for match, function in parameters.functions(r"(?:SERVO|PWM_(MAIN|AUX)_FUNC)(\d+)(?(1)|_FUNCTION)"):
+        motor = int(function) - (_PX4_MOTOR if match[1] else _ARDUPILOT_MOTOR)
+        if 0 < motor <= _MOST_MOTORS:
+            assigned[motor] = int(match[2])
+    count = thrusters or max(assigned, default=0) or max(outputs.used, default=0)
+    return [assigned.get(motor, motor) for motor in range(1, count + 1)]
+
+
+# ---- What the numbers mean -------------------------------------------------------------------------------------------
+
+
+def _fractions(
+    path: Path, outputs: _Outputs, numbers: Mapping[str, int], parameters: Parameters, keys: LogKeys
+) -> tuple[dict[str, Series], list[Finding]]:
+    """Return the fractions of the full command of each thruster, not yet limited to ±1, and what had to be decided.
+
+    `numbers` has the number of the output of each thruster, in the order of the motors. Raises DataFileError.
+    """
+    series = {name: (outputs.series[n][0], np.nan_to_num(outputs.series[n][1])) for name, n in numbers.items()}
+    findings = []
+    if outputs.rule.unit != "1" and "MOT_1_DIRECTION" not in parameters.told:
+        findings.append(_finding(path, "unknown direction"))
+    if not series or not _are_pulses(path, outputs):
+        return series, findings
+    turned, without_pulse, ranges = [], 0, []
+    for motor, (name, (time, values)) in enumerate(series.items(), start=1):
+        low, neutral, high = _range(numbers[name], time, parameters, keys)
+        ranges.append([f"{end[-1]:g}" for end in (low, neutral, high)])
+        is_turned = parameters.at(f"MOT_{motor}_DIRECTION", time, 1.0) < 0.0
+        if parameters.last("MOT_PWM_TYPE") in (None, *_BY_SERVO):
+            is_turned ^= parameters.at(f"SERVO{numbers[name]}_REVERSED", time) > 0.0
+        turned += [name] if is_turned.any() else []
+        is_none = np.isin(values, NO_OUTPUT)
+        without_pulse += int(is_none.sum())
+        span = np.where(values > neutral, high - neutral, neutral - low) * np.where(is_turned, -1.0, 1.0)
+        series[name] = time, np.where(is_none, 0.0, (values - neutral) / span)
+    if without_pulse:
+        findings.append(Finding("no servo pulse", file=path.name, numbers={"count": without_pulse}))
+    if ranges[0] != [f"{end:g}" for end in (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN)]:
+        findings.append(
+            _finding(path, "range of pulses", **dict(zip(("low", "neutral", "high"), ranges[0], strict=True)))
+        )
+    if turned:
+        findings.append(_finding(path, "reversed motors", thrusters=", ".join(turned)))
+    begin = max(time[0] for time, _ in series.values())
+    return series, [*findings, *_changes(path, parameters, begin)]
+
+
+def _changes(path: Path, parameters: Parameters, begin: float) -> Iterator[Finding]:
+    """Yield a finding for each time at which parameters that are used change, after the first command."""
+    changed: dict[str, list[str]] = {}
+    for name in sorted(parameters.used):
+        times, told = parameters.told[name]
+        for time in times[1:][np.diff(told) != 0.0] - begin:
+            changed.setdefault(f"{time:.4g}", []).append(name)
+    yield from (_finding(path, "parameter changed", name=", ".join(names), at=at) for at, names in changed.items())
+
+
+def _are_pulses(path: Path, outputs: _Outputs) -> bool:
+    """Return True for pulses in µs, False for fractions. Raises DataFileError where the numbers are neither."""
+    values = np.nan_to_num(np.concatenate([values for _, values in outputs.series.values()]))
+    low, high = PULSE_RANGE
+    if outputs.rule.unit == "1" or (not outputs.rule.unit and (np.abs(values) <= 1.0).all()):
+        return False
+    if outputs.rule.unit or (np.isin(values, NO_OUTPUT) | ((low <= values) & (values <= high))).all():
+        return True
+    raise DataFileError(
+        f"{path}, {shown(outputs.source.topic)}: outputs between {values.min():g} and {values.max():g} are neither "
+        "fractions within -1 ... 1 nor pulses in us: name their unit in the table [topics] of rov.toml"
+    )
+
+
+def _range(number: int, time: Array, parameters: Parameters, keys: LogKeys) -> tuple[Array, Array, Array]:
+    """Return the pulses of full thrust astern, of no thrust, and of full thrust ahead of an output, at some times."""
+    kind = parameters.last("MOT_PWM_TYPE")
+    of_motors = [("MOT_PWM_MIN", "MOT_PWM_MAX")] if kind not in _BY_SERVO else []
+    of_servo = [tuple(f"SERVO{number}_{end}" for end in ("MIN", "MAX", "TRIM"))] if kind in (None, *_BY_SERVO) else []
+    usual = np.full(len(time), keys.neutral or NEUTRAL)
+    for names in [*of_motors, *of_servo] if keys.neutral is keys.span is None else ():
+        if all((parameters.last(name) or 0.0) > 0.0 for name in names):
+            low, high, *trim = (parameters.at(name, time) for name in names)
+            return low, (0.5 * (low + high) if kind == _BY_SERVO[0] else [*trim, usual][0]), high
+    span = keys.span or SPAN
+    return usual - span, usual, usual + span

@@ -1,0 +1,374 @@
+"""Read and check a folder of tank tests with its rov.toml.
+
+The name of a file, in small or capital letters, gives the kind of test and the tested thrust curve or axis. Any text
+may follow after another underscore:
+
+    thrust_<curve>*.csv                        command, force                  bollard pull, (6)-(10)
+    steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5
+    time_constant_<surge|sway|heave|yaw>*.csv  command, time constant          (17), Tables 6-8
+    log_<surge|sway|heave|yaw>*.csv            time, command, and distance, depth or heading, or velocity
+    any other log (rov_fmu/tank/read_log.py)   time, commands, and the motion of several axes
+
+A bag of ROS 2 may be in a folder of its own. The files of the tables [dives] of rov.toml may have any names.
+
+A command is that of an axis, or, in a test of a thrust curve, that of all thrusters that were tested together.
+"""
+
+import hashlib
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, read_header
+from rov_fmu.io.file_kinds import LOG_SUFFIXES, TABLE_SUFFIXES
+from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed
+from rov_fmu.io.toml_file import join_names, key_line
+from rov_fmu.model.layout import AXES, Layout
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
+from rov_fmu.tank.description import ROV_FILE, Dive, Requests, RovFile, read_description
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import CLOCK_ERROR, Commands, Log
+from rov_fmu.tank.quality import checked
+from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.parsers import one_parser, open_table
+from rov_fmu.tank.readers.tank_tables import Row, read_rows
+from rov_fmu.vehicle.vehicle import VehicleFileError
+
+KINDS = (*TABLES, "log")
+"""The words that the name of a file begins with."""
+
+
+@dataclass
+class Folder:
+    """The tests in a folder, and the mistakes in its files."""
+
+    path: Path
+    rov_file: RovFile
+    names: Names = field(default_factory=Names)
+    """The tables [columns] and [topics]."""
+    files: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    """The names of files by kind of test and by curve or axis, including files that cannot be read."""
+    rows: dict[tuple[str, str], list[Row]] = field(default_factory=dict)
+    """The rows of tables by kind of test and by curve or axis."""
+    logs: list[Log] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+    """The SHA-256 hash of each file by its name."""
+    findings: list[Finding] = field(default_factory=list)
+    mistakes: list[str] = field(default_factory=list)
+    """A line for every mistake in a file of tests."""
+    unreadable: list[str] = field(default_factory=list)
+    """A line for every log that cannot be read. They are mistakes only if nothing else is left, or if there are other
+    mistakes, which may follow from them."""
+    rov_file_mistakes: list[str] = field(default_factory=list)
+    """A line for every mistake in rov.toml."""
+    originals: dict[tuple[str, ...], str] = field(default_factory=dict)
+    """The first file (or the files of the first dive) with each content, by kind and hash."""
+    known: set[str] = field(default_factory=set)
+    """The keys that the tables [columns] and [topics] may have."""
+
+    @property
+    def layout(self) -> Layout | None:
+        """The largest layout that the vehicle can have; None where it is unknown."""
+        return self.rov_file.description.layout if self.rov_file.description else None
+
+    @property
+    def logged(self) -> Layout | None:
+        """The layout with the axes that a log of several axes may measure."""
+        return self.rov_file.description.logged if self.rov_file.description else None
+
+    def read(self, path: Path) -> None:
+        """Read one file."""
+        try:
+            digest = file_hash(path)
+            kind, subject = self._kind_and_subject(path)
+            # Two curves or axes may have equal tables: a vehicle may be as fast in surge as in sway.
+            if self._is_copy(path.name, ("log", digest) if kind == "log" else (kind, subject, digest)):
+                return
+            self.inputs[path.name] = digest
+            self.files.setdefault((kind, subject), []).append(path.name)
+            axis = AXES.get(subject)
+            if kind != "log":
+                rows, known = read_rows(path, kind, axis, self.names.columns)
+                self.rows.setdefault((kind, subject), []).extend(rows)
+                self.known |= known
+            elif layout := self.layout if axis else self.logged:
+                self._add(read_logs(path, layout, self.names, axis))
+        except FileError as error:
+            is_table = parts_of_name(path.stem.lower(), None)[0] in TABLES
+            if isinstance(error, UnreadableFileError) and not is_table:
+                self.unreadable += str(error).splitlines()
+                self.findings.append(unreadable(path, error))
+            else:
+                self.mistakes += str(error).splitlines()
+
+    def read_all(self, paths: Iterable[Path]) -> None:
+        """Read some files and the dives of several files, and check their logs."""
+        self.inputs[ROV_FILE] = file_hash(self.path / ROV_FILE)
+        with one_parser():
+            for path in paths:
+                self.read(path)
+            for name, dive in self.rov_file.tables.dives.items():
+                self.read_dive(name, dive)
+        if self.mistakes or not (self.logs or self.rows):
+            self.mistakes += self.unreadable
+        self.logs = [checked(log) for log in self.logs]
+        self.findings += [finding for log in self.logs for finding in log.findings]
+
+    def read_dive(self, name: str, dive: Dive) -> None:
+        """Read the files of a dive together."""
+        try:
+            for other in dive.other_clock:
+                if other not in dive.files:
+                    reason = f"must be one of its files{did_you_mean(other, dive.files)}"
+                    raise self._error(f"dives.{name}.other_clock", reason, other)
+            paths = [self.path / part for part in dive.files]
+            for part, path in zip(dive.files, paths, strict=True):
+                if path.name != part or not path.is_file():
+                    raise self._error(f"dives.{name}.files", "there is no such file in this folder", part)
+            digests = dict(zip(dive.files, map(file_hash, paths), strict=True))
+            if self._is_copy(join_names(dive.files), ("dive", *sorted(digests.values()))):
+                return
+            self.inputs |= digests
+            if layout := self.logged:
+                logs = [log for path in paths for log in read_logs(path, layout, self.names, is_part=True)]
+                self._add([_together(paths[0], logs, dive.other_clock)])
+        except FileError as error:
+            self.mistakes += str(error).splitlines()
+
+    def _error(self, key: str, reason: str, value: str) -> DataFileError:
+        return DataFileError(f"{self.path / ROV_FILE}: {key_line(key, reason, value)}")
+
+    def _is_copy(self, name: str, content: tuple[str, ...]) -> bool:
+        """Return True, and add a finding, if an earlier file has the same content. The same data must not count
+        twice."""
+        if content not in self.originals:
+            self.originals[content] = name
+            return False
+        self.findings.append(Finding("copy", file=name, names={"original": self.originals[content]}))
+        return True
+
+    def _add(self, logs: Sequence[Log]) -> None:
+        """Add the pieces of a log that have commands. Raises DataFileError if none has."""
+        if not any(log.commands for log in logs):
+            raise DataFileError(
+                f"{self.path / logs[0].file}: no commands of thrusters were found. `rov-fmu identify --inspect` "
+                "lists the content of the log. Name the commands in the table [topics] of rov.toml"
+            )
+        self.known = self.known.union(*(log.names for log in logs))
+        self.logs += [log for log in logs if log.commands]
+
+    def unknown_names(self) -> Iterator[str]:
+        """Yield a line for each entry of [columns] and [topics] that no file has."""
+        tables = self.rov_file.tables
+        for table, names in (("columns", tables.columns), ("topics", tables.topics)):
+            free = self.known - names.keys()
+            for name, value in names.items():
+                if name not in self.known:
+                    is_header = table == "columns"
+                    what = "no CSV file has such a column" if is_header else "no log has such a topic and field"
+                    yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, free)}", value)
+
+    def missing_columns(self, requests: Requests) -> Iterator[str]:
+        """Yield a line for each key of [fit] that needs a column which a log does not have."""
+        for key, quantities in requests.quantities.items():
+            for name in quantities:
+                lacking = sorted({log.file for log in self.logs if not log.used(name)})
+                if lacking or not self.logs:
+                    column = f"the column {name} [{in_degrees(QUANTITIES[name].unit)[1]}]"
+                    none = f"there is none in {brief(join_names(lacking))}" if lacking else "there is no log"
+                    yield key_line(f"fit.{key}", f"every log must have {column}, but {none}")
+
+    def _kind_and_subject(self, path: Path) -> tuple[str, str]:
+        """Return the kind of test and its curve or axis. The axis is empty for a log of several axes. Raises
+        DataFileError."""
+        curves = [curve.name for curve in self.layout.curves] if self.layout else None
+        kind, subject = parts_of_name(path.stem.lower(), curves)
+        if kind != "log" and path.name.isprintable() and has_log(path, kind, self.names.columns):
+            kind, subject = "log", subject if subject in AXES else ""
+        axes = self.layout.kinds if self.layout else AXES
+        known = [*((curves or []) if kind == "thrust" else axes)]
+        if not (kind and path.name.isprintable() and (subject or known)):
+            raise self._unknown_kind(path)
+        self._check_subject(path, kind, subject, known)
+        return kind, subject
+
+    def _unknown_kind(self, path: Path) -> DataFileError:
+        """Return the error about a file that is neither a log nor a table."""
+        curves = [curve.name for curve in self.layout.curves] if self.layout else []
+        subjects = [*curves, *(self.logged.kinds if self.logged else AXES)]
+        hint = did_you_mean(path.stem.lower().partition("_")[0], KINDS, also={"time": "time_constant"})
+        return DataFileError(
+            f"{path}: neither a log, which has a column 'time [s]', nor a table, whose name begins with "
+            f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {listed(subjects, 'or')}{hint}"
+        )
+
+    def _check_subject(self, path: Path, kind: str, subject: str, known: Sequence[str]) -> None:
+        """Check the curve or the axis in the name of a file. Raises DataFileError."""
+        if not subject and kind != "log":
+            word = path.stem.lower().removeprefix(f"{kind}_").partition("_")[0]
+            what = "a thrust curve" if kind == "thrust" else "an axis"
+            whose = "this" if self.layout else "any"
+            hint = did_you_mean(word, known)
+            raise DataFileError(
+                f"{path}: {word or repr('')} is not {what} of {whose} vehicle, only {listed(known)}{hint}"
+            )
+        if self.layout and subject in AXES and kind != "thrust" and not self.layout.signs(AXES[subject]):
+            raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
+
+
+def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> Folder:
+    """Read a folder. Raises DataFileError or VehicleFileError if it cannot be read at all.
+
+    `check_inputs` is called with every file that is read, before any test is read.
+    """
+    rov_file = _read_description(folder)
+    found = Folder(folder, rov_file, rov_file_mistakes=[*rov_file.mistakes])
+    mistakes, tables, dives = found.rov_file_mistakes, rov_file.tables, rov_file.tables.dives
+    found.names, wrong_names = names_of(found.layout, tables)
+    if wrong_names or not rov_file.explains_files:  # each file would be refused for what rov.toml should explain
+        raise VehicleFileError(*mistakes, *lines_on(folder / ROV_FILE, wrong_names))
+    parts = {name for dive in dives.values() for name in dive.files}
+    paths = [path for path in test_files(folder) if path.name not in parts]
+    if not paths and not dives:
+        patterns = ", ".join(f"*{suffix}" for suffix in (*TABLE_SUFFIXES, *LOG_SUFFIXES))
+        raise VehicleFileError(*mistakes, f"{folder}: there are no tests ({patterns}) in this folder")
+    vehicles = filter(None, (tables.against, tables.base))
+    check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *vehicles])
+    found.read_all(paths)
+    if (description := rov_file.description) and not (mistakes or found.mistakes):
+        mistakes += lines_on(description.path, found.unknown_names())
+        mistakes += lines_on(description.path, found.missing_columns(description.requests))
+    return found
+
+
+def unreadable(path: Path, error: FileError) -> Finding:
+    """Return the finding about a file that cannot be read, with the first reason."""
+    first, *_ = str(error).splitlines()
+    return Finding("unreadable file", file=path.name, names={"reason": first.removeprefix(f"{path}: ")})
+
+
+def test_files(folder: Path) -> list[Path]:
+    """Return the files of a folder that may be tests, also those of bags in folders of their own, in order."""
+    in_bags = (path for bag in folder.glob("*/metadata.yaml") for path in bag.parent.iterdir())
+    suffixes = (*TABLE_SUFFIXES, *LOG_SUFFIXES)
+    return sorted(path for path in (*folder.iterdir(), *in_bags) if path.name.lower().endswith(suffixes))
+
+
+def _read_description(folder: Path) -> RovFile:
+    """Read rov.toml, and explain its purpose where there is none."""
+    if not folder.is_dir():
+        what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
+        raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
+    path = folder / ROV_FILE
+    try:
+        return read_description(path)
+    except VehicleFileError:
+        if path.exists():
+            raise
+        words = (
+            "there is no such file. It must give the vehicle's name, and everything that no test determines, "
+            "such as the mass"
+        )
+        raise VehicleFileError(f"{path}: {words}") from None
+
+
+# ---- Files -----------------------------------------------------------------------------------------------------------
+
+
+def _together(path: Path, logs: Sequence[Log], other_clock: Collection[str]) -> Log:
+    """Return the log of a dive of several files, of which one has the commands. Raises DataFileError.
+
+    A file with another clock than the commands is one of the log's `other_clocks`. If its times do not overlap with
+    those of the commands, its first sample is moved to the first command.
+    """
+    commanding = [log for log in logs if log.commands]
+    if len(commanding) != 1:
+        which = join_names(log.file for log in commanding) or "none"
+        raise DataFileError(
+            f"{path}: exactly one file of the dive must have the commands. The files with commands are: {which}"
+        )
+    commands = commanding[0].commands
+    assert commands
+    parts = [log if log.commands else _on_clock(log, commands, is_other=log.file in other_clock) for log in logs]
+    return _joined(commanding[0], parts)
+
+
+def _joined(first: Log, parts: Sequence[Log]) -> Log:
+    """Return the log that has the commands, with the channels of all parts."""
+    return replace(
+        first,
+        channels=tuple(replace(channel, file=log.file) for log in parts for channel in log.channels),
+        findings=tuple(finding for log in parts for finding in log.findings),
+        names=frozenset().union(*(log.names for log in parts)),
+        unread=tuple(item for log in parts for item in log.unread),
+        other_clocks=frozenset().union(*(log.other_clocks for log in parts)),
+    )
+
+
+def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
+    """Return a file of a dive on the clock of the commands, with a finding if it has another clock."""
+    times = [channel.time[channel.there] for channel in log.channels if channel.count]
+    if not times:
+        return log
+    start, end = min(time[0] for time in times), max(time[-1] for time in times)
+    overlap = start <= commands.rows[-1] and commands.rows[0] <= end
+    if overlap and not is_other:
+        return log
+    moved = 0.0 if overlap else float(commands.rows[0] - start)
+    kind = "other clock" if overlap else "aligned clock"
+    return replace(
+        log,
+        channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
+        findings=(*log.findings, Finding(kind, file=log.file, numbers={"most": CLOCK_ERROR})),
+        other_clocks=frozenset([log.file]),
+    )
+
+
+def kind_of_table(path: Path, columns: Mapping[str, str]) -> str:
+    """Return the kind of the table of tank tests in a file, or an empty text for a log."""
+    kind, _ = parts_of_name(path.stem.lower(), None)
+    return kind if kind in TABLES and not has_log(path, kind, columns) else ""
+
+
+def has_log(path: Path, kind: str, columns: Mapping[str, str]) -> bool:
+    """Return True if a file has a column of times, as a log has, and not what a table of this kind measures.
+
+    `columns` is the table [columns] of rov.toml. Raises DataFileError if the name tells no kind.
+    """
+    try:
+        lines = open_table(path)
+        if not lines:
+            return True
+        header = [columns.get(title, title) for title in read_header(path, lines)]
+    except DataFileError:
+        if kind:
+            return False  # the table is read with its mistakes
+        raise
+    measured = columns_of(kind) if kind else {}
+    measured.pop(COMMAND, None)
+    return has_column(header, {"time": TIME}) and not has_column(header, measured)
+
+
+def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
+    """Split the name of a file into the kind of test and the longest curve or axis name that follows, if any.
+
+    Without curves, any name may be that of a curve.
+    """
+    for kind in KINDS:
+        if (rest := stem.removeprefix(f"{kind}_")) != stem:
+            names = AXES if kind != "thrust" else [rest] if curves is None else curves
+            fitting = (name for name in names if f"{rest}_".startswith(f"{name.lower()}_"))
+            return kind, max(fitting, key=len, default="")
+    return "", ""
+
+
+def file_hash(path: Path) -> str:
+    found = hashlib.sha256()
+    try:
+        with path.open("rb") as file:  # in pieces, because a bag may be larger than the memory
+            while piece := file.read(2**20):
+                found.update(piece)
+    except OSError as error:
+        raise DataFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    return found.hexdigest()

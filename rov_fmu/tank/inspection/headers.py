@@ -1,0 +1,247 @@
+"""What unknown headers of CSV files seem to mean, before a vehicle is known."""
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import groupby, takewhile
+from math import ceil, floor, inf, log10, pi
+from pathlib import Path
+
+import numpy as np
+
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns, read_header
+from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import COMMANDS, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES
+from rov_fmu.tank.columns import columns_of, columns_of_log
+from rov_fmu.tank.commands import PULSE_RANGE
+from rov_fmu.tank.folder import kind_of_table, parts_of_name
+
+_HEADER = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>[^\])]*)[\])]\s*")
+_MOST_THRUSTERS = 32
+"""The largest number of columns of a CSV file that are taken as the commands of thrusters; no vehicle has more."""
+_USUAL_PULSES = 1000.0, 2000.0
+_REST = 20.0
+"""The largest distance of the usual pulse of a thruster from the neutral one, µs."""
+_NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
+"""A name of a thruster that a vehicle file may have."""
+_CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
+_LIKELY = {"depth": 100.0, "heading": 2.1 * pi, "roll angle": pi, "pitch angle": 0.5 * pi, "voltage": 1000.0}
+"""The largest number that is likely in the SI unit. If a larger one has no unit, it is in a smaller unit."""
+_FORCES = {"force": "N", "torque": "N.m"}
+"""The words by which a column of a wrench is recognised, and its unit."""
+_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+"""The least time since 1970 that is in a unit."""
+
+
+@dataclass(frozen=True)
+class TableHeaders:
+    """The information in the names and headers of tables."""
+
+    curves: tuple[str, ...] = ()
+    """The thrust curves that are tested."""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    """Headers of columns that seem to be meant, by the headers of the files; empty for one that is not recognised."""
+
+
+def header_parts(title: str) -> tuple[str, str]:
+    """Return the name and the unit in a header with brackets of any kind."""
+    match = _HEADER.fullmatch(title)
+    return (match["name"].rstrip(), match["unit"]) if match else (title, "")
+
+
+def axis_in_name(path: Path) -> Axis | None:
+    """Return the axis that the name of a file contains."""
+    return next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
+
+
+def layout_of(thrusters: Iterable[str]) -> Layout:
+    """Return a layout with all axes, and with thrusters of which only the names are known."""
+    axes = tuple(VehicleAxis(axis) for axis in AXES.values())
+    return Layout(axes, (Curve("t"),), tuple(Thruster(name, "t", (1.0, 0.0, 0.0), arm=1) for name in thrusters))
+
+
+def fitting(names: Sequence[str], layouts: Iterable[Layout]) -> Layout | None:
+    """Return the first layout with the same number of thrusters. None if the names are neither its names nor
+    numbers."""
+    found = next((layout for layout in layouts if len(layout.thrusters) == len(names)), None)
+    fits = found and ({*names} == {thruster.name for thruster in found.thrusters} or all(map(str.isdigit, names)))
+    return found if fits else None
+
+
+# ---- Logs ------------------------------------------------------------------------------------------------------------
+
+
+def guessed(
+    titles: Sequence[str], numbers: Mapping[str, Array], axis: Axis | None, layouts: Iterable[Layout]
+) -> tuple[Layout, dict[str, str]]:
+    """Return a layout with the thrusters that a CSV file seems to have, and what its headers seem to mean.
+
+    `numbers` has the numbers below each header as they stand in the file. The headers of commands mean the names of
+    thrusters.
+    """
+    rotations = {words[:-1] for words in map(_words, titles) if words.endswith(" w")}
+    meant = {title: _meant(title, numbers[title], rotations) for title in titles}
+    commanding = _commanding(meant, numbers)
+    names = _names(commanding)
+    layout = fitting(names, layouts) or layout_of(names)
+    known = [thruster.name for thruster in layout.thrusters]
+    is_column = KnownColumns(columns_of_log(layout, axis)).has
+    columns: dict[str, str] = {}
+    if not all(map(is_column, commanding)):
+        for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):
+            columns[title] = f"u_{name} [{_unit_of_command(title, numbers[title])}]"
+    others = {title: name for title, name in meant.items() if title not in commanding and not is_column(title)}
+    return layout, columns | _measured(others, numbers, is_up=_is_up(meant, numbers))
+
+
+def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
+    """Return the headers of the commands of thrusters, or else those of forces that are applied."""
+    commanding = [title for title, name in meant.items() if _is_command(title, numbers[title], name)]
+    return commanding[:_MOST_THRUSTERS] or [t for t in meant if _unit_of_force(t) and len(numbers[t])]
+
+
+def _is_up(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> bool:
+    """Return True if the third component of a position is negative, so that z points up and y to port."""
+    depths = (numbers[title] for title, name in meant.items() if name == "depth" and _words(title).endswith(" z"))
+    depth = next((found for found in depths if len(found)), None)
+    return depth is not None and bool(np.median(depth) < 0.0)
+
+
+def _measured(meant: Mapping[str, str], numbers: Mapping[str, Array], *, is_up: bool) -> dict[str, str]:
+    """Return the columns that headers mean; the first header of each column counts."""
+    columns, taken = {}, {""}
+    for title, name in meant.items():
+        if name not in taken:
+            taken.add(name)
+            sign = "-" if is_up and _words(title).endswith((" y", " z")) else ""
+            columns[title] = f"{sign}{name} [{_unit(title, name, numbers[title])}]"
+    return columns
+
+
+def _words(title: str) -> str:
+    """Return the words and numbers of a header in small letters, without its unit."""
+    return " ".join(re.findall("[a-z]+|[0-9]+", header_parts(title)[0].casefold()))
+
+
+def _candidates(title: str, columns: Iterable[str]) -> Iterator[str]:
+    """Yield the columns among these of which a header has a word, in the order of the catalogue."""
+    words = _words(title)
+    return (name for name, pattern in HEADERS if name in columns and re.search(rf"\b({pattern})\b", words))
+
+
+def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
+    """Return the name of the column that a header seems to mean, or an empty text.
+
+    `rotations` are the beginnings of headers of quaternions.
+    """
+    words, unit = _words(title), header_parts(title)[1]
+    is_part = words.endswith((" x", " y", " z"))
+    if is_part and (words[:-1] in rotations or not len(numbers)):
+        return ""
+    for name in _candidates(title, ("", "time", *QUANTITIES)):
+        quantity = QUANTITIES.get(name)
+        if not (quantity and quantity.is_velocity) or unit in quantity.units or (is_part and not unit):
+            return name
+    return ""
+
+
+def _is_command(title: str, numbers: Array, meant: str) -> bool:
+    """Return True for the command of a thruster, by its name, unit and size, or for pulses that rest at 1500 us."""
+    words, unit = _words(title), header_parts(title)[1].casefold()
+    is_possible = unit in ("", "1", "-", "%", "pwm") or unit.startswith(PULSES)
+    if not is_possible or not len(numbers) or {"rc", *NOT_COMMANDED} & {*words.split()}:
+        return False
+    given = numbers[~np.isin(numbers, NO_OUTPUT)]
+    if re.search(COMMANDS, words) or (unit == "%" and not meant):
+        return bool((np.abs(given) <= 100.0).all()) or _within(given, PULSE_RANGE)
+    values, counts = np.unique(given, return_counts=True)
+    return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
+
+
+def _within(numbers: Array, ends: tuple[float, float]) -> bool:
+    return bool(len(numbers) and ends[0] <= numbers.min() and numbers.max() <= ends[1])
+
+
+def _names(titles: Sequence[str]) -> list[str]:
+    """Return names of thrusters for columns of commands: what is particular in those of the columns, or else numbers.
+
+    The words that all headers share say nothing: the particular part of `thr_FS_pwm` is `FS`.
+    """
+    parts = [header_parts(title)[0] for title in titles]
+    words = [re.findall(r"[^\W\d_]+|\d+|[\W_]+", part) for part in parts]
+    shared = set.intersection(*map(set, words)) if len(words) > 1 else {*words[0][:-1]} if words else set()
+    particular = [re.sub(r"[\W_]+", "_", "".join(w for w in own if w not in shared)).strip("_") for own in words]
+    for names in (particular, parts):
+        if all(_NAME.fullmatch(name) for name in names) and len({name.casefold() for name in names}) == len(names):
+            return names
+    return [str(n + 1) for n in range(len(titles))]
+
+
+def _unit(title: str, name: str, numbers: Array) -> str:
+    """Return the unit of a column, from its header or else the likely one."""
+    given, most = header_parts(title)[1], float(np.abs(numbers).max(initial=0.0))
+    units = QUANTITIES[name].units if name in QUANTITIES else TIMES
+    if name == "time":
+        usual = float(np.ptp(numbers)) / max(len(numbers) - 1, 1) if len(numbers) else 0.0
+        likely = next((unit for least, unit in _EPOCHS if most > least), "ms" if usual > 5.0 and most < 1e9 else "s")
+    else:
+        largest = _LIKELY.get(name, inf)
+        likely = next((unit for unit, per in units.items() if most <= largest * per), [*units][-1])
+    return given if given in units else likely
+
+
+def _unit_of_force(title: str) -> str:
+    """Return the unit of a component of a force or torque that is applied, or an empty text for another header."""
+    match = re.search(rf"\b({'|'.join(_FORCES)})\b.* [xyz]$", _words(title))
+    return _FORCES[match[1]] if match else ""
+
+
+def _unit_of_command(title: str, numbers: Array) -> str:
+    """Return the unit of a command: from its header, or else from the size of the values."""
+    unit, most = header_parts(title)[1], float(np.abs(numbers).max(initial=0.0))
+    if unit_of_force := _unit_of_force(title):
+        digit = 10.0 ** floor(log10(most)) if most > 0.0 else 1.0
+        return f"{unit_of_force} {max(ceil(most / digit), 1) * digit:g}"  # 60 for 52.3
+    known = unit in ("%", "1") or unit.startswith(PULSES)
+    return unit if known else "1" if most <= 1.0 else "%" if most <= 100.0 else "us"
+
+
+# ---- Tables ----------------------------------------------------------------------------------------------------------
+
+
+def headers_of_tables(folder: Path) -> TableHeaders:
+    """Return the information in the tables of a folder. Of a table that cannot be read, only the name is used."""
+    columns: dict[str, str] = {}
+    tested = set()
+    for path in sorted(folder.glob("*.[cC][sS][vV]")):
+        if kind := kind_of_table(path, {}):
+            if kind == "thrust":
+                _, curve = parts_of_name(path.stem.lower(), None)
+                tested.add(curve)
+            with suppress(DataFileError):
+                for title, meant in guessed_of_table(kind, axis_in_name(path), read_header(path)).items():
+                    columns[title] = meant or columns.get(title, "")
+    return TableHeaders(tuple(_curves(tested)), columns)
+
+
+def guessed_of_table(kind: str, axis: Axis | None, titles: Iterable[str]) -> dict[str, str]:
+    """Return what the headers of a table that are not known seem to mean; an empty text for those that mean nothing."""
+    of_table, columns = columns_of(kind, axis), {}
+    is_column = KnownColumns(of_table).has
+    for title in titles:
+        if not is_column(title):
+            unit = header_parts(title)[1].replace(" ", "")
+            meant = (f"{name} [{unit}]" for name in _candidates(title, of_table))
+            columns[title] = next((header for header in meant if is_column(header)), "")
+    return columns
+
+
+def _curves(tested: Iterable[str]) -> Iterator[str]:
+    """Yield the name of a curve for all names of files that begin with the same word: main for main_1 and main_2."""
+    for _, group in groupby(sorted(tested), lambda name: name.partition("_")[0]):
+        parts = zip(*(name.split("_") for name in group), strict=False)
+        name = "_".join(words[0] for words in takewhile(lambda words: len({*words}) == 1, parts))
+        if _CURVE.fullmatch(name):
+            yield name

@@ -1,0 +1,145 @@
+"""A log: what was commanded and what was measured in one dive or one test, each with its own times.
+
+Nothing in a log is resampled or copied onto the times of something else. Every format is read into this type, and
+identification, `--inspect`, the flight page and `simulate` use it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rov_fmu.model.layout import Axis
+from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.tank.clocks import held
+from rov_fmu.tank.findings import Finding
+
+LEAST_SAMPLES = 20
+"""The smallest number of samples from which something can be identified."""
+CLOCK_ERROR = 5.0
+"""The largest error of times that were aligned with those of another clock, s."""
+
+
+@dataclass(frozen=True, order=True)
+class Source:
+    """Who sent messages or a channel, and in which frames."""
+
+    topic: str
+    """The topic, the message or the header of the column; empty for a whole table."""
+    kind: str = ""
+    """The type of the messages."""
+    vehicle: str = ""
+    """The MAVLink system or the ROS namespace; empty where a log can only be of one vehicle."""
+    part: str = ""
+    """The part of the vehicle that sent it, such as `core 1` of the estimator or `component 154`."""
+    frames: tuple[str, str] = ("", "")
+    """The frames that the header names: of a pose, such as `map`, and of a twist."""
+
+    def __str__(self) -> str:
+        return f"{self.topic} ({self.part})" if self.part else self.topic
+
+    @classmethod
+    def of_several(cls, topics: Sequence[str]) -> "Source":
+        """Return the source of what comes from several fields or columns."""
+        return cls(" ... ".join(dict.fromkeys([*topics[:1], *topics[-1:]])))
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """The measurements of one quantity by one source, in SI units and in the frames of the model."""
+
+    quantity: Quantity
+    source: Source
+    time: Array
+    """n: s, ascending, all different."""
+    values: Array
+    """n: NaN where there is no measurement. Angles may wrap."""
+    file: str = ""
+    """The file that it is from, in a dive of several files."""
+    unused: str = ""
+    """Why the channel is not used, such as `a setpoint`; empty for a channel that is used."""
+    derived_from: str = ""
+    """The quantity that the sensor measures, such as `pressure`, if the values are computed from it."""
+
+    @property
+    def there(self) -> Flags:
+        """n: True where there is a measurement."""
+        return np.isfinite(self.values)
+
+    @property
+    def count(self) -> int:
+        """The number of samples with a measurement."""
+        return int(self.there.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """The commands of the thrusters as changes: each value holds until the next change of that thruster."""
+
+    thrusters: tuple[str, ...]
+    """The names of the thrusters; only `command` in a log of one axis, whose thrusters all follow it."""
+    rows: Array
+    """The times at which the log tells commands, s, ascending. The last command holds for one more usual interval."""
+    time: Array
+    """n: the time of the row at which a change is told first, s, ascending."""
+    since: Array
+    """n: the time of the row before, at which the old command still held; the change happened between the two."""
+    thruster: NDArray[np.intp]
+    """n: the index of the thruster that changes."""
+    value: Array
+    """n: the new command, a fraction of the full command within ±1."""
+    source: Source = field(default_factory=lambda: Source(""))
+
+    @property
+    def interval(self) -> float:
+        """The usual time between two rows, s."""
+        return float(np.median(np.diff(self.rows))) if len(self.rows) > 1 else 0.0
+
+    @property
+    def end(self) -> float:
+        """The time until which the last commands hold, s."""
+        return float(self.rows[-1]) + self.interval
+
+    def at(self, time: Array) -> Array:
+        """Return the command of each thruster at some times, times x thrusters; 0 before its first change."""
+        by_thruster = (self.thruster == n for n in range(len(self.thrusters)))
+        begun = np.asarray(time) >= self.rows[0]
+        return np.column_stack([begun * held(self.time[own], self.value[own], time) for own in by_thruster])
+
+    @classmethod
+    def of_rows(cls, thrusters: Sequence[str], rows: Array, values: Array, source: Source) -> "Commands":
+        """Return the changes in rows of commands: `rows` has n times (s), `values` is n x thrusters within ±1."""
+        changes = np.vstack([np.ones((1, len(thrusters)), bool), values[1:] != values[:-1]])
+        row, thruster = np.nonzero(changes)
+        since = rows[np.maximum(row - 1, 0)]
+        return cls(tuple(thrusters), rows, rows[row], since, thruster, values[row, thruster], source)
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """What one dive, or one test of an axis, commanded and measured."""
+
+    file: str
+    """The name of the file, or of the part of it: `dive.tlog (from 41 s)`."""
+    commands: Commands | None
+    """None where the log has no commands, such as one file of a dive."""
+    channels: tuple[Channel, ...]
+    """All channels, those that are preferred first."""
+    axis: Axis | None = None
+    """The only axis that the log is a test of; None for a dive."""
+    follows_axis: bool = False
+    """True if the log has one command, which all thrusters of its axis follow."""
+    other_clocks: frozenset[str] = frozenset()
+    """The files whose times are those of another clock than that of the commands."""
+    findings: tuple[Finding, ...] = ()
+    """What was left out, taken or doubted."""
+    unread: tuple[tuple[str, str], ...] = ()
+    """The name and a description of everything that is not recognised."""
+    names: frozenset[str] = frozenset()
+    """The keys that the tables [columns] and [topics] of rov.toml may have for this log."""
+
+    def used(self, name: str) -> Channel | None:
+        """Return the channel that is used for a quantity, by the quantity's name, or None."""
+        return next((c for c in self.channels if c.quantity.name == name and not c.unused), None)

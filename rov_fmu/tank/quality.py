@@ -1,0 +1,219 @@
+"""What is told about the channels of a log: their sources, sensors that froze, jumps, gaps and scales."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from rov_fmu.io.messages import MOST, first_of, listed
+from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.columns import in_degrees
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
+
+_MOST_SOURCES = 4
+"""The largest number of sources that are not used and told."""
+_LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
+"""A gap is longer than this time, s, and than this many usual intervals."""
+_ROUNDING = 0.01
+_TURN = 2.0 * pi + 2.0 * _ROUNDING
+"""What rounding may add to the bounds of a wrapped angle, and the width of these bounds, rad."""
+_APART = 2.0
+"""The time over which changes of a position are compared with a velocity, s."""
+_SAME_SCALE, _CLEAR = 0.01, 4.0
+"""The scales of two sensors differ if the difference exceeds this share, and this number of standard errors."""
+_LEAST_SHARE, _LEAST_TIME = 0.2, 5.0
+"""A sensor is frozen if it keeps its last value for more than this share of the log, and for more than this time, s."""
+_CHANGING, _TURNING, _VISIBLE = 0.5, 0.2, 1.5
+"""The noise of a sensor is visible if three conditions hold. At least the first share of the samples differ from the
+sample before. At least the second share of the changes have the opposite sign of the change before. The median change
+is more than the third number times the smallest change, which is the resolution of the sensor."""
+_TOGETHER = 2.0
+"""Sensors froze together if they froze within this time, s."""
+_LEAST_JUMP = 0.2
+"""The smallest jump that is told, m or rad."""
+_FASTER = 5.0
+"""A position jumps where it changes this many times as fast as around there and as 95 % of the time, by this many usual
+steps, and stays there: its median over three samples changes by half of the jump or more."""
+
+
+def checked(log: Log) -> Log:
+    """Return the log without the values that must be wrong, with findings about these and about doubtful channels."""
+    channels, frozen = _without_frozen(log.file, log.channels)
+    findings = [*log.findings, *frozen]
+    used = [channel for channel in channels if not channel.unused]
+    if any(channel.derived_from == "pressure" for channel in used):
+        findings.append(Finding("depth by pressure", file=log.file))
+    findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
+    findings += sources(log.file, channels)
+    return replace(log, channels=tuple(channels), findings=tuple(findings))
+
+
+# ---- Sources ---------------------------------------------------------------------------------------------------------
+
+
+def sources(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
+    """Yield a finding for each source that is used, with its quantities and the sources that are not used for them, and
+    one for each source that is left out although no other one of its quantities is used.
+
+    The column of a table, which has only its header for a source, is not worth a sentence if it has no rival.
+    """
+    used = {channel.quantity.name for channel in channels if not channel.unused}
+    groups: dict[tuple[str, str, str], list[Channel]] = {}
+    for channel in channels:
+        others = "" if channel.unused else "".join(_others(channel, channels))
+        if not channel.unused and (channel.source.kind or others):
+            groups.setdefault(("source", str(channel.source), others), []).append(channel)
+        elif channel.quantity.name not in used:
+            groups.setdefault(("channel left out", str(channel.source), channel.unused), []).append(channel)
+    for (kind, source, words), own in sorted(groups.items(), key=lambda group: group[0][0]):
+        quantities = listed(dict.fromkeys(channel.quantity.name for channel in own))
+        names = {"quantities": quantities, "source": source, "words": words}
+        numbers = {"rate": rate(own[0].time[own[0].there])} if kind == "source" else {}
+        yield Finding(kind, file=file, names=names, numbers=numbers)
+
+
+def rate(time: Array) -> float:
+    """Return the usual number of samples in a second, 1/s; 0 for less than two samples."""
+    intervals = np.diff(time)
+    return 1.0 / float(np.median(intervals)) if len(intervals) else 0.0
+
+
+def _others(channel: Channel, channels: Sequence[Channel]) -> Iterator[str]:
+    """Yield the words about the sources of the same quantity that are not used."""
+    unused = [other for other in channels if other.unused and other.quantity == channel.quantity]
+    rivals = f"{channel.source} is used"
+    told = [
+        f"{other.source}{'' if other.unused == rivals else f' ({other.unused})'}"
+        for other in unused
+        if str(other.source) != str(channel.source)
+    ]
+    if told:
+        yield f"; also in {', '.join(first_of([*dict.fromkeys(told)], _MOST_SOURCES))}, not used"
+
+
+# ---- Gaps, angles and jumps ------------------------------------------------------------------------------------------
+
+
+def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
+    """Return the last time before each gap in the measurements and the first time after it, s.
+
+    A gap is longer than 1 s and than ten usual intervals between two measurements.
+    """
+    at = time[np.isfinite(values)]
+    intervals = np.diff(at)
+    if not len(intervals):
+        return []
+    (before,) = np.nonzero(intervals > max(_LEAST_GAP, _GAP_INTERVALS * float(np.median(intervals))))
+    return [(float(at[n]), float(at[n + 1])) for n in before]
+
+
+def unwrapped(channel: Channel) -> Array:
+    """Return the values without jumps of a full turn, if they are angles; NaN stays NaN.
+
+    An angle is already continuous if it is not within -180° ... 180° or 0° ... 360°, or if it never jumps by more than
+    half a turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is
+    assumed.
+    """
+    found, there = channel.values.copy(), channel.there
+    values = found[there]
+    jumps = np.abs(np.diff(values)) > pi
+    jumps[np.isin(channel.time[there][:-1], [start for start, _ in gaps(channel.time, found)])] = False
+    in_one_turn = any(((low <= values) & (values <= low + _TURN)).all() for low in (-pi - _ROUNDING, -_ROUNDING))
+    if channel.quantity.wraps and jumps.any() and in_one_turn:
+        found[there] = np.unwrap(values)
+    return found
+
+
+def _jumps(file: str, channel: Channel) -> Finding | None:
+    """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
+    from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
+
+    axis, unit, there = channel.quantity.axis, channel.quantity.unit, channel.there
+    time, values = channel.time[there], unwrapped(channel)[there]
+    steps = np.diff(values)
+    if unit not in ("m", "rad") or len(values) < LEAST_SAMPLES or not steps.any():
+        return None
+    rates = np.abs(steps) / np.diff(time)
+    beside = maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
+    least = max(_LEAST_JUMP, _FASTER * float(np.median(np.abs(steps[steps != 0.0]))))
+    sudden = (np.abs(steps) > least) & (rates > _FASTER * np.maximum(beside, np.quantile(rates, 0.95)))
+    around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")
+    places = np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))
+    if not len(places):
+        return None
+    factor, shown_unit = in_degrees(unit)
+    told = [f"{factor * steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in places]
+    names = {"quantity": channel.quantity.name, "jumps": ", ".join(first_of(told, MOST))}
+    return Finding("jumps", axis.name if axis else "", file=file, names=names, numbers={"count": len(places)})
+
+
+def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> list[Finding]:
+    """Return a finding if a position changes by another factor than 1 of what the velocity of its axis says.
+
+    The changes of the position over short times are compared with the integral of the velocity; a constant current is
+    allowed for. Logs with roll or pitch are left out, because there the velocity has another direction.
+    """
+    from scipy.integrate import cumulative_trapezoid  # imported here because it is slow
+
+    axis = position.quantity.axis
+    used = (c for c in channels if c.quantity.axis == axis and c.quantity.is_velocity and not c.unused)
+    velocity = next(used, None)
+    tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
+    if not axis or tilted or not velocity or velocity.count < LEAST_SAMPLES:
+        return []
+    time, values = position.time[position.there], unwrapped(position)[position.there]
+    at, speeds = velocity.time[velocity.there], velocity.values[velocity.there]
+    ends = np.arange(max(time[0], at[0]), min(time[-1], at[-1]), _APART)
+    rows = np.unique(np.searchsorted(time, ends))
+    travelled = np.interp(time[rows], at, cumulative_trapezoid(speeds, at, initial=0.0))
+    implied, actual = (np.diff(path) / np.diff(time[rows]) for path in (travelled, values[rows]))
+    if len(implied) < LEAST_SAMPLES or not spread(implied):
+        return []
+    (scale, _), covariance = np.polyfit(implied, actual, 1, cov=True)
+    if abs(scale - 1.0) < max(_SAME_SCALE, _CLEAR * np.sqrt(covariance[0, 0])):
+        return []
+    names = {"quantity": position.quantity.name}
+    return [Finding("scales differ", axis.name, file=file, names=names, numbers={"factor": float(scale)})]
+
+
+# ---- Frozen sensors --------------------------------------------------------------------------------------------------
+
+
+def _without_frozen(file: str, channels: Sequence[Channel]) -> tuple[list[Channel], list[Finding]]:
+    """Return the channels without the values of sensors that froze together, and a finding about these.
+
+    A single constant sensor may be right: for example the depth at the surface, or a coarse heading at rest.
+    """
+    used = [channel for channel in channels if not channel.unused and len(channel.time)]
+    first = min((float(channel.time[0]) for channel in used), default=0.0)
+    last = max((float(channel.time[-1]) for channel in used), default=0.0)
+    frozen = {channel: at for channel in used if (at := _frozen_from(channel, last - first)) is not None}
+    groups = ({c: at for c, at in frozen.items() if start <= at <= start + _TOGETHER} for start in frozen.values())
+    together = max(groups, key=len, default={})
+    names = [channel.quantity.name for channel in together]
+    if len({*names}) < 2:
+        return [*channels], []
+    kept = [replace(c, values=np.where(c.time < together.get(c, np.inf), c.values, np.nan)) for c in channels]
+    numbers = {"start": min(together.values()) - first, "end": last - first}
+    return kept, [Finding("frozen sensors", file=file, names={"sensors": listed(names)}, numbers=numbers)]
+
+
+def _frozen_from(channel: Channel, duration: float) -> float | None:
+    """Return the time after which a sensor with visible noise keeps its last value exactly, or None."""
+    time, steps = channel.time[channel.there], np.diff(channel.values[channel.there])
+    start = int(np.max(np.flatnonzero(steps), initial=-1)) + 1
+    if start < LEAST_SAMPLES or time[-1] - time[start] <= max(_LEAST_TIME, _LEAST_SHARE * duration):
+        return None
+    return float(time[start]) if _is_noisy(steps[:start]) else None
+
+
+def _is_noisy(steps: Array) -> bool:
+    """Return True if the noise of a sensor is visible. Without noise, a slow motion in coarse steps may simply have
+    ended."""
+    changes = steps[steps != 0.0]
+    sizes = np.abs(changes)
+    turning = np.count_nonzero(changes[1:] * changes[:-1] < 0.0)
+    changing = len(changes) >= _CHANGING * len(steps) and turning >= _TURNING * len(changes)
+    return bool(changing and np.median(sizes) > _VISIBLE * sizes.min())

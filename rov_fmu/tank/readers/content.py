@@ -1,0 +1,107 @@
+"""What a reader returns: the messages of a log by topic, before anything is known about the vehicle."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from rov_fmu.tank.arrays import Array, range_in_words
+from rov_fmu.tank.channels import Topic
+from rov_fmu.tank.clocks import ascending, restarts, usual_delay
+from rov_fmu.tank.commands import Parameters
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Source
+
+Messages = dict[Source, list[tuple[float, float, Mapping[str, float]]]]
+"""The messages of each source in the order of their arrival: the time, NaN where it has none, that of the arrival, s,
+and the numbers."""
+
+
+@dataclass(eq=False)
+class Piece:
+    """The messages of a log between two restarts of its clock."""
+
+    topics: list[Topic]
+    parameters: Parameters = field(default_factory=Parameters)
+    since: float = 0.0
+    """The time of its first message after that of the log, on a clock that does not restart, s."""
+
+    @property
+    def fields(self) -> dict[str, str]:
+        """The name of the topic of each field, by the field's name in rov.toml."""
+        return {field: topic.source.topic for topic in self.topics for field, _ in topic.full_fields()}
+
+
+@dataclass(eq=False)
+class Content:
+    """What a file contains."""
+
+    file: str
+    pieces: list[Piece]
+    findings: list[Finding] = field(default_factory=list)
+    is_damaged: bool = False
+    """True if the parser says so."""
+    unread: dict[str, str] = field(default_factory=dict)
+    """A description of everything that is not recognised, by name."""
+    names: frozenset[str] = frozenset()
+    """All headers of a table."""
+    headers: Mapping[str, str] = field(default_factory=dict)
+    """The headers of the columns of a table that are read, by their field."""
+
+    def count(self, kind: str, count: int, **names: str) -> None:
+        """Add a finding about something that was counted, if there is any."""
+        if count:
+            self.findings.append(Finding(kind, file=self.file, names=names, numbers={"count": count}))
+
+
+def content_of(
+    file: str,
+    messages: Messages,
+    parameters: Mapping[str, Sequence[tuple[float, float]]] = MappingProxyType({}),
+    damaged: int = 0,
+) -> Content:
+    """Return the content of a log whose messages have times of their own and of their arrival.
+
+    `parameters` has the arrival (s) and the value of each message about a parameter, by name. A clock that restarts
+    splits the log.
+    """
+    content, late = Content(file, []), Counter[str]()
+    stamps = [np.array([message[:2] for message in own]) for own in messages.values()]
+    again = restarts(stamps)
+    begin = min((float(pairs[0, 1]) for pairs in stamps), default=0.0)
+    for n, first in enumerate([begin, *again]):
+        inside = [np.searchsorted(again, pairs[:, 1], side="right") == n for pairs in stamps]
+        own = [pairs[there] for pairs, there in zip(stamps, inside, strict=True)]
+        delay = usual_delay(np.concatenate([np.empty((0, 2)), *own]))
+        topics = []
+        for source, (stamp, arrival), there in zip(messages, (pairs.T for pairs in own), inside, strict=True):
+            if len(stamp):
+                numbers = [messages[source][row][2] for row in np.flatnonzero(there)]
+                topics.append(topic_of(source, np.where(np.isnan(stamp), arrival - delay, stamp), numbers))
+                late[source.topic] += len(stamp) if np.isnan(stamp).any() else 0
+        content.pieces.append(Piece(topics, Parameters.of_pairs(parameters, delay), first - begin))
+    content.count("time of arrival", late.total(), topics=", ".join(+late))
+    content.count("damaged pieces", damaged)
+    return content
+
+
+def topic_of(source: Source, time: Array, numbers: Sequence[Mapping[str, float]]) -> Topic:
+    """Return the topic of messages with these times, s, and numbers."""
+    keys = dict.fromkeys(key for row in numbers for key in row)
+    ordered, *columns = ascending(time, *(np.array([row.get(key, np.nan) for row in numbers]) for key in keys))
+    return Topic(source, ordered, dict(zip(keys, columns, strict=True)))
+
+
+def described(topics: Iterable[Topic], messages: Mapping[str, int] = MappingProxyType({})) -> dict[str, str]:
+    """Return the descriptions of topics that are not recognised, and of the range of each number in their messages.
+
+    `messages` has the number of all messages, if the topics have only the first ones.
+    """
+    found = {}
+    for topic in topics:
+        name, kind = topic.source.topic, topic.source.kind
+        found[name] = f"{kind}, {messages.get(name, len(topic.time))} messages"
+        found |= {place: range_in_words(values) for place, values in topic.full_fields() if np.isfinite(values).any()}
+    return found

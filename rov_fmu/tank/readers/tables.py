@@ -1,0 +1,285 @@
+"""Read a log that is a table: a CSV file, or the variables of a .mat file of MATLAB.
+
+It has a column `time`, columns of commands and columns of measured motion. The commands are one column `command` in a
+log of one axis, or a column for each input of the vehicle (`u_<name>`), or a column for each thruster. Rows and cells
+that cannot be used are left out and counted.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from io import StringIO
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from rov_fmu.io.csv_table import (
+    NEUTRAL,
+    NO_OUTPUT,
+    NUMBER,
+    PULSES,
+    SPAN,
+    Column,
+    Columns,
+    DataFileError,
+    read_columns,
+)
+from rov_fmu.io.messages import did_you_mean, shown, similar
+from rov_fmu.model.layout import Axis, Layout
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import QUANTITIES, TIMES
+from rov_fmu.tank.channels import Topic
+from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, restart_rows
+from rov_fmu.tank.columns import (
+    COMMAND,
+    FRACTION,
+    RENAMING,
+    SLIPS,
+    WELL_KNOWN,
+    Entry,
+    Names,
+    columns_of_log,
+    command_columns,
+    motion_columns,
+    refuse_slips,
+    thrusters_of,
+)
+from rov_fmu.tank.findings import SENTENCES, Finding, refusals
+from rov_fmu.tank.log import Source
+from rov_fmu.tank.readers.content import Content, Piece
+
+_MOST_UNORDERED = 0.2
+"""The largest share of rows out of order. If it is exceeded, the times are not those of a log."""
+_IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in ("[]", "()"))
+"""The ends of headers in pulse widths, such as "PWM (us)": such a column may have commands."""
+_SLOW, _SHORTEST = 0.1, 1e-5
+"""A log with fewer rows per second than the first number, or with shorter intervals than the second, s, has times in
+another unit than its header says, in all likelihood."""
+
+
+def rules_of_page() -> dict[str, Any]:
+    """Return the rules by which recording.js, of the page that flies, reads tables as `read_table` does."""
+    return {
+        "number": NUMBER.pattern,
+        "times": TIMES,
+        "fractions": FRACTION.units,
+        "pulses": {"units": PULSES, "neutral": NEUTRAL, "span": SPAN, "none": NO_OUTPUT},
+        "renamed": WELL_KNOWN,
+        "slips": SLIPS,
+        "mostUnordered": _MOST_UNORDERED,
+        "leastAfter": LEAST_AFTER,
+        "again": AGAIN,
+    }
+
+
+def read_table(
+    path: Path,
+    layout: Layout,
+    axis: Axis | None,
+    names: Names,
+    open_stream: Callable[[], TextIO],
+    *,
+    is_part: bool = False,
+) -> tuple[Content, dict[str, Entry]]:
+    """Read a table, and return its columns in SI units, with the meaning of each. Raises DataFileError.
+
+    `open_stream` opens its lines. A part of a dive may have only commands or only motion.
+    """
+    quantities = motion_columns(axis)
+    kinds = command_columns(layout, axis)
+    check = partial(_wrong_columns, path=path, layout=layout, axis=axis, kinds=kinds, is_part=is_part)
+    table = read_columns(
+        path,
+        columns_of_log(layout, axis, names.keys),
+        others=True,
+        loose=True,
+        renamed=names.columns,
+        hint=RENAMING,
+        check_header=check,
+        open_stream=open_stream,
+    )
+    commanding = next(_commanding(table.values, kinds), [])
+    refuse_slips(table, commanding)
+    values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
+    unlikely = _unlikely_rate(table, values["time"])
+    if unlikely and not is_part:
+        raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
+    content = Content(path.name, [], names=frozenset(table.header), headers=table.headers)
+    _add_pieces(content, table, values, commanding)
+    _tell_cells(content, table, commanding)
+    if unlikely:
+        content.findings.append(unlikely)
+    thrusters = thrusters_of(layout)
+    entries = {name: Entry(thrusters.get(name, name), None) for name in commanding}
+    return content, entries | {name: Entry(name, QUANTITIES[quantity.name]) for name, quantity in quantities.items()}
+
+
+# ---- Columns ---------------------------------------------------------------------------------------------------------
+
+
+def _commanding(names: Collection[str], kinds: Iterable[Mapping[str, Column]]) -> Iterator[list[str]]:
+    """Yield the columns of commands among the names, those of each kind."""
+    return filter(None, ([name for name in columns if name in names] for columns in kinds))
+
+
+def _wrong_columns(
+    headers: Mapping[str, str],
+    others: Sequence[str],
+    path: Path,
+    layout: Layout,
+    axis: Axis | None,
+    kinds: Sequence[Mapping[str, Column]],
+    is_part: bool,
+) -> Iterator[str]:
+    """Yield a line for every mistake in the columns of a log, from the headers that are read and the others."""
+    found = [*_commanding(headers, kinds)]
+    if len(found) > 1:
+        titles = ", ".join(shown(headers[names[0]]) for names in found)
+        yield (
+            f"columns {titles}: a log must have the commands of the axis, of the inputs or of the thrusters, "
+            "but only one of these"
+        )
+    if is_part and headers.keys() != {"time"}:
+        return
+    unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
+    renaming = RENAMING if unread else ""
+    command = next((title for name, title in unread.items() if name.casefold() == COMMAND), None)
+    if not found and command and not axis:
+        yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
+        return
+    if not found:
+        yield _no_commands(kinds, unread, others, renaming)
+    yield from _no_motion(headers, layout, axis, renaming)
+
+
+def _no_motion(headers: Mapping[str, str], layout: Layout, axis: Axis | None, renaming: str) -> Iterator[str]:
+    """Yield the line about a log without a column of the motion along an axis, nor one of the pressure."""
+    axes = [axis] if axis else [form.axis for form in layout.axes]
+    wanted = {name: quantity for name, quantity in motion_columns(axis).items() if quantity.axis in axes}
+    if not headers.keys() & {*wanted, "pressure"}:
+        titles = " or ".join(f"'{name} [{quantity.unit}]'" for name, quantity in wanted.items())
+        yield f"column {titles} is missing{renaming}"
+
+
+def _no_commands(
+    kinds: Sequence[Mapping[str, Column]], unread: Mapping[str, str], others: Sequence[str], renaming: str
+) -> str:
+    """Return the line about a log without a column of commands, with the headers that may be meant."""
+    wanted = " or ".join(", ".join(columns) for columns in kinds if columns)
+    known = [name for columns in kinds for name in columns]
+    near = dict.fromkeys(unread[name] for column in known for name in similar(column, unread))
+    near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
+    hint = f"; is it the column {' or '.join(near)}?" if near else ""
+    hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
+    return f"there is no column of commands. Possible columns: {wanted}, each in [%], [1] or [us]{hint or renaming}"
+
+
+def _no_axis_in_name(path: Path, layout: Layout) -> str:
+    """Explain that the name of a file does not contain an axis of the vehicle."""
+    axes, word = [*layout.kinds], path.stem.lower().partition("_")[2].partition("_")[0]
+    names = " or ".join(f"log_{name}*{path.suffix}" for name in axes)
+    hint = did_you_mean(word, axes)
+    return f"{word or repr('')} is not an axis of this vehicle: the name of the file must be {names}{hint}"
+
+
+# ---- Rows ------------------------------------------------------------------------------------------------------------
+
+
+def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], commanding: Sequence[str]) -> None:
+    """Add the rows with a time and commands between the restarts of the clock, and what was left out or sorted.
+
+    Raises DataFileError.
+    """
+    timed = np.isfinite(columns["time"])
+    rows = np.flatnonzero(np.all([np.isfinite(columns[name]) for name in ("time", *commanding)], axis=0))
+    if not rows.size:
+        unread = (text["time"] for text in table.rows()) if table.unread["time"] else ()
+        quoted = next((f": {shown(text)} is no time in {table.headers['time']}" for text in unread if text), "")
+        what = "both a time and a command" if commanding else "a time"
+        raise DataFileError(f"{table.path}: no row has {what}{quoted}")
+    late: list[int] = []
+    merged, since = rows.size, 0.0
+    for own in np.split(rows, restart_rows(columns["time"][rows])):
+        times = columns["time"][own]
+        late += own[times < np.maximum.accumulate(times)].tolist()
+        # One column after the other, because a log may be as large as the memory allows.
+        fields = {name: ascending(times, values[own])[1] for name, values in columns.items()}
+        time = fields.pop("time")
+        content.pieces.append(Piece([Topic(Source(""), time, fields)], since=since))
+        merged -= len(time)
+        since += float(time[-1] - time[0])
+    if len(late) > _MOST_UNORDERED * rows.size:
+        reason = "the time goes back and does not return. Are there two logs in one file?"
+        raise table.error(late[0], "time", reason)
+    content.count("rows sorted", len(late))
+    content.count("time stamps merged", merged)
+    content.count("rows without time", int((~timed).sum()))
+    content.count("rows without command", int(timed.sum()) - rows.size)
+
+
+def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> None:
+    """Add what the cells tell: too many in a row, no numbers, and no pulses."""
+    content.count("torn rows", table.torn)
+    for name, count in table.unread.items():
+        if name not in ("time", *commanding):
+            content.count("unread cells", count, column=name)
+    for name in (name for name in commanding if table.units[name] in PULSES):
+        count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
+        content.count("no pulse", count, column=name)
+
+
+def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
+    """Return the finding about times whose unit is probably another one than their header says, or None."""
+    intervals = np.abs(np.diff(time[np.isfinite(time)]))
+    usual = float(np.median(intervals)) if len(intervals) else 0.0
+    if usual <= 1.0 / _SLOW and (usual == 0.0 or usual >= _SHORTEST):
+        return None
+    names = {"column": table.headers["time"], "rate": f"{1.0 / usual:.3g}"}
+    return Finding("unlikely rate", file=table.path.name, names=names)
+
+
+# ---- Variables of MATLAB ---------------------------------------------------------------------------------------------
+
+
+def open_matlab(path: Path) -> Callable[[], TextIO]:
+    """Return a function that opens the numeric variables of a .mat file as the lines of a CSV file: all vectors as long
+    as the time.
+
+    Fields of structures have the names of both, such as `log.depth`. Raises DataFileError.
+    """
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except NotImplementedError:
+        reason = "is a .mat file of version 7.3 (HDF5), which SciPy does not read: save it with -v7"
+        raise DataFileError(f"{path}: {reason}") from None
+    vectors = dict(_vectors("", content))
+    lengths = Counter(len(values) for values in vectors.values())
+    time = next((name for name in vectors if name.rpartition(".")[2].casefold() in _TIME_NAMES), None)
+    if not lengths:
+        raise DataFileError(f"{path}: has no vectors of numbers")
+    length = len(vectors[time]) if time else lengths.most_common(1)[0][0]
+    columns = {name: values for name, values in vectors.items() if len(values) == length}
+    lines = StringIO()
+    np.savetxt(lines, np.column_stack([*columns.values()]), "%.17g", ";", header=";".join(columns), comments="")
+    return partial(StringIO, lines.getvalue())
+
+
+_TIME_NAMES = ("time", "t", "timestamp", "tout")
+
+
+def _vectors(place: str, value: Any) -> Iterator[tuple[str, Array]]:
+    """Yield the vectors of numbers in the variables of a .mat file, with their names."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        if value.ndim == 1 and len(value) > 1:
+            yield place, value.astype(float)
+        elif value.ndim == 2 and value.size:
+            columns = value.T if value.shape[0] >= value.shape[1] else value
+            yield from ((f"{place}({n})", column.astype(float)) for n, column in enumerate(columns, start=1))
+        return
+    fields = value if isinstance(value, dict) else {n: getattr(value, n) for n in getattr(value, "_fieldnames", ())}
+    for name, inner in fields.items():
+        if not name.startswith("__"):
+            yield from _vectors(f"{place}.{name}" if place else name, inner)

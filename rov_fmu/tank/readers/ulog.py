@@ -1,0 +1,70 @@
+"""Read logs of PX4 (.ulg) with pyulog.
+
+The catalogue says which topics are read and what they measure. Times are those of the sample, where a message has one,
+and otherwise of the message. Where a flag says that the filter does not know a number, it is NaN.
+"""
+
+from collections import Counter
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rov_fmu.tank.catalogue import is_known
+from rov_fmu.tank.channels import Topic
+from rov_fmu.tank.clocks import ascending
+from rov_fmu.tank.commands import Parameters
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Source
+from rov_fmu.tank.readers.content import Content, Piece, described
+
+_FRAMES = {1: "ned", 3: "frd"}
+"""The numbers of the frames of vehicle_odometry; others are not usable."""
+_VALID = {"x": "xy_valid", "y": "xy_valid", "z": "z_valid", "vx": "v_xy_valid", "vy": "v_xy_valid", "vz": "v_z_valid"}
+"""The flags of vehicle_local_position."""
+
+
+def read_ulog(path: Path, named: Collection[str]) -> Content:
+    """Read the topics that the catalogue knows, and those in `named`."""
+    from pyulog import ULog
+
+    with path.open("rb") as file:
+        log = ULog(file)
+    names = Counter(data.name for data in log.data_list)
+    topics = [_topic(data, names[data.name] > 1) for data in log.data_list if "timestamp" in data.data]
+    read = [topic for topic in topics if is_known(topic.source.kind) or topic.source.topic in named]
+    unread = described(topic for topic in topics if topic not in read)
+    content = Content(path.name, [Piece(read, _parameters(log))], is_damaged=log.file_corruption, unread=unread)
+    if log.dropouts:
+        numbers = {"count": len(log.dropouts), "longest": max(dropout.duration for dropout in log.dropouts) / 1000.0}
+        content.findings.append(Finding("dropouts", file=path.name, numbers=numbers))
+    return content
+
+
+def _parameters(log: Any) -> Parameters:
+    values = {name: [(0.0, value)] for name, value in log.initial_parameters.items()}
+    for stamp, name, value in log.changed_parameters:
+        values.setdefault(name, []).append((stamp * 1e-6, value))
+    return Parameters.of_pairs(values)
+
+
+def _topic(data: Any, several: bool) -> Topic:
+    """Return a topic; the name of every instance but the first ends with its number."""
+    columns = {key: values.astype(float) for key, values in data.data.items()}
+    sampled = columns.get("timestamp_sample", columns["timestamp"])
+    stamp = np.where(sampled > 0.0, sampled, columns["timestamp"]) * 1e-6
+    names = [key for key in columns if not key.startswith("timestamp")]
+    time, *ordered = ascending(stamp, *(columns[key] for key in names))
+    fields = dict(zip(names, ordered, strict=True))
+    fields |= {
+        key: np.where(fields[flag] > 0.0, fields[key], np.nan)
+        for key, flag in _VALID.items()
+        if {key, flag} <= fields.keys()
+    }
+    frames = ("ned", _FRAMES.get(int(np.median(fields.get("velocity_frame", np.ones(1)))), ""))
+    if data.name == "vehicle_odometry" and not frames[1]:
+        fields = {key: values for key, values in fields.items() if not key.startswith("velocity")}
+    name = f"{data.name}_{data.multi_id}" if data.multi_id else data.name
+    part = f"instance {data.multi_id}" if several else ""
+    return Topic(Source(name, data.name, part=part, frames=frames), time, fields)

@@ -1,0 +1,129 @@
+"""Files of the earlier state 8d6b1e9 load unchanged. README.md has the rule."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rov_fmu
+from rov_fmu.cli import main
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.io.messages import FileError
+from tests.commands import ROOT
+
+HERE = Path(__file__).parent
+_EXPECTED = HERE / "expected.json"
+CHANGED: dict[str, tuple[str, str]] = {}
+"""The files that no longer load, with the key that the changelog names and the new line that the message shows."""
+
+
+def _vehicle(path: Path) -> Any:
+    vehicle = rov_fmu.load(path)
+    layout, uncertainty = vehicle.layout, vehicle.uncertainty
+    return {
+        "coefficients": dict(vehicle.rov.coefficients),
+        "inputs": [*layout.inputs],
+        "states": [*layout.state],
+        "errors": dict(zip(uncertainty.names, map(float, uncertainty.errors), strict=True)) if uncertainty else {},
+    }
+
+
+def _tank_tests(path: Path) -> Any:
+    tests = load_tank_tests(path.parent)
+    tables = {"thrust": tests.thrust, "steady": tests.steady, "time constants": tests.time_constants}
+    return {
+        **{
+            name: {subject: [[row.command, row.value] for row in rows] for subject, rows in table.items()}
+            for name, table in tables.items()
+        },
+        "recordings": {
+            f"{recording.file} {axis} {recording.quantity}": [
+                len(recording.time),
+                float(recording.time[-1]),
+                float(np.nansum(recording.values)),
+                float(sum(np.abs(command).sum() for command in recording.thrusters.values())),
+                float(np.abs(recording.command).sum()) if recording.command is not None else None,
+            ]
+            for axis, recordings in tests.recordings.items()
+            for recording in recordings
+        },
+    }
+
+
+def _plan(path: Path) -> Any:
+    from rov_fmu.study.plan.plan import load_plan
+
+    return load_plan(path).model_dump(mode="json", exclude={"vehicle_file", "fmu_file"})
+
+
+def _study(path: Path) -> Any:
+    from rov_fmu.study import Results
+
+    results = Results(path.parent)
+    frames = {"runs": results.runs.reset_index(), "trajectories": results.trajectories()}
+    own = {"title": results.title, "planned": results.planned, "figures": [*results.figures], "units": results.units}
+    return own | {name: {"columns": [*frame], "rows": frame.values.tolist()} for name, frame in frames.items()}
+
+
+KINDS: dict[str, Callable[[Path], Any]] = {
+    "vehicles/*/*.toml": _vehicle,
+    "tank_tests/*/rov.toml": _tank_tests,
+    "plans/*.toml": _plan,
+    "studies/*/study.json": _study,
+}
+"""How the files of each pattern are loaded."""
+FILES = {path.relative_to(HERE).as_posix(): load for pattern, load in KINDS.items() for path in HERE.glob(pattern)}
+
+
+@pytest.mark.parametrize("file", sorted(FILES))
+def test_a_file_loads_unchanged(file: str) -> None:
+    if FILES[file] in (_plan, _study):
+        pytest.importorskip("dask")
+    if file in CHANGED:
+        key, line = CHANGED[file]
+        with pytest.raises(FileError) as error:
+            FILES[file](HERE / file)
+        assert line in str(error.value)
+        assert f"`{key}`" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+        return
+    _check(json.loads(_EXPECTED.read_text(encoding="utf-8"))[file], json.loads(json.dumps(FILES[file](HERE / file))))
+
+
+def _check(expected: Any, loaded: Any, at: str = "") -> None:
+    """Check that everything expected is there. Dictionaries may have new keys."""
+    if isinstance(expected, dict):
+        assert expected.keys() <= loaded.keys(), at
+        for key, value in expected.items():
+            _check(value, loaded[key], f"{at}.{key}")
+    elif isinstance(expected, list):
+        assert len(loaded) == len(expected), at
+        for n, value in enumerate(expected):
+            _check(value, loaded[n], f"{at}[{n}]")
+    elif isinstance(expected, float):
+        assert loaded == pytest.approx(expected, rel=1e-12, nan_ok=True), at
+    else:
+        assert loaded == expected, at
+
+
+def test_every_file_is_loaded() -> None:
+    expected = json.loads(_EXPECTED.read_text(encoding="utf-8"))
+    assert {*expected} == {*FILES}
+    assert {path.relative_to(HERE).parts[0] for path in HERE.rglob("*.toml")} == {"vehicles", "tank_tests", "plans"}
+
+
+@pytest.mark.parametrize("file", ["plans/commands.csv", "csv/manoeuvre.csv"])
+def test_a_table_of_commands_is_simulated(file: str, tmp_path: Path) -> None:
+    output = tmp_path / "motion.csv"
+    assert main(["simulate", "videoray", "--input", str(HERE / file), "--stop", "1", "-o", str(output)]) == 0
+    assert output.read_text(encoding="utf-8").count("\n") > 10
+
+
+def test_a_table_of_points_is_fitted(tmp_path: Path) -> None:
+    output = tmp_path / "tuned.toml"
+    points = str(HERE / "csv" / "points.csv")
+    vehicle = str(HERE / "vehicles" / "of_docs" / "vehicle.toml")
+    assert main(["tune", vehicle, "--axis", "surge", "--points", points, "-o", str(output)]) == 0
+    assert output.exists()

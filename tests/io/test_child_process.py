@@ -1,0 +1,133 @@
+"""An object in a process of its own (rov_fmu.io.child_process.py)."""
+
+import os
+import signal
+import sys
+import tempfile
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, Limits, call_in_child
+
+
+class Counter:
+    """An object that counts, fails, hangs, or ends its process."""
+
+    def __init__(self, start: int) -> None:
+        if start < 0:
+            raise ValueError("must not be negative")
+        print("started")  # would damage the messages if it were not dropped
+        self.n = start
+
+    def add(self, a: int, b: int = 1) -> int:
+        print("adding")
+        self.n += a * b
+        return self.n
+
+    def fail(self, text: str) -> None:
+        raise LookupError(text)
+
+    def hang(self) -> None:
+        time.sleep(60.0)
+
+    def end(self, code: int) -> None:
+        os._exit(code)
+
+    def kill(self) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def leave_a_file(self) -> None:
+        Path(os.environ["TMPDIR"], "left").touch()
+
+    def pid(self) -> int:
+        return os.getpid()
+
+
+def test_methods_return_and_raise_as_in_this_process_and_the_object_remembers() -> None:
+    child = ChildProcess(Counter, 2, limits=Limits(time=60.0))
+    try:
+        assert child.call("pid") != os.getpid()
+        assert (child.call("add", 3), child.call("add", 2, 10)) == (5, 25)
+        with pytest.raises(LookupError, match="not here"):
+            child.call("fail", "not here")
+        assert child.call("add", 0) == 25
+    finally:
+        child.close()
+
+
+def test_what_the_object_raises_as_it_is_made_is_raised() -> None:
+    with pytest.raises(ValueError, match="must not be negative"):
+        ChildProcess(Counter, -1)
+
+
+@pytest.mark.parametrize(
+    ("method", "arguments", "cause"),
+    [("end", (3,), "exit code 3"), ("end", (0,), "exit code 0"), ("kill", (), "SIGKILL")],
+)
+def test_the_end_of_the_process_is_told_with_its_cause(method: str, arguments: tuple[int, ...], cause: str) -> None:
+    child = ChildProcess(Counter, 0)
+    with pytest.raises(ChildError, match=f"^ended its process: {cause}$"):
+        child.call(method, *arguments)
+
+
+def test_a_call_beyond_its_time_limit_ends_the_process() -> None:
+    child = ChildProcess(Counter, 0, limits=Limits(time=0.3))
+    pid, began = child.call("pid"), time.monotonic()
+    with pytest.raises(ChildError, match=r"^needs more than 0\.3 s$"):
+        child.call("hang")
+    assert 0.3 <= time.monotonic() - began < 5.0
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def _write(size: int, path: str) -> None:
+    Path(path).write_bytes(bytes(size))
+
+
+def _opaque() -> None:
+    class OpaqueError(Exception):
+        """An exception that pickle cannot send, since its class is local."""
+
+    raise OpaqueError("the reason")
+
+
+def _swallowed() -> None:
+    try:
+        bytes(10**12)
+    except MemoryError as error:
+        raise ValueError("a parser hides the cause") from error
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory and files")
+def test_a_call_beyond_its_memory_or_disk_is_ended_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    limits = Limits(time=60.0, memory=500_000_000, disk=1_000_000)
+    with closing(ChildProcess(Functions, limits=limits)) as child:
+        assert Path(child.call("call", os.getenv, "TMPDIR")).parent == tmp_path
+        assert child.call("call", len, bytes(10**7)) == 10**7
+    for function, arguments, reason in (
+        (bytes, (10**9,), r"needs more than 0\.5 GB of memory"),
+        (_swallowed, (), r"needs more than 0\.5 GB of memory"),
+        (_write, (2_000_000, str(tmp_path / "large")), r"needs more than 0\.001 GB of disk space"),
+    ):
+        with pytest.raises(ChildError, match=f"^{reason}$"):
+            call_in_child(function, *arguments, limits=limits)
+    assert [file.name for file in tmp_path.iterdir()] == ["large"]
+    with pytest.raises(RuntimeError, match=r"^OpaqueError: the reason$"):
+        call_in_child(_opaque, limits=limits)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the process is killed with a signal of POSIX")
+def test_temporary_files_of_a_killed_process_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    child = ChildProcess(Counter, 0)
+    child.call("leave_a_file")
+    assert [*tmp_path.rglob("left")]
+    with pytest.raises(ChildError, match="SIGKILL"):
+        child.call("kill")
+    assert not [*tmp_path.iterdir()]

@@ -1,0 +1,250 @@
+"""Bags of ROS 1 and ROS 2, which the tests write with rosbags."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.columns import names_of
+from rov_fmu.tank.description import RovTables
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.readers.bags import _RC_OUT
+from tests.tank.logs import Read, read_log
+from tests.tank.readers import motion
+from tests.tank.readers.motion import BLUEROV2, TIME
+
+START = 1_700_000_000.0  # s since 1970
+LATE = 0.03  # s, from the header to the arrival
+ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+FLU = np.diag([1.0, -1.0, -1.0])
+Messages = Iterable[tuple[str, float, Any]]
+
+
+class Ros:
+    """Makes and writes messages of one version of ROS."""
+
+    def __init__(self, version: int) -> None:
+        self.version = version
+        self.store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+        self.store.register(get_types_from_msg(_RC_OUT, "mavros_msgs/msg/RCOut"))
+
+    def message(self, kind: str, **fields: Any) -> Any:
+        """Make a message; fields that are not given are zero."""
+        return self.store.types[kind](**{name: fields.get(name, self._zero(*form)) for name, form in self._form(kind)})
+
+    def _form(self, kind: str) -> Any:
+        return [(name, form) for name, form in self.store.fielddefs[kind][1]]
+
+    def _zero(self, form: Any, what: Any) -> Any:
+        if form.name == "BASE":
+            return "" if what[0] == "string" else 0
+        if form.name == "NAME":
+            return self.message(what)
+        count = what[1] if form.name == "ARRAY" else 0
+        return (
+            np.zeros(count)
+            if what[0][1][0] == "float64"
+            else np.zeros(count, what[0][1][0])
+            if what[0][0].name == "BASE"
+            else []
+        )
+
+    def header(self, time: float, frame: str = "") -> Any:
+        nanoseconds = round((START + time) * 1e9)
+        stamp = self.message("builtin_interfaces/msg/Time", sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+        return self.message("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
+
+    def vector(self, kind: str, values: Iterable[float]) -> Any:
+        return self.message(f"geometry_msgs/msg/{kind}", **dict(zip("xyz", map(float, values), strict=True)))
+
+    def quaternion(self, R: Any) -> Any:
+        return self.message("geometry_msgs/msg/Quaternion", **dict(zip("wxyz", motion.quaternion(R), strict=True)))
+
+    def write(self, folder: Path, messages: Messages, suffix: str = ".db3") -> Path:
+        """Write a bag, and return the path of its file."""
+        found = sorted(messages, key=lambda entry: entry[1])
+        path = folder / "dive.bag" if self.version == 1 else folder / "dive"
+        plugin = StoragePlugin.MCAP if suffix == ".mcap" else StoragePlugin.SQLITE3
+        with Writer1(path) if self.version == 1 else Writer2(path, version=9, storage_plugin=plugin) as writer:
+            connections: dict[str, Any] = {}
+            for topic, time, message in found:
+                kind = message.__msgtype__
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=self.store)
+                pack = self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr
+                writer.write(connections[topic], round((START + time + LATE) * 1e9), pack(message, kind))
+        return path if self.version == 1 else next(path.glob(f"*{suffix}"))
+
+
+def pulses(ros: Ros, n: int) -> Any:
+    channels = np.array([round(1500 + 400 * c[n]) for c in motion.THRUSTERS.values()] + [0] * 10, np.uint16)
+    return ros.message("mavros_msgs/msg/RCOut", header=ros.header(TIME[n]), channels=channels)
+
+
+def array(ros: Ros, n: int) -> Any:
+    return ros.message("std_msgs/msg/Float64MultiArray", data=np.array([c[n] for c in motion.THRUSTERS.values()]))
+
+
+def dive(ros: Ros, *, ned: bool = False, commands: Callable[[Ros, int], Any] | None = pulses) -> Messages:
+    """Yield the messages of a dive, in the frames of REP 103 or in those of the sea."""
+    earth, body = (np.eye(3), np.eye(3)) if ned else (ENU, FLU)
+    for n, (time, R) in enumerate(zip(TIME, motion.rotations(), strict=True)):
+        place = earth @ [motion.NORTH[n], motion.EAST[n], motion.DEPTH[n]]
+        attitude = ros.quaternion(earth @ R @ body)
+        pose = ros.message("geometry_msgs/msg/Pose", position=ros.vector("Point", place), orientation=attitude)
+        linear = ros.vector("Vector3", body @ [motion.U[n], motion.V[n], motion.W[n]])
+        twist = ros.message("geometry_msgs/msg/Twist", linear=linear)
+        yield (
+            "/odom",
+            time,
+            ros.message(
+                "nav_msgs/msg/Odometry",
+                header=ros.header(time, "world_ned" if ned else "world"),
+                child_frame_id="rov/base_link",
+                pose=ros.message("geometry_msgs/msg/PoseWithCovariance", pose=pose),
+                twist=ros.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
+            ),
+        )
+        if commands:
+            yield "/thrusters", time, commands(ros, n)
+        if n % 10 == 0 or n == len(TIME) - 1:
+            yield (
+                "/battery",
+                time,
+                ros.message("sensor_msgs/msg/BatteryState", header=ros.header(time), voltage=motion.VOLTAGE[n]),
+            )
+
+
+def told(log: Read) -> tuple[str, ...]:
+    return sentences(log.findings, SENTENCES)
+
+
+@pytest.mark.parametrize(("version", "suffix"), [(1, ".bag"), (2, ".db3"), (2, ".mcap")])
+def test_a_bag_is_read_in_si_units_and_in_the_frames_of_the_sea(version: int, suffix: str, tmp_path: Path) -> None:
+    ros = Ros(version)
+    log = read_log(ros.write(tmp_path, dive(ros), suffix), BLUEROV2)
+    motion.check(log)
+    file = log.recordings[0].file
+    assert told(log) == (
+        f"{file}: the commands of the thrusters are those of /thrusters",
+        f"{file}: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
+        "push ahead above its neutral pulse",
+    )
+
+
+def test_frames_named_ned_are_taken_as_they_are(tmp_path: Path) -> None:
+    ros = Ros(2)
+    motion.check(read_log(ros.write(tmp_path, dive(ros, ned=True)), BLUEROV2))
+
+
+def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path) -> None:
+    ros = Ros(2)
+    path = ros.write(tmp_path, dive(ros, commands=array))
+    log = read_log(path, BLUEROV2)
+    assert f"{path.name}: 100 messages of /thrusters without a time in the header: the time of arrival is used" in (
+        told(log)
+    )
+    (heave,) = (recording for recording in log.recordings if recording.axis.name == "heave")
+    (step,) = np.flatnonzero(np.diff(heave.thrusters["5"]))
+    first = heave.time[np.isfinite(heave.values)][0]
+    assert heave.time[step + 1] - first == pytest.approx(TIME[10] + LATE - TIME[1], abs=1e-6)
+
+
+def test_arrivals_are_moved_to_the_clock_of_the_headers(tmp_path: Path) -> None:
+    """A simulator stamps its messages from 0, and the commands have only their arrival."""
+    ros = Ros(2)
+    messages = []
+    for topic, time, message in dive(ros, commands=array):
+        if hasattr(message, "header"):
+            message.header.stamp.sec -= round(START)
+        messages.append((topic, time, message))
+    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
+    motion.check(log)
+
+
+def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> None:
+    """The topics count from 0; the IMU measures the attitude, and the pressure is not needed."""
+    ros = Ros(2)
+    messages: list[tuple[str, float, Any]] = []
+    for n, (time, R) in enumerate(zip(TIME, motion.rotations(), strict=True)):
+        number = ros.store.types["std_msgs/msg/Float64"]
+        pulse = 1500.0 + 400.0 * np.array([*motion.THRUSTERS.values()])[:, n]
+        messages += [(f"/rov/thruster{k}/input", time, number(data=float(value))) for k, value in enumerate(pulse)]
+        messages += [("/bar30/depth", time, number(data=float(motion.DEPTH[n])))]
+        header = ros.header(time, "imu_link")
+        imu = ros.message("sensor_msgs/msg/Imu", header=header, orientation=ros.quaternion(ENU @ R @ FLU))
+        pressure = ros.message("sensor_msgs/msg/FluidPressure", header=header, fluid_pressure=2e5)
+        battery = ros.message("sensor_msgs/msg/BatteryState", header=header, voltage=motion.VOLTAGE[n])
+        messages += [("/imu", time - LATE, imu), ("/pressure", time, pressure), ("/battery", time - LATE, battery)]
+    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
+    assert [recording.axis.name for recording in log.recordings] == ["heave", "yaw"]
+    (heave, yaw) = log.recordings
+    assert heave.values[np.isfinite(heave.values)] == pytest.approx(motion.DEPTH)
+    assert heave.thrusters["6"][np.isfinite(heave.values)] == pytest.approx(motion.THRUSTERS["6"])
+    assert np.nanmax(np.abs(yaw.values - np.interp(yaw.time, TIME - LATE, motion.HEADING))) < 0.02
+    assert heave.context["pitch"].min() == pytest.approx(-0.2, abs=1e-3)
+
+
+def test_depth_by_pressure(tmp_path: Path) -> None:
+    ros = Ros(2)
+    messages = [(topic, time, message) for topic, time, message in dive(ros) if topic != "/odom"]
+    for n, time in enumerate(TIME):
+        pressure = 101325.0 + 9806.65 * motion.DEPTH[n]
+        header = ros.header(time)
+        messages += [("/p", time, ros.message("sensor_msgs/msg/FluidPressure", header=header, fluid_pressure=pressure))]
+    (heave,) = (log := read_log(ros.write(tmp_path, messages), BLUEROV2)).recordings
+    assert heave.values == pytest.approx(motion.DEPTH)
+    assert any("fresh water" in line for line in told(log))
+
+
+def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
+    """A driver publishes percent, and an altitude in cm that is negative below the surface."""
+    ros = Ros(2)
+    commands = [[100.0 * c[n] for c in motion.THRUSTERS.values()] for n in range(len(TIME))]
+    messages: list[tuple[str, float, Any]] = []
+    for n, time in enumerate(TIME):
+        messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=np.array(commands[n])))]
+        messages += [("/alt", time, ros.vector("Vector3", [0.0, 0.0, -100.0 * motion.DEPTH[n]]))]
+    path = ros.write(tmp_path, messages)
+    with pytest.raises(DataFileError, match="no commands of thrusters were found"):
+        read_log(path, BLUEROV2)
+    table = {f"/out.data[{n}]": f"u_{n + 1} [%]" for n in range(6)} | {"/alt.z": "-depth [cm]"}
+    names, mistakes = names_of(BLUEROV2, RovTables(topics=table))
+    assert not mistakes
+    log = read_log(path, BLUEROV2, names=names)
+    (heave,) = log.recordings
+    assert heave.values == pytest.approx(motion.DEPTH)
+    assert heave.thrusters["2"] == pytest.approx(motion.THRUSTERS["2"])
+    assert log.logs[0].names >= table.keys()
+
+
+def test_outputs_of_an_unknown_unit_are_refused(tmp_path: Path) -> None:
+    ros = Ros(2)
+    newton = ros.message("std_msgs/msg/Float64MultiArray", data=np.full(6, 35.0))
+    path = ros.write(tmp_path, [*dive(ros, commands=None), ("/thrusters", 0.0, newton)])
+    with pytest.raises(DataFileError) as error:
+        read_log(path, BLUEROV2)
+    assert str(error.value) == (
+        f"{path}, '/thrusters': outputs between 35 and 35 are neither fractions within -1 ... 1 nor pulses in us: name "
+        "their unit in the table [topics] of rov.toml"
+    )
+
+
+@pytest.mark.parametrize(("version", "suffix"), [(1, ".bag"), (2, ".db3"), (2, ".mcap")])
+@pytest.mark.parametrize("kept", [0, 100, -300])
+def test_a_bag_that_is_cut_short_is_one_line(version: int, suffix: str, kept: int, tmp_path: Path) -> None:
+    ros = Ros(version)
+    path = ros.write(tmp_path, dive(ros), suffix)
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(DataFileError) as error:
+        read_log(path, BLUEROV2)
+    assert str(error.value).startswith(f"{path}: {'begins as a' if kept else 'the file is empty'}")
+    assert not kept or "damaged or was cut short, and cannot be read" in str(error.value)
+    assert len(str(error.value).splitlines()) == 1

@@ -1,0 +1,114 @@
+"""Clocks that restart, and times in every unit."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.columns import Names, names_of, seconds
+from rov_fmu.tank.description import RovTables
+from rov_fmu.tank.read_log import read_logs
+from tests.tank.logs import read_log
+from tests.tank.readers import motion, test_mavlink
+from tests.tank.readers.motion import BLUEROV2, TIME
+from tests.tank.readers.test_bags import START, Ros, pulses
+from tests.tank.readers.test_mavlink import BOOT, N, tlog
+
+
+def test_two_boots_in_a_telemetry_log_are_two_logs(tmp_path: Path) -> None:
+    """The second boot begins 60 s later, at a time since boot that occurs in the first one."""
+    path = tlog(tmp_path / "a.tlog", test_mavlink.dive(20.0))
+    again = tlog(tmp_path / "b.tlog", test_mavlink.dive(18.0)).read_bytes()
+    first, later = struct.pack(">Q", round((BOOT + 18.05) * 1e6))[:3], b""
+    assert again.startswith(first)
+    with path.open("ab") as file:
+        position = 0
+        while position < len(again):  # a time of arrival of 8 bytes, and a message of MAVLink 2
+            (arrival,) = struct.unpack(">Q", again[position : position + 8])
+            length = 12 + again[position + 9]
+            later += struct.pack(">Q", arrival + 60_000_000) + again[position + 8 : position + 8 + length]
+            position += 8 + length
+        file.write(later)
+    log = read_log(path, BLUEROV2)
+    assert [one.file for one in log.logs] == ["a.tlog", "a.tlog (from 58 s)"]
+    assert [finding.names for finding in log.findings if finding.kind == "clock restarts"] == [{"at": "58"}]
+    one, other = log.recordings
+    assert one.values[np.isfinite(one.values)] == pytest.approx(other.values[np.isfinite(other.values)])
+    assert np.isfinite(one.values).sum() == N
+
+
+def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
+    """The clock in the headers restarts at 5 s, and the arrivals go on."""
+    ros, messages = Ros(2), []
+    for n, time in enumerate(TIME):
+        simulated = time if time < 4.95 else time - 5.0
+        header = ros.header(simulated - START + 100.0)
+        outputs = pulses(ros, n)
+        outputs.header = header
+        place = ros.vector("Point", [0.0, 0.0, -motion.DEPTH[n]])
+        pose = ros.message("geometry_msgs/msg/Pose", position=place)
+        messages += [("/rc/out", time, outputs)]
+        messages += [("/pose", time, ros.message("geometry_msgs/msg/PoseStamped", header=header, pose=pose))]
+    logs = read_logs(ros.write(tmp_path, messages), BLUEROV2, Names())
+    assert [one.file for one in logs] == ["dive.db3", "dive.db3 (from 5 s)"]
+    for log, part in zip(logs, (TIME < 4.95, TIME >= 4.95), strict=True):
+        depth = log.used("depth")
+        assert depth is not None
+        assert depth.values == pytest.approx(motion.DEPTH[part])
+        assert log.commands is not None
+        assert log.commands.at(log.commands.rows)[:, 5] == pytest.approx(motion.THRUSTERS["6"][part], abs=2e-3)
+
+
+def csv(folder: Path, header: str, times: list[str]) -> Path:
+    path = folder / "dive.csv"
+    rows = [f"{time},{30 * (n > 9)},{0.01 * n}" for n, time in enumerate(times)]
+    path.write_text("\n".join([f"{header},u_5 [%],depth [m]", *rows]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "times"),
+    [
+        ("time [us]", [f"{123_000_000 + 200_000 * n}" for n in range(N)]),
+        ("time [ns]", [f"{1_669_909_208_877_428_140 + 200_000_000 * n}" for n in range(N)]),
+        ("%time", [f"{1_669_909_208_877_428_140 + 200_000_000 * n}" for n in range(N)]),
+        ("time [s]", [f"2026-05-01T23:59:{50 + n // 5:02d}.{2 * (n % 5)}Z" for n in range(50)]),
+        ("stamp", [f"2026-05-01 10:00:{n // 5:02d},{200 * (n % 5):03d}000111+02:00" for n in range(N)]),
+    ],
+    ids=["microseconds", "nanoseconds", "rostopic echo -p", "ISO 8601", "ISO 8601 with an offset"],
+)
+def test_times_in_any_unit(header: str, times: list[str], tmp_path: Path) -> None:
+    if header == "stamp":  # decimal commas need another separator
+        times = [time.replace(",", ".") for time in times]
+    names, _ = names_of(BLUEROV2, RovTables(columns={"stamp": "time [s]"}))
+    (log,) = read_logs(csv(tmp_path, header, times), BLUEROV2, names)
+    assert log.commands is not None
+    assert np.diff(log.commands.rows) == pytest.approx(0.2 * np.ones(len(times) - 1), abs=1e-6)
+
+
+def test_iso_8601() -> None:
+    assert seconds("1970-01-01T00:00:01.5Z") == 1.5
+    assert seconds("1970-01-01 01:00:02+01:00") == 2.0
+    with pytest.raises(ValueError, match="should be a valid datetime"):
+        seconds("yesterday")
+
+
+@pytest.mark.parametrize(("unit", "rate"), [("s", "5e-06"), ("ns", "5e+03")])
+def test_an_unlikely_rate_is_told(unit: str, rate: str, tmp_path: Path) -> None:
+    path = csv(tmp_path, f"time [{unit}]", [f"{123_000_000 + 200_000 * n}" for n in range(N)])
+    if unit == "ns":  # 5 kHz is possible
+        assert read_log(path, BLUEROV2).recordings
+        return
+    with pytest.raises(DataFileError) as error:
+        read_log(path, BLUEROV2)
+    assert str(error.value) == (
+        f"{path}: the column time [s] gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
+    )
+
+
+def test_a_reboot_to_times_before_those_of_the_log_splits_it(tmp_path: Path) -> None:
+    times = [f"{300 + n / 5:.1f}" for n in range(50)] + [f"{n / 5:.1f}" for n in range(50)]
+    logs = read_log(csv(tmp_path, "time [s]", times), BLUEROV2).logs
+    assert [len(one.commands.rows) for one in logs if one.commands] == [50, 50]

@@ -1,0 +1,185 @@
+"""Logs that are damaged, or made to exhaust the machine: one line each, within the budget, and no file is left."""
+
+import random
+import sqlite3
+import struct
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from rov_fmu.io.child_process import Limits
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.inspection.inspection import inspect
+from rov_fmu.tank.readers import parsers
+from rov_fmu.tank.readers.content import Content
+from rov_fmu.tank.readers.parsers import budget, format_of, one_parser, read_parsed
+from tests.tank.logs import read_log
+from tests.tank.readers import test_bags, test_mavlink, test_ulog
+from tests.tank.readers.motion import BLUEROV2, TIME
+from tests.tank.readers.test_bags import Ros
+from tests.tank.readers.test_mavlink import att, ctun, dataflash, packed, rcou
+
+
+def read(path: Path) -> Content:
+    return read_parsed(path, format_of(path), ())
+
+
+def _ulog(path: Path, *formats: str, data: bytes = bytes(100)) -> Path:
+    """Write a ULog with these formats and one message of the first."""
+    name = formats[0].partition(":")[0].encode()
+    pieces = [(b"F", text.encode()) for text in formats]
+    pieces += [(b"A", struct.pack("<BH", 0, 0) + name), (b"D", struct.pack("<H", 0) + data)]
+    content = b"ULog\x01\x12\x35\x01" + bytes(8)
+    path.write_bytes(content + b"".join(struct.pack("<H", len(text)) + kind + text for kind, text in pieces))
+    return path
+
+
+def _nested_ulog(folder: Path) -> Path:
+    """Write a message of 65,535 structures of 65,535 structures."""
+    formats = ("a:uint64_t timestamp;b[65535] z;", "b:c[65535] y;", "c:uint8_t[65535] x;")
+    return _ulog(folder / "a.ulg", *formats)
+
+
+def _endless_database(folder: Path) -> Path:
+    """Write a bag whose definitions of messages are a view without an end, which SQLite sorts on the disk."""
+    path = Ros(2).write(folder, test_bags.dive(Ros(2)))
+    with sqlite3.connect(path) as bag:
+        bag.execute("DROP TABLE message_definitions")
+        bag.execute(
+            "CREATE VIEW message_definitions AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT "
+            "x AS id, 'a/msg/B' AS topic_type, 'ros2msg' AS encoding, 'uint8 a' AS encoded_message_definition, "
+            "'' AS type_description_hash FROM c"
+        )
+    bag.close()
+    return path
+
+
+def _compressed_zeros(folder: Path) -> Path:
+    """Write a bag with a message of 500 MB in 16 kB."""
+    ros = Ros(2)
+    unopened = Writer(folder / "zeros", version=9, storage_plugin=StoragePlugin.MCAP)
+    unopened.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    with unopened as writer:
+        kind = "std_msgs/msg/Float64MultiArray"
+        topic = writer.add_connection("/thruster", kind, typestore=ros.store)
+        writer.write(topic, 0, bytes(500_000_000))
+    return next((folder / "zeros").glob("*.mcap"))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory and disk")
+@pytest.mark.parametrize("write", [_nested_ulog, _endless_database, _compressed_zeros])
+def test_a_small_file_that_exhausts_the_machine_is_one_line(
+    write: Callable[[Path], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    path = write(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    monkeypatch.setattr(parsers, "_PARSER", parsers._Parser())  # which begins after the folder of its files has changed
+    monkeypatch.setattr(parsers, "budget", lambda _: Limits(10.0, 450_000_000, 20_000_000))
+    limits = r"needs more than (10 s|0\.45 GB of memory|0\.02 GB of disk space) to be read"
+    with pytest.raises(DataFileError, match=limits):
+        read(path)
+    good = Ros(2).write(tmp_path / "good", test_bags.dive(Ros(2)))
+    assert read(good).pieces
+    assert not [*temporary.iterdir()]
+
+
+def test_the_budget_of_a_large_log_grows_with_its_size(tmp_path: Path) -> None:
+    assert (budget(0).memory, budget(50_000_000).memory) == (10**9, 10**9)
+    assert budget(200_000_000) == Limits(time=430.0, memory=2_200_000_000, disk=10**9)
+    with one_parser():
+        path = dataflash(tmp_path / "a.bin", test_mavlink.turn())
+        assert len({id(parsers._PARSER._child) for _ in range(2) if read(path).pieces}) == 1
+
+
+def test_messages_without_a_time_or_an_output_are_no_traceback(tmp_path: Path) -> None:
+    time = struct.pack("<Q", 10**6)
+    for name, format_of_message, reason in (
+        ("none.ulg", "actuator_motors:float[12] control;", "no commands of thrusters"),
+        ("no_control.ulg", "actuator_motors:uint64_t timestamp;float other;", "no commands of thrusters"),
+        ("no_output.ulg", "actuator_outputs:uint64_t timestamp;uint32_t noutputs;", "no commands of thrusters"),
+        ("text.ulg", "actuator_motors:uint64_t timestamp;char[12] control;", "no commands of thrusters"),
+    ):
+        path = _ulog(tmp_path / name, format_of_message, data=time + bytes(200))
+        with pytest.raises(DataFileError, match=reason):
+            read_log(path, BLUEROV2)
+        assert all(one.path == path for one in inspect(path, [BLUEROV2]))
+
+
+@pytest.mark.parametrize("stamp", ["repeated", "huge", "in bursts"])
+def test_times_that_no_clock_shows_are_no_traceback(stamp: str, tmp_path: Path) -> None:
+    stamps = {"repeated": lambda n: 0 * n, "huge": lambda n: 2**62 * (n % 3), "in bursts": lambda n: 10**6 * (n // 10)}
+    messages = []
+    for n in range(60):
+        time = stamps[stamp](n) * 1e-6
+        pulse = 1500 + 200 * (n >= 10)
+        messages += [
+            rcou(time, pulse, 3000 - pulse, 3000 - pulse, pulse, 1500, 1500),
+            ctun(time, -0.1 * n),
+            att(time, n),
+        ]
+        messages += [packed("BAT", round(time * 1e6), 0, float("nan") if n % 2 else float("inf"))]
+    path = dataflash(tmp_path / "a.bin", messages)
+    assert all(np.isfinite(row.rate) for one in inspect(path, [BLUEROV2]) for row in one.channels)
+    with suppress(DataFileError):
+        read_log(path, BLUEROV2)
+
+
+# ---- Damaged files ---------------------------------------------------------------------------------------------------
+
+
+def _good(suffix: str, folder: Path) -> Path:
+    """Write a good log of a format."""
+    if suffix == ".tlog":
+        return test_mavlink.tlog(folder / "a.tlog", test_mavlink.dive())
+    if suffix == ".bin":
+        return dataflash(folder / "a.bin", test_mavlink.turn())
+    if suffix == ".ulg":
+        return test_ulog.dive().write(folder / "a.ulg")
+    ros = Ros(1 if suffix == ".bag" else 2)
+    return ros.write(folder, test_bags.dive(ros), suffix)
+
+
+def _damaged(content: bytes, count: int) -> Iterator[bytes]:
+    """Yield truncations, flipped bits, bytes of other values, and pieces that are missing or stand twice."""
+    for seed in range(count):
+        chance = random.Random(seed)
+        piece, start = bytearray(content), chance.randrange(len(content))
+        if seed % 4 == 0:
+            del piece[start:]
+        elif seed % 4 == 1:
+            end = start + chance.randrange(1, 100)
+            piece[start:end] = chance.choice((b"", content[start:end] * 2))
+        else:
+            # Most structure is at the start; a few bits in the rest.
+            for _ in range(chance.choice((1, 3, 30))):
+                place = chance.randrange(chance.choice((min(2000, len(piece)), len(piece))))
+                piece[place] = chance.choice((piece[place] ^ 1 << chance.randrange(8), 0, 255, chance.randrange(256)))
+        yield bytes(piece)
+
+
+@pytest.mark.parametrize("count", [10, pytest.param(2000, marks=pytest.mark.weekly)], ids=["a few", "many"])
+@pytest.mark.parametrize("suffix", [".bin", ".tlog", ".ulg", ".bag", ".db3", ".mcap"])
+def test_a_damaged_log_is_read_or_is_one_line(
+    suffix: str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert len(TIME) > 20
+    monkeypatch.setattr(parsers, "budget", lambda _: Limits(20.0, 700_000_000, 100_000_000))
+    path = _good(suffix, tmp_path)
+    content = path.read_bytes()
+    read = 0
+    for damaged in _damaged(content, count):
+        path.write_bytes(damaged)
+        for use in (lambda: read_log(path, BLUEROV2), lambda: inspect(path, [BLUEROV2])):
+            with suppress(DataFileError):
+                use()
+                read += 1
+    assert read

@@ -1,0 +1,372 @@
+"""Logs of ArduSub, which the tests write with pymavlink (.tlog) and in the DataFlash format (.bin)."""
+
+import struct
+import sys
+from collections.abc import Iterable
+from math import cos, pi, radians, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.model.layout import HEAVE, SWAY, Layout
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.readers import parsers
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.tank.logs import Read, read_log
+
+BOOT = 1_700_000_000.0  # s since 1970: when the vehicle began to count
+LATE = 0.05  # s, from the vehicle to the ground station
+N = 60
+
+
+@pytest.fixture(scope="module")
+def bluerov2() -> Layout:
+    return load_vehicle(SHIPPED["bluerov2"]).rov.layout
+
+
+def pulse(command: float) -> int:
+    return round(1500.0 + 400.0 * command)
+
+
+def of_axis(log: Read, name: str) -> Recording:
+    (recording,) = (recording for recording in log.recordings if recording.axis.name == name)
+    return recording
+
+
+# ---- .tlog -----------------------------------------------------------------------------------------------------------
+
+
+def tlog(path: Path, messages: Iterable[tuple[float, Any]], system: int = 1) -> Path:
+    """Write messages with the times of their arrival: eight bytes, big-endian µs, then the message."""
+    writer = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
+    with path.open("ab") as file:
+        for time, message in messages:
+            file.write(struct.pack(">Q", round((BOOT + LATE + time) * 1e6)) + message.pack(writer))
+    return path
+
+
+def servos(time: float, *pulses: int, port: int = 0) -> tuple[float, Any]:
+    outputs = [*pulses, *[0] * (16 - len(pulses))]
+    stamp = round(time * 1e6) % 2**32
+    return time, mavlink.MAVLink_servo_output_raw_message(stamp, port, *outputs)
+
+
+def altitude(time: float, metres: float) -> tuple[float, Any]:
+    return time, mavlink.MAVLink_global_position_int_message(
+        round(time * 1e3), 0, 0, 0, round(metres * 1e3), 0, 0, 0, 0
+    )
+
+
+def attitude(time: float, yaw: float) -> tuple[float, Any]:
+    return time, mavlink.MAVLink_attitude_message(round(time * 1e3), 0.1, -0.2, yaw, 0.0, 0.0, 0.0)
+
+
+def battery(time: float, millivolts: int) -> tuple[float, Any]:
+    return time, mavlink.MAVLink_sys_status_message(0, 0, 0, 0, millivolts, -1, -1, *[0] * 6)
+
+
+def parameter(name: str, value: float) -> tuple[float, Any]:
+    return 1.0, mavlink.MAVLink_param_value_message(name.encode(), value, 9, 1, 0)
+
+
+def dive(start: float = 100.0) -> list[tuple[float, Any]]:
+    """Return messages of a dive: from 1 s on, the vertical thrusters push down and the depth grows at 0.2 m/s."""
+    found = []
+    for n in range(N):
+        time = start + 0.1 * n
+        down = pulse(0.5) if n >= 10 else 1500
+        found += [servos(time, 1500, 1500, 1500, 1500, down, down)]
+        found += [altitude(time + 0.03, -1.0 - 0.02 * max(n - 10, 0)), attitude(time + 0.05, 1.0)]
+    return found
+
+
+def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> None:
+    log = read_log(tlog(tmp_path / "Dive.TLOG", dive()), bluerov2)
+    (recording,) = log.recordings
+    assert (recording.axis, recording.quantity, recording.file) == (HEAVE, "depth", "Dive.TLOG")
+    there = np.isfinite(recording.values)
+    assert recording.values[there] == pytest.approx([1.0 + 0.02 * max(n - 10, 0) for n in range(N)])
+    assert recording.time[there] == pytest.approx(0.1 * np.arange(N) + 0.03, abs=2e-3)
+    assert recording.command is not None
+    assert recording.command == pytest.approx(np.where(recording.time < 0.999, 0.0, 0.5))
+    assert recording.thrusters["6"] == pytest.approx(recording.command)
+    assert not recording.thrusters["1"].any()
+    assert [(f.kind, f.axis, f.file) for f in log.findings] == [
+        ("unknown direction", "", "Dive.TLOG"),
+        ("constant motion", "yaw", "Dive.TLOG"),
+    ]
+
+
+def test_the_conditions_of_a_telemetry_log(bluerov2: Layout, tmp_path: Path) -> None:
+    """Before its first measurement, the voltage is reported as 65535."""
+    voltages = [battery(100.0, 65535), battery(101.0, 16000), battery(105.0, 15600)]
+    (recording,) = read_log(tlog(tmp_path / "a.tlog", [*dive(), *voltages]), bluerov2).recordings
+    context = recording.context
+    assert context["voltage"] == pytest.approx(np.interp(recording.time, [1.0, 5.0], [16.0, 15.6]), abs=1e-3)
+    assert context["roll"] == pytest.approx(0.1 * np.ones(len(recording.time)))
+    assert context["pitch"] == pytest.approx(-0.2 * np.ones(len(recording.time)))
+
+
+def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
+    """Motor 6 is on servo 9 and turns in the opposite direction; the lights are on servo 6."""
+    numbers = {"MOT_6_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0, "SERVO9_FUNCTION": 38}
+    parameters = [parameter(name, value) for name, value in numbers.items()]
+    messages = []
+    for n in range(N):
+        down = 0.5 * (n >= 10)
+        messages += [servos(0.1 * n, 1500, 1500, 1500, 1500, pulse(down), 1100, 1500, 1500, pulse(-down))]
+        messages += [altitude(0.1 * n, -0.01 * n)]
+    log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), bluerov2)
+    assert of_axis(log, "heave").thrusters["6"][-1] == 0.5
+    assert log.findings == [Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"})]
+
+
+def test_a_clock_of_servos_that_begins_anew(bluerov2: Layout, tmp_path: Path) -> None:
+    start = 2.0**32 * 1e-6 - 3.0
+    recording = of_axis(read_log(tlog(tmp_path / "dive.tlog", dive(start)), bluerov2), "heave")
+    assert recording.time[-1] == pytest.approx(0.1 * (N - 1) + 0.03, abs=2e-3)
+    assert recording.command is not None
+    assert recording.time[np.flatnonzero(recording.command)[0]] == pytest.approx(1.0, abs=2e-3)
+
+
+def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> None:
+    """VFR_HUD has no time; it arrives with the delay of the other messages."""
+    messages = []
+    for n in range(N):
+        hud = mavlink.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, -0.5 - 0.01 * n, 0.0)
+        messages += [servos(0.1 * n, *[1500] * 4, *[1500 + 4 * n] * 2), attitude(0.1 * n, 0.0), (0.1 * n + 0.02, hud)]
+    log = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2, HEAVE)
+    recording = of_axis(log, "heave")
+    there = np.isfinite(recording.values)
+    assert recording.time[there] == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
+    assert recording.values[there] == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
+    assert (
+        Finding("time of arrival", file="dive.tlog", names={"topics": "VFR_HUD"}, numbers={"count": N}) in log.findings
+    )
+
+
+def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -> None:
+    """The vehicle moves ahead at 0.01 n m/s over ground while it turns, with a pitch of -0.2 and a roll of 0.1 rad.
+
+    The first ten velocities are unknown.
+    """
+    ahead, messages = pulse(0.4), []
+    for n in range(N):
+        psi, V = -pi / 4 + 0.01 * n, 0.01 * n
+        outputs = [3000 - ahead, 3000 - ahead, ahead, ahead, 1500, 1500] if n > 5 else [1500] * 6
+        local = mavlink.MAVLink_local_position_ned_message(100 * n, 0, 0, 0, V * cos(psi), V * sin(psi), 0)
+        flags = mavlink.MAVLink_ekf_status_report_message(831 if n >= 10 else 165, 0, 0, 0, 0, 0)
+        messages += [(0.1 * n - 0.01, flags), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
+    log = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2)
+    surge = of_axis(log, "surge")
+    there = np.isfinite(surge.values)
+    assert surge.values[there] == pytest.approx(cos(-0.2) * 0.01 * np.arange(10, N), abs=1e-6)
+    sway = log.logs[0].used("sway velocity")
+    assert sway is not None
+    assert sway.values[10:] == pytest.approx(sin(0.1) * sin(-0.2) * 0.01 * np.arange(10, N), abs=1e-6)
+    assert surge.command is not None
+    assert surge.command[-1] == pytest.approx(0.4)
+    assert {recording.axis.name for recording in log.recordings} == {"surge"}
+    assert Finding("cancelling thrusters", axis="sway", file="dive.tlog") in log.findings
+    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
+
+
+def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
+    path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
+    tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
+    tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
+    log = read_log(path, bluerov2)
+    assert not of_axis(log, "heave").thrusters["1"].any()
+    assert of_axis(log, "heave").thrusters["5"][0] == 0.0
+    names = {"vehicles": "1 and 2", "vehicle": "1"}
+    assert Finding("several vehicles", file="dive.tlog", names=names) in log.findings
+    assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
+
+
+def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp_path: Path) -> None:
+    """The damage is inside a message of depth, and at the end."""
+    before = tlog(tmp_path / "before.tlog", dive()[:31]).stat().st_size
+    path = tlog(tmp_path / "dive.tlog", dive())
+    content = bytearray(path.read_bytes())
+    content[before + 20 : before + 24] = b"\x07" * 4
+    path.write_bytes(content[:-7])
+    log = read_log(path, bluerov2)
+    there = np.isfinite(of_axis(log, "heave").values)
+    assert of_axis(log, "heave").values[there] == pytest.approx(
+        [1.0 + 0.02 * max(n - 10, 0) for n in range(N) if n != 10]
+    )
+    assert Finding("damaged pieces", file="dive.tlog", numbers={"count": 1}) in log.findings
+
+
+# ---- .bin ------------------------------------------------------------------------------------------------------------
+
+# Type, name, format and columns, as ArduSub 4.1 declares them.
+FORMATS = {
+    "RCOU": (150, "QHHHHHHHHHHHHHH", "TimeUS,C1,C2,C3,C4,C5,C6,C7,C8,C9,C10,C11,C12,C13,C14"),
+    "CTUN": (151, "Qffffffffffhh", "TimeUS,ThI,ABst,ThO,ThH,DAlt,Alt,BAlt,DSAlt,SAlt,TAlt,DCRt,CRt"),
+    "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
+    "BARO": (153, "QBffcfIffB", "TimeUS,I,Alt,Press,Temp,CRt,SMS,Offset,GndTemp,Health"),
+    "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
+    "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
+    "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
+}
+CODES = {"Q": "Q", "H": "H", "h": "h", "f": "f", "c": "h", "C": "H", "B": "B", "I": "I", "e": "i", "N": "16s"}
+
+
+def packed(name: str, *values: Any) -> bytes:
+    """Pack one message: A3 95, its type, its numbers; c, C and e are hundredths."""
+    kind, form, _ = FORMATS[name]
+    stored = [round(100 * v) if f in "cCe" else v for f, v in zip(form, values, strict=True)]
+    return b"\xa3\x95" + bytes([kind]) + struct.pack("<" + "".join(CODES[f] for f in form), *stored)
+
+
+def dataflash(path: Path, messages: Iterable[bytes]) -> Path:
+    """Write a log, which begins with the formats of messages."""
+    declared = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **FORMATS}
+    content = b""
+    for name, (kind, form, columns) in declared.items():
+        length = 89 if name == "FMT" else 3 + struct.calcsize("<" + "".join(CODES[f] for f in form))
+        content += b"\xa3\x95\x80" + struct.pack(
+            "<BB4s16s64s", kind, length, name.encode(), form.encode(), columns.encode()
+        )
+    path.write_bytes(content + b"".join(messages))
+    return path
+
+
+def rcou(time: float, *pulses: int) -> bytes:
+    return packed("RCOU", round(time * 1e6), *pulses, *[0] * (14 - len(pulses)))
+
+
+def ctun(time: float, alt: float) -> bytes:
+    return packed("CTUN", round(time * 1e6), 0.0, 0.0, 0.0, 0.0, 0.0, alt, 0.0, 0.0, 0.0, 0.0, 0, 0)
+
+
+def att(time: float, yaw: float) -> bytes:
+    return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
+
+
+def baro(time: float, instance: int, alt: float) -> bytes:
+    return packed("BARO", round(time * 1e6), instance, alt, 1e5, 20.0, 0.0, 0, 0.0, 0.0, 1)
+
+
+def turn() -> list[bytes]:
+    """Return messages of a turn: from 1 s on, the heading passes north at 20 deg/s, by all horizontal thrusters."""
+    messages = [packed("PARM", 1, f"MOT_{n}_DIRECTION".encode(), 1.0, 1.0) for n in range(1, 7)]
+    for n in range(N):
+        time, c = 50.0 + 0.1 * n, 0.25 * (n >= 10)
+        messages += [rcou(time, pulse(c), pulse(-c), pulse(-c), pulse(c), 1500, 1500)]
+        messages += [packed("BAT", round(time * 1e6), battery, 16.0 - 8.0 * battery) for battery in (1, 0)]
+        messages += [ctun(time, -2.0), att(time, (350.0 + 2.0 * max(n - 10, 0)) % 360.0)]
+    return messages
+
+
+def test_a_dataflash_log_tells_of_a_turn(bluerov2: Layout, tmp_path: Path) -> None:
+    log = read_log(dataflash(tmp_path / "00000012.BIN", turn()), bluerov2)
+    (recording,) = log.recordings
+    assert recording.quantity == "heading"
+    assert recording.values == pytest.approx([radians(-10.0 + 2.0 * max(n - 10, 0)) for n in range(N)])
+    assert recording.time == pytest.approx(0.1 * np.arange(N))
+    assert {name: values[-1] for name, values in recording.thrusters.items()} == pytest.approx(
+        {"1": 0.25, "2": -0.25, "3": -0.25, "4": 0.25, "5": 0.0, "6": 0.0}
+    )
+    assert recording.context["roll"] == pytest.approx(radians(4.0) * np.ones(N))
+    assert recording.context["voltage"] == pytest.approx(16.0 * np.ones(N))
+    names = {"quantity": "depth"}
+    assert log.findings == [Finding("constant motion", axis="heave", file="00000012.BIN", names=names)]
+
+
+def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp_path: Path) -> None:
+    """CTUN.Alt stays 0; one of two barometers is inside the hull, and its altitude changes by centimetres only."""
+    messages = []
+    for n in range(N):
+        time, down = 0.1 * n, pulse(0.5 * (n >= 10))
+        messages += [rcou(time, *[1500] * 4, down, down), ctun(time, 0.0)]
+        messages += [baro(time, 0, 0.001 * n), baro(time, 1, -0.02 * n)]
+    recording = of_axis(read_log(dataflash(tmp_path / "a.bin", messages), bluerov2), "heave")
+    assert recording.values == pytest.approx(0.02 * np.arange(N), abs=1e-6)
+
+
+def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
+    """At a heading of 90 deg, the vehicle moves to starboard at 0.01 n m/s; the second core differs."""
+    messages = []
+    for n in range(N):
+        time, c = 0.1 * n, 0.3 * (n >= 10)
+        messages += [rcou(time, *(pulse(s * c) for s in (1, -1, 1, -1)), 1500, 1500)]
+        for core, sign in ((0, 1.0), (1, -1.0)):
+            numbers = [-sign * 0.01 * n, 0.0, *[0.0] * 5, 0.0, 0.0, 0.0, 0.0]
+            messages += [packed("XKF1", round(time * 1e6), core, 0.0, 0.0, 90.0, *numbers)]
+    (sway,) = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).recordings
+    assert (sway.axis, sway.quantity) == (SWAY, "velocity")
+    assert sway.values == pytest.approx(0.01 * np.arange(N), abs=1e-6)
+    assert sway.command == pytest.approx(0.3 * (np.arange(N) >= 10))
+
+
+@pytest.mark.parametrize("cut", [1, 40, 500])
+def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layout, tmp_path: Path) -> None:
+    path = dataflash(tmp_path / "a.bin", turn())
+    path.write_bytes(path.read_bytes()[:-cut])
+    recording = of_axis(read_log(path, bluerov2), "yaw")
+    assert N - 6 <= len(recording.time) <= N
+
+
+def test_a_damaged_dataflash_log_is_read_around_the_damage(
+    bluerov2: Layout, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = dataflash(tmp_path / "a.bin", turn())
+    content = bytearray(path.read_bytes())
+    at = content.index(att(53.0, 30.0)[:11])
+    content[at : at + 10] = b"\x07" * 10
+    path.write_bytes(content)
+    log = read_log(path, bluerov2)
+    assert np.flatnonzero(np.isnan(of_axis(log, "yaw").values)).tolist() == [30]
+    assert Finding("damaged log", file="a.bin") in log.findings
+    assert capfd.readouterr() == ("", "")
+
+
+# ---- Neither ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("a.tlog", b"", "the file is empty"),
+        ("a.bin", b"", "the file is empty"),
+        ("a.bin", b"time [s],command [%]\n" * 50, "line 1: column 'command \\[%\\]' is the command of one axis"),
+        ("a.bin", b"\xa3\x95\x80" + b"\xff" * 2000, "no commands of thrusters|damaged or was cut short"),
+        ("a.tlog", b"nonsense\n" * 50, "none of these headers is known"),
+        (
+            "a.tlog",
+            bytes(range(256)) * 20,
+            "its first bytes are those of none of the formats that are read",
+        ),
+    ],
+)
+def test_what_is_no_log_is_one_clear_line(
+    name: str, content: bytes, told: str, bluerov2: Layout, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(DataFileError, match=told) as error:
+        read_log(path, bluerov2)
+    assert str(error.value).startswith(f"{path}")
+    assert len(str(error.value).splitlines()) == 1
+    assert capfd.readouterr() == ("", "")
+
+
+def test_outputs_of_servos_alone_are_refused(tmp_path: Path, bluerov2: Layout) -> None:
+    with pytest.raises(DataFileError, match="nothing measured"):
+        read_log(tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)]), bluerov2)
+
+
+def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pymavlink", None)
+    monkeypatch.chdir(tmp_path)  # the reader enters the folder, since it has a process of its own; this test has not
+    path = tlog(tmp_path / "a.tlog", [])
+    with pytest.raises(DataFileError, match=r"a telemetry log needs pymavlink: pip install 'rov-fmu\[mavlink\]'"):
+        parsers.read_guarded(tmp_path, path, parsers._TELEMETRY, ())

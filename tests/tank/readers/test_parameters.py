@@ -1,0 +1,127 @@
+"""What the parameters of an autopilot and [logs] of rov.toml say about commands, and clipping in every format."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.commands import LogKeys
+from rov_fmu.tank.log import Log
+from tests.tank.readers import motion
+from tests.tank.readers.motion import TIME
+from tests.tank.readers.test_bags import array
+from tests.tank.readers.test_mavlink import N, altitude, dataflash, packed, parameter, rcou, servos, tlog
+from tests.tank.readers.test_sources import ROS, numbers, one, outputs, told
+
+
+def dive(path: Path, pulse: int, *parameters: tuple[float, Any]) -> Log:
+    """Write a log in which thrusters 5 and 6 get a pulse from the tenth row on."""
+    messages = [*parameters]
+    for n in range(N):
+        time = 2.0 + 0.1 * n
+        messages += [servos(time, *[1500] * 4, *[pulse if n >= 10 else 1500] * 2), altitude(time, -1.0 - 0.01 * n)]
+    return one(tlog(path, messages))
+
+
+def command(log: Log, thruster: int = 5) -> Array:
+    assert log.commands is not None
+    return log.commands.at(log.commands.rows)[:, thruster - 1]
+
+
+def told_at(time: float, **values: float) -> list[tuple[float, Any]]:
+    return [(time, parameter(name, value)[1]) for name, value in values.items()]
+
+
+SERVO5 = {"SERVO5_MIN": 1000.0, "SERVO5_TRIM": 1480.0, "SERVO5_MAX": 2000.0, "SERVO5_REVERSED": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("values", "expected", "sentence"),
+    [
+        ({}, 0.5, ""),
+        ({"MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000}, 0.4, "full thrust is 1000 and 2000 us, and no thrust 1500 us"),
+        ({"MOT_5_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0}, -0.5, "reverse the thrusters 5"),
+        (SERVO5, -(1700 - 1480) / 520, "reverse the thrusters 5"),
+        (
+            {**SERVO5, "MOT_PWM_TYPE": 9.0, "MOT_PWM_MIN": 1100, "MOT_PWM_MAX": 1900},
+            -(1700 - 1480) / 520,
+            "thrusters 5",
+        ),
+        ({**SERVO5, "MOT_PWM_TYPE": 8.0}, -0.4, "reverse the thrusters 5"),
+        ({**SERVO5, "MOT_PWM_TYPE": 0.0}, 0.5, ""),
+        ({**SERVO5, "MOT_5_DIRECTION": -1.0}, (1700 - 1480) / 520, ""),
+    ],
+    ids=["none", "range", "direction", "servo", "servo alone", "servo without trim", "motor alone", "reversed twice"],
+)
+def test_parameters_define_the_commands(
+    values: dict[str, float], expected: float, sentence: str, tmp_path: Path
+) -> None:
+    log = dive(tmp_path / "a.tlog", 1700, *told_at(1.0, **values))
+    assert command(log)[-1] == pytest.approx(expected)
+    assert command(log)[0] == pytest.approx(0.0, abs=0.05)
+    assert sentence in told(log)
+    assert ("reverse the thrusters" in told(log)) == (expected < 0.0)
+
+
+def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
+    values = {"MOT_5_DIRECTION": 1.0, "MOT_6_DIRECTION": 1.0}
+    log = dive(
+        tmp_path / "a.tlog",
+        1700,
+        *told_at(1.0, **values),
+        *told_at(5.0, MOT_5_DIRECTION=-1.0, MOT_6_DIRECTION=-1.0),
+    )
+    assert command(log)[29] == pytest.approx(0.5)
+    assert command(log)[31] == pytest.approx(-0.5)
+    assert "MOT_5_DIRECTION, MOT_6_DIRECTION changes 3 s after the first command. Each value is used in its time" in (
+        told(log)
+    )
+
+
+def test_parameters_in_a_dataflash_log(tmp_path: Path) -> None:
+    messages = [packed("PARM", 1, name, value, 0.0) for name, value in ((b"MOT_PWM_MIN", 1000), (b"MOT_PWM_MAX", 2000))]
+    for n in range(N):
+        messages.append(rcou(0.1 * n, *[1500] * 4, 1700, 1700))
+    assert command(one(dataflash(tmp_path / "a.bin", messages)))[-1] == pytest.approx(0.4)
+
+
+def csv(folder: Path, unit: str, values: Iterable[float]) -> Path:
+    rows = [f"{n / 10},{value},{0.01 * n}" for n, value in enumerate(values)]
+    path = folder / "dive.csv"
+    path.write_text("\n".join([f"time [s],u_5 [{unit}],depth [m]", *rows]), encoding="utf-8")
+    return path
+
+
+def test_rov_toml_states_neutral_and_span_for_every_format(tmp_path: Path) -> None:
+    keys = LogKeys(neutral=1520.0, span=250.0)
+    pulse = np.where(np.arange(N) > 9, 1645, 1520)
+    assert command(one(csv(tmp_path, "us", pulse), keys), 5)[-1] == pytest.approx(0.5)
+    assert command(one(csv(tmp_path, "us 1500 290", pulse), keys), 5)[-1] == pytest.approx(0.5), "the header counts"
+    bag = one(ROS.write(tmp_path, [*outputs(), *numbers("/depth", motion.DEPTH)]), keys)
+    assert command(bag)[-1] == pytest.approx((1500.0 + 400.0 * 0.5 - 1520.0) / 250.0)
+    topic = ROS.write(tmp_path / "b", [*numbers("/out", 1645.0 + 0.0 * TIME), *numbers("/depth", motion.DEPTH)])
+    assert command(one(topic, keys, {"/out.data": "u_5 [us]"}), 5)[-1] == pytest.approx(0.5)
+    log = one(tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 4, 1645, 1645) for n in range(N)]), keys)
+    assert command(log)[-1] == pytest.approx(0.5)
+
+
+def test_clipping_is_told_in_every_format(tmp_path: Path) -> None:
+    sentence = "50 commands of {} beyond full thrust taken as full thrust"
+    log = dive(tmp_path / "a.tlog", 1964)
+    assert command(log)[-1] == 1.0
+    assert sentence.format("thruster 5") in told(log)
+    pulses = np.where(np.arange(N) > 9, 1964, 1500)
+    assert sentence.format("u_5") in told(one(csv(tmp_path, "us", pulses)))
+    percent = ROS.write(tmp_path / "p", [*numbers("/out", 120.0 * (TIME > 4.95)), *numbers("/depth", motion.DEPTH)])
+    assert sentence.format("/out.data") in told(one(percent, topics={"/out.data": "u_5 [%]"}))
+
+
+@pytest.mark.parametrize(
+    "commands", [outputs, lambda: [("/thrusters", time, array(ROS, n)) for n, time in enumerate(TIME)]]
+)
+def test_a_bag_without_directions_of_motors_says_so(commands: Any, tmp_path: Path) -> None:
+    log = one(ROS.write(tmp_path, [*commands(), *numbers("/depth", motion.DEPTH)]))
+    assert "does not tell the directions of the motors (MOT_n_DIRECTION)" in told(log)

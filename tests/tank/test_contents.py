@@ -1,0 +1,246 @@
+"""What a file contains tells its format, not its name; tables of makers; and jumps of sensors."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.inspection.inspection import Inspection, inspect
+from rov_fmu.tank.quality import checked
+from tests.commands import ROOT
+from tests.tank.logs import channel, commands, log, read_log
+from tests.tank.readers import motion, test_bags, test_mavlink, test_ulog
+from tests.tank.readers.motion import BLUEROV2, TIME
+from tests.tank.test_several_files import ROV, table
+
+FOLDER = ROV.replace("Dive of May", "x")
+
+
+def folder(path: Path, more: str = "") -> Path:
+    path.mkdir(exist_ok=True)
+    (path / "rov.toml").write_text(f"{FOLDER}{more}", encoding="utf-8")
+    return path
+
+
+def dive(path: Path) -> Path:
+    names = ",".join(f"u_{name} [1]" for name in motion.THRUSTERS)
+    table(path, f"time [s],{names},depth [m]", TIME, *motion.THRUSTERS.values(), motion.DEPTH)
+    return path
+
+
+# ---- Formats ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["tlog", "bin", "ulg", "bag", "mcap", "csv", "mat"])
+def test_a_log_is_read_under_any_name(kind: str, tmp_path: Path) -> None:
+    if kind == "tlog":
+        path = test_mavlink.tlog(tmp_path / "a", test_mavlink.dive())
+    elif kind == "bin":
+        path = test_mavlink.dataflash(tmp_path / "a", test_mavlink.turn())
+    elif kind == "ulg":
+        path = test_ulog.dive().write(tmp_path / "a")
+    elif kind in ("bag", "mcap"):
+        ros = test_bags.Ros(1 if kind == "bag" else 2)
+        (tmp_path / "ros").mkdir()
+        path = ros.write(tmp_path / "ros", test_bags.dive(ros), f".{kind}")
+    elif kind == "csv":
+        path = dive(tmp_path / "a")
+    else:
+        path = tmp_path / "a.mat"
+        titles = {f"u{n}": values for n, values in enumerate(motion.THRUSTERS.values())}
+        savemat(path, {"time": TIME, "z": motion.DEPTH, **titles})
+    other = tmp_path / "any.log"
+    shutil.copy(path, other)
+    (one,) = inspect(other, [BLUEROV2])
+    assert one.commands or one.unread
+    if kind == "mat":
+        assert {"time", "z", "u0"} <= {*one.unread, *one.columns}
+        assert one.columns["time"] == "time [s]"
+    else:
+        assert read_log(other, BLUEROV2).recordings
+
+
+def test_variables_of_matlab(tmp_path: Path) -> None:
+    """A structure of vectors with a matrix of pulses, as theses publish them."""
+    pulses = np.column_stack([1500.0 + 400.0 * c for c in motion.THRUSTERS.values()])
+    savemat(tmp_path / "dive.mat", {"log": {"t": TIME, "pwm": pulses, "z": motion.DEPTH, "note": "a dive"}})
+    columns = '[columns]\n"log.t" = "time [s]"\n"log.z" = "depth [m]"\n'
+    columns += "".join(f'"log.pwm({n})" = "u_{n} [us]"\n' for n in range(1, 7))
+    (heave,) = load_tank_tests(folder(tmp_path, columns)).recordings["heave"]
+    assert heave.values == pytest.approx(motion.DEPTH)
+    assert heave.thrusters["6"] == pytest.approx(motion.THRUSTERS["6"])
+
+
+def test_a_file_that_was_cut_short_differs_from_one_of_an_unknown_kind(tmp_path: Path) -> None:
+    path = test_bags.Ros(2).write(tmp_path, test_bags.dive(test_bags.Ros(2)), ".mcap")
+    path.write_bytes(path.read_bytes()[:-300])
+    with pytest.raises(DataFileError, match="begins as an MCAP file, but is damaged or was cut short, and cannot be"):
+        read_log(path, BLUEROV2)
+    path.write_bytes(b"\x7fELF\x02\x01\x01\0" * 100)
+    with pytest.raises(DataFileError, match="its first bytes are those of none of the formats that are read: a CSV"):
+        read_log(path, BLUEROV2)
+
+
+@pytest.mark.parametrize("name", ["thrust_main.csv", "thrust_t200_dive.csv", "steady_surge.csv"])
+def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> None:
+    if "surge" in name:  # a log of the axis in its name
+        table(tmp_path / name, "time [s],command [1],distance [m]", TIME, motion.THRUSTERS["5"], TIME)
+    else:
+        dive(tmp_path / name)
+    tests = load_tank_tests(folder(tmp_path))
+    assert [recording.file for some in tests.recordings.values() for recording in some] == [name]
+    assert not tests.thrust
+
+
+def test_columns_without_any_known_header_are_listed(tmp_path: Path) -> None:
+    table(tmp_path / "pose.csv", "stamp,pos_x,pos_z,quality", TIME, motion.NORTH, -motion.DEPTH, 0.0 * TIME)
+    (one,) = inspect(tmp_path / "pose.csv", [BLUEROV2])
+    assert isinstance(one, Inspection)
+    assert not one.commands
+    assert one.unread["pos_z"] == "-1.99 to -1"
+    assert one.unread["quality"] == "always 0"
+
+
+def test_messages_of_rostopic_are_columns(tmp_path: Path) -> None:
+    """`rostopic echo -p` writes a row for each message, with `%time` in ns and the fields as columns."""
+    stamps = [f"{1_669_909_208_877_428_140 + 100_000_000 * n}" for n in range(len(TIME))]
+    titles = ",".join(["%time", "field.header.frame_id", *(f"field.data{n}" for n in range(6)), "field.position.z"])
+    pulses = np.column_stack([1500.0 + 400.0 * c for c in motion.THRUSTERS.values()])
+    rows = [
+        ",".join([stamp, "map", *(f"{pulse:.0f}" for pulse in row), f"{-depth:.4f}"])
+        for stamp, row, depth in zip(stamps, pulses, motion.DEPTH, strict=True)
+    ]
+    (tmp_path / "rov.csv").write_text("\n".join([titles, *rows]), encoding="utf-8")
+    (one,) = inspect(tmp_path / "rov.csv", [BLUEROV2])
+    assert "%time" not in one.unread
+    columns = '[columns]\n"field.position.z" = "-depth [m]"\n'
+    columns += "".join(f'"field.data{n}" = "u_{n + 1} [us]"\n' for n in range(6))
+    (heave,) = load_tank_tests(folder(tmp_path, columns)).recordings["heave"]
+    assert heave.values == pytest.approx(motion.DEPTH, abs=1e-4)
+    assert heave.time[-1] == pytest.approx(9.9, abs=1e-5)
+
+
+# ---- Tables and vehicles ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "titles", ["PWM (µs),RPM,Force (Kg f),Current (A)", "command [us],RPM,force [kgf],Current (A)"]
+)
+def test_a_table_of_thrust_in_pulses_as_a_maker_publishes_it(titles: str, tmp_path: Path) -> None:
+    rows = [
+        f"{1500 + 400 * c:.0f},{2000 * c:.0f},{5.0 * c * abs(c):.3f},{9 * c * c:.2f}" for c in np.linspace(-1, 1, 21)
+    ]
+    (tmp_path / "thrust_t200.csv").write_text("\n".join([titles, *rows]), encoding="utf-8")
+    columns = '[columns]\n"PWM (µs)" = "command [us]"\n"Force (Kg f)" = "force [kgf]"\n' if "PWM" in titles else ""
+    thrust = load_tank_tests(folder(tmp_path, columns)).thrust["t200"]
+    assert [row.command for row in thrust] == pytest.approx(np.linspace(-1, 1, 21))
+    assert thrust[-1].value == pytest.approx(5.0 * 9.80665)
+
+
+def test_the_sign_of_a_table_is_changed_too(tmp_path: Path) -> None:
+    (tmp_path / "thrust_t200.csv").write_text("command [%],load [N]\n50,-9\n-50,8\n", encoding="utf-8")
+    tests = load_tank_tests(folder(tmp_path, '[columns]\n"load [N]" = "-force [N]"\n'))
+    assert [row.value for row in tests.thrust["t200"]] == [9.0, -8.0]
+    (tmp_path / "thrust_t200.csv").write_text("command [%],load [N]\n50,-1e7\n", encoding="utf-8")
+    with pytest.raises(DataFileError, match=r"'-1e7': must be at least -1e\+06"):
+        load_tank_tests(tmp_path)
+
+
+def test_a_vehicle_with_fins_is_read(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "examples" / "remus100" / "remus100.toml", tmp_path)
+    rows = "".join(f"{n / 10},{n % 9},{n % 7},{0.02 * n},{n % 5}\n" for n in range(60))
+    header = "time [s],u_prop [%],u_rudder [%],surge velocity [m/s],heading [deg]\n"
+    (tmp_path / "log_dive.csv").write_text(header + rows, encoding="utf-8")
+    (tmp_path / "rov.toml").write_text(FOLDER.replace("bluerov2", "remus100.toml"), encoding="utf-8")
+    tests = load_tank_tests(tmp_path)
+    assert [*tests.recordings] == ["surge"]
+    assert (
+        "log_dive.csv: the recording of yaw is left out: no thruster drives it, and the effect of fins is not fitted"
+        in sentences(tests.findings, SENTENCES)
+    )
+
+
+# ---- Jumps -----------------------------------------------------------------------------------------------------------
+
+
+def jumps(quantity: str, values: Array) -> list[str]:
+    down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
+    found = checked(log(down, channel(quantity, TIME, values))).findings
+    return [line for line in sentences(found, SENTENCES) if "jump" in line]
+
+
+NOISE = 0.004 * np.random.default_rng(1).standard_normal(len(TIME))
+
+
+def test_jumps_of_a_position_are_told() -> None:
+    depth = motion.DEPTH + NOISE
+    assert not jumps("depth", depth)
+    assert jumps("depth", depth + 1.2 * (TIME > 5.05)) == [
+        "a.csv: 1 jump of the depth, as by a reset: +1.21 m at 5.1 s"
+    ]
+    heading = 0.2 * np.sin(TIME) + NOISE
+    (line,) = jumps("heading", heading - 0.6 * (TIME > 3.05))
+    assert "1 jump of the heading, as by a reset: -3" in line
+    (line,) = jumps("distance", 0.3 * TIME + NOISE + 2.0 * (TIME > 3.05) - 2.5 * (TIME > 7.05))
+    assert "2 jumps of the distance, as by a reset: +2.0" in line
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        motion.DEPTH + 0.7 * (np.arange(len(TIME)) == 50),
+        10.0 * TIME,
+        motion.DEPTH + 0.5 * np.random.default_rng(2).standard_normal(len(TIME)),
+        0.25 * np.round(4.0 * motion.DEPTH),
+        np.where(TIME < 5.0, motion.DEPTH, motion.DEPTH + 1.5 * (TIME - 5.0)),
+    ],
+    ids=["an outlier", "a fast motion", "noise", "a coarse sensor", "a dive that begins"],
+)
+def test_what_is_no_jump(values: Array) -> None:
+    assert not jumps("depth", values)
+
+
+TOE = """[vehicle]
+name = "Toe"
+identifier = "toe"
+version = "1.0"
+description = "Two thrusters with a toe-in"
+source = "x"
+[body]
+m_rov = { value = 10.0, unit = "kg", source = "x" }
+I_r = { value = 0.3, unit = "kg.m2", source = "x" }
+[curves.t]
+[[thruster]]
+name = "l"
+curve = "t"
+direction = { value = [0.966, 0.259, 0.0], source = "x" }
+position = { value = [-0.2, -0.15, 0.0], unit = "m", source = "x" }
+[[thruster]]
+name = "r"
+curve = "t"
+direction = { value = [0.966, -0.259, 0.0], source = "x" }
+position = { value = [-0.2, 0.15, 0.0], unit = "m", source = "x" }
+[known]
+a_t_t = { value = 20.0, unit = "N", source = "x" }
+b_t_t = { value = 5.0, unit = "N", source = "x" }
+"""
+
+
+@pytest.mark.parametrize("axes", ["", "[axes.surge]\n[axes.yaw]\n"])
+def test_thrusters_with_a_toe_in_and_a_log_with_sway(axes: str, tmp_path: Path) -> None:
+    """The thrusters drive sway only together with yaw, so the column must not make the vehicle impossible."""
+    (tmp_path / "rov.toml").write_text(TOE + axes, encoding="utf-8")
+    titles = "time [s],u_l [1],u_r [1],surge velocity [m/s],sway velocity [m/s],heading [rad]"
+    left, right = np.where(TIME > 2.0, 0.5, 0.0), np.where(TIME > 5.0, 0.3, 0.0)
+    table(tmp_path / "dive.csv", titles, TIME, left, right, motion.U, motion.V, motion.HEADING)
+    tests = load_tank_tests(tmp_path)
+    assert [*tests.recordings] == ["surge", "yaw"]
+    assert "dive.csv: the motion in sway is left out, because the thrusters drive it only together with" in (
+        "\n".join(sentences(tests.findings, SENTENCES))
+    )

@@ -1,0 +1,78 @@
+"""The gate of equal bits: it finds the smallest difference, and allows only what it is told to."""
+
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tests.commands import ROOT
+from verification.new_tests import copy_checkout
+from verification.same_bits import QUATERNION, STEPS, Floats, Runs, differences, main, random_runs, trajectories
+
+NAMES = ["u", "psi", *QUATERNION, *(f"der({name})" for name in QUATERNION)]
+
+
+def _described(folder: Path) -> tuple[list[str], list[str], Runs]:
+    description = fmpy.read_model_description(str(folder))
+    unknowns = [unknown.variable.name for unknown in description.derivatives]
+    return [v.name for v in description.modelVariables], unknowns, random_runs(description, 4)
+
+
+def _compared(new: Floats, points: int = STEPS, new_points: int = STEPS, names: list[str] = NAMES) -> list[str]:
+    old = np.full((2, STEPS, len(NAMES)), 0.5)
+    ends = np.array([points, STEPS]), np.array([new_points, STEPS])
+    return differences(names, (ends[0], old), (ends[1], new), ["attitude"])[0]
+
+
+def test_an_allowed_difference_is_one_of_whole_turns_or_of_the_sign() -> None:
+    new = np.full((2, STEPS, len(NAMES)), 0.5)
+    new[0, 3, 1] += 6 * pi
+    new[1, 5:, 2:] *= -1
+    assert _compared(new) == []
+    assert len(_compared(new, names=["z" if name == "eta" else name for name in NAMES])) == 9, "not a quaternion"
+    new[0, 4, 1] += 1e-9
+    assert _compared(new) == ["  psi differs in 1 runs, by 1e-09, first in 0 and point 4"]
+    new[0, 4, 1] = new[1, 5, 2] = 0.5
+    assert [line.split()[0] for line in _compared(new)] == NAMES[3:], "the sign of a part of it"
+    new[..., :] = 0.5
+    new[0, 7:] = 9.0
+    assert _compared(new, points=7) == [], "a step that failed before"
+    new[0, 6] = 9.0
+    assert len(_compared(new, points=7)) == len(NAMES)
+    new[...] = 0.5
+    assert _compared(new, new_points=8) == ["  the failing step differs in 1 runs, first in 0"]
+
+
+def test_the_smallest_difference_is_found(videoray_dir: Path, videoray3_dir: Path) -> None:
+    for folder in (videoray_dir, videoray3_dir):
+        names, unknowns, runs = _described(folder)
+        old = trajectories(folder, names, unknowns, runs)
+        assert np.isfinite(old[1]).all()
+        assert (old[0] == STEPS + 1).all()
+        columns = [*names, *unknowns]
+        assert differences(columns, old, trajectories(folder, names, unknowns, runs)) == ([], 4)
+        place = (2, 3, np.flatnonzero(~np.isnan(runs.values[2, 3]))[-1])
+        values = runs.values.copy()
+        values[place] = np.nextafter(values[place], np.inf)
+        new = trajectories(folder, names, unknowns, replace(runs, values=values))
+        lines, equal = differences(columns, old, new)
+        assert equal == 3
+        assert lines
+        assert all("differs in 1 runs" in line for line in lines)
+
+
+@pytest.mark.long
+def test_a_changed_rounding_is_found(tmp_path: Path) -> None:
+    changed = copy_checkout(tmp_path) / "fmu_src" / "c" / "series.c"
+    text = changed.read_text(encoding="utf-8")
+    assert "1.0 / 3.0," in text
+    changed.write_text(text.replace("1.0 / 3.0,", "1.0 / (3.0 + 1e-15),"), encoding="utf-8")
+    arguments = [str(ROOT), str(tmp_path), "--vehicle", "videoray", "--fmi", "2", "--runs", "3"]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 1
+    assert result.output.startswith("videoray, FMI 2.0: 3 runs, 0 with equal bits; a call fails in 0 and 0 runs\n")
+    assert "\n  psi differs in " in result.output
