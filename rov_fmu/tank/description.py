@@ -79,6 +79,9 @@ _Window = Annotated[
 ]
 
 
+_Deviation = Annotated[Finite, _must_be("0 or above", lambda deviation: deviation >= 0.0)]
+
+
 def _find_vehicle(name: object, info: ValidationInfo) -> Path:
     """Return the path of the vehicle file in the folder of rov.toml, or of the one that ships. Raises ValueError."""
     if not isinstance(name, str):
@@ -197,6 +200,8 @@ class RovTables(OpenHardware):
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
     fit: _Fit = _Fit()
+    priors: dict[str, _Deviation] = Field(default={})
+    """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""
     columns: dict[str, str] = Field(default={})
     """What the headers of CSV files stand for: other headers."""
     topics: dict[str, str] = Field(default={})

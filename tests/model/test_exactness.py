@@ -215,7 +215,7 @@ OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e3
 
 
 @pytest.mark.parametrize("name", OVERFLOWING)
-def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: Fmu, name: str) -> None:
+def test_a_step_that_overflows_is_not_finite_or_refused_and_takes_no_time(fmu: Fmu, name: str) -> None:
     rov, inputs, before, h = OVERFLOWING[name]
     start = process_time()
     assert name == "spin" or not all(map(isfinite, in_python(rov, inputs, before, h).values()))
@@ -223,7 +223,7 @@ def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: F
         instance.start({**rov.coefficients, **inputs, **before})
         assert instance.step(0.0, h) == ERROR
         assert any(word in instance.log[-1].text for word in ("overflows", "MOST_PIECES"))
-    assert process_time() - start < 20.0  # a million pieces, of 2 to 5 us each, precede a refusal
+    assert process_time() - start < 2.0
 
 
 # ---- The VideoRay, against an integration of the equations as the paper prints them ----
