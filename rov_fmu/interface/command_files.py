@@ -8,7 +8,7 @@ import numpy as np
 
 from rov_fmu.interface.arguments import TIME, Array
 from rov_fmu.io.csv_table import read_header
-from rov_fmu.io.messages import NO_FILE, FileError, only, shown
+from rov_fmu.io.messages import NO_FILE, FileError, lines_on, only, shown
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import series
 from rov_fmu.model.layout import Axis, Layout
@@ -92,7 +92,7 @@ def _read(path: Path, layout: Layout, axis: Axis | None, rov_file: RovFile) -> L
     driven = layout_of(name.removeprefix("u_") for name in layout.commands)
     names, wrong = names_of(driven, rov_file.tables)
     if wrong or not rov_file.explains_files:
-        raise VehicleFileError(*([f"{path.parent / ROV_FILE}: {line}" for line in wrong] or rov_file.mistakes))
+        raise VehicleFileError(*(lines_on(path.parent / ROV_FILE, wrong) or rov_file.mistakes))
     log, *others = read_logs(path, driven, names, axis, is_part=True)
     if others:
         warnings.warn(f"{path}: only the part before the clock restarts is used", UserWarning, stacklevel=4)

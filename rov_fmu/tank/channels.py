@@ -137,7 +137,7 @@ def _reason_against(topic: Topic, topics: Sequence[Topic], sender: Source | None
 def with_one_source(channels: Sequence[Channel]) -> list[Channel]:
     """Mark all channels of a quantity but one as unused: the first with enough samples that change, or else the first.
 
-    A position is preferred to the velocity of the same axis, so the two have sources of their own.
+    The position and the velocity along an axis are two quantities, and may come from different sources.
     """
     chosen: dict[str, Channel] = {}
     for channel in sorted(channels, key=lambda c: c.count < LEAST_SAMPLES or not spread(c.values)):

@@ -316,10 +316,12 @@ def _range(number: int, time: Array, parameters: Parameters, keys: LogKeys) -> t
     kind = parameters.last("MOT_PWM_TYPE")
     of_motors = [("MOT_PWM_MIN", "MOT_PWM_MAX")] if kind not in _BY_SERVO else []
     of_servo = [tuple(f"SERVO{number}_{end}" for end in ("MIN", "MAX", "TRIM"))] if kind in (None, *_BY_SERVO) else []
-    usual = np.full(len(time), keys.neutral or NEUTRAL)
+    neutral = np.full(len(time), keys.neutral or NEUTRAL)
     for names in [*of_motors, *of_servo] if keys.neutral is keys.span is None else ():
         if all((parameters.last(name) or 0.0) > 0.0 for name in names):
             low, high, *trim = (parameters.at(name, time) for name in names)
-            return low, (0.5 * (low + high) if kind == _BY_SERVO[0] else [*trim, usual][0]), high
+            if kind == _BY_SERVO[0]:  # with PWMRange, no thrust is in the middle
+                return low, 0.5 * (low + high), high
+            return low, trim[0] if trim else neutral, high
     span = keys.span or SPAN
-    return usual - span, usual, usual + span
+    return neutral - span, neutral, neutral + span

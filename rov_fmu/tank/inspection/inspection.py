@@ -169,15 +169,13 @@ def _numbers(
     A header that several columns share gets no numbers, because it is ambiguous.
     """
     counts = Counter(titles)
-    names = {title: f"{n} [1]" for n, title in enumerate(titles) if counts[title] == 1}
-    columns = {str(n): Column({"1": 1.0}, True, True) for n in range(len(titles))}
-    table = read_columns(path, columns, others=True, loose=True, renamed=names, open_stream=open_stream)
+    places = {title: str(n) for n, title in enumerate(titles) if counts[title] == 1}
+    columns = {place: Column({"1": 1.0}, True, True) for place in map(str, range(len(titles)))}
+    renamed = {title: f"{place} [1]" for title, place in places.items()}
+    table = read_columns(path, columns, others=True, loose=True, renamed=renamed, open_stream=open_stream)
     numbers, ranges = dict.fromkeys(titles, np.empty(0)), dict.fromkeys(titles, "")
-    for title, name in names.items():
-        values = np.frombuffer(table.values[name.removesuffix(" [1]")])
+    for title, place in places.items():
+        values = np.frombuffer(table.values[place])
         numbers[title] = found = values[np.isfinite(values)]
-        if table.unread[name.removesuffix(" [1]")] > len(found):
-            ranges[title] = "text"
-        else:
-            ranges[title] = range_in_words(found)
+        ranges[title] = "text" if table.unread[place] > len(found) else range_in_words(found)
     return numbers, ranges

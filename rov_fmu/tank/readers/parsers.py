@@ -5,7 +5,6 @@ reader therefore runs with everything that uses what its parser returns in the c
 the log come back.
 """
 
-import os
 import shutil
 import warnings
 from collections.abc import Callable, Collection, Iterator
@@ -163,13 +162,13 @@ _PARSER = _Parser()
 
 
 def read_guarded(folder: Path, path: Path, kind: Format, named: Collection[str]) -> Content:
-    """Read a log whose path is relative to a folder. Any exception means that the file is damaged: a DataFileError.
+    """Read a log. Any exception means that the file is damaged: a DataFileError, which names the file by `path`.
 
-    What a parser prints is about damage.
+    `folder` is what a relative path starts from: the caller's working directory, which this process may not share. What
+    a parser prints is about damage.
     """
     printed = StringIO()
     try:
-        os.chdir(folder)
         with (
             np.errstate(all="ignore"),
             warnings.catch_warnings(),
@@ -177,7 +176,7 @@ def read_guarded(folder: Path, path: Path, kind: Format, named: Collection[str])
             redirect_stderr(printed),
         ):
             warnings.simplefilter("ignore")
-            content = _read(path, kind, named)
+            content = _read(folder / path, kind, named)
             for piece in content.pieces:
                 piece.topics = [*filter(None, map(_usable, piece.topics))]
     except ImportError:

@@ -366,7 +366,6 @@ def test_outputs_of_servos_alone_are_refused(tmp_path: Path, bluerov2: Layout) -
 
 def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymavlink", None)
-    monkeypatch.chdir(tmp_path)  # the reader enters the folder, since it has a process of its own; this test has not
     path = tlog(tmp_path / "a.tlog", [])
     with pytest.raises(DataFileError, match=r"a telemetry log needs pymavlink: pip install 'rov-fmu\[mavlink\]'"):
         parsers.read_guarded(tmp_path, path, parsers._TELEMETRY, ())
