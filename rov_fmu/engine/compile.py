@@ -28,6 +28,7 @@ UNITY_FILE = "fmu.c"
 MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
+FILTER_FILE = FMU_SRC / "engine" / "filter.c"
 _LOCATION_FILE = FMU_SRC / "python" / "location.c"
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """The name by which PythonFMU's library for Linux knows itself."""
@@ -168,17 +169,21 @@ def compile_location(pythonfmu: bytes) -> bytes:
     return _side_by_side({_LOCATION_FILE.name: partial(_compile_location, pythonfmu)})[_LOCATION_FILE.name]
 
 
-def engine_flags() -> list[str]:
-    """Return the compiler's arguments for the engine. They are those of the FMU, so the numbers are the same."""
+def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
+    """Return the compiler's arguments for a file of the engine: those of the FMU, so the numbers are the same."""
     name = host_platform(fmi=3)
     target = ["-target", PLATFORMS[name].target] if name else ["-mcpu=baseline"]
     libraries = PLATFORMS[name].flags if name else ("-lm",)
-    return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, "-Wno-unused-function", ENGINE_FILE.name, *libraries]
+    return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, "-Wno-unused-function", file, *libraries]
 
 
 def compile_engine(sources: Mapping[str, str]) -> bytes:
-    """Compile sources (file name to text) to the engine's library for this machine. Raises BuildError."""
-    return _side_by_side({ENGINE_FILE.name: partial(_compile_engine, sources)})[ENGINE_FILE.name]
+    """Compile sources (file name to text), the last of which includes the others, to a library for this machine.
+
+    Raises BuildError.
+    """
+    *_, file = sources
+    return _side_by_side({file: partial(_compile_engine, sources)})[file]
 
 
 def _side_by_side(
@@ -314,7 +319,8 @@ def _compile_module(sources: Mapping[str, str], compilers: _Compilers) -> bytes:
 
 def _compile_engine(sources: Mapping[str, str], compilers: _Compilers) -> bytes:
     with _folder_of(sources) as folder:
-        command = [*compiler(), *engine_flags(), "-o", "engine.library"]
+        *_, file = sources
+        command = [*compiler(), *engine_flags(file), "-o", "engine.library"]
         compilers.run(command, folder, "the C compiler failed for the engine", most_lines=1)
         return Path(folder, "engine.library").read_bytes()
 

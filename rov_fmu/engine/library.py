@@ -1,4 +1,4 @@
-"""The compiled engine of a vehicle. It is loaded from the user's cache folder, or compiled if it is not there yet."""
+"""The compiled engine or filter of a vehicle, from the user's cache folder, or compiled if it is not there yet."""
 
 import ctypes
 import hashlib
@@ -19,24 +19,24 @@ from rov_fmu.io.output import Output, write_whole
 from rov_fmu.model.rov import Rov
 
 _LOADED: dict[str, ctypes.CDLL] = {}
-"""The libraries that this process has loaded, by the layout of the vehicle."""
+"""The libraries that this process has loaded, by the file and the layout of the vehicle."""
 _LOADING = Lock()
 
 
-def load_library(rov: Rov) -> ctypes.CDLL:
-    """Return the library of a vehicle. It depends on the vehicle's layout, but not on its coefficients.
+def load_library(rov: Rov, file: Path = ENGINE_FILE) -> ctypes.CDLL:
+    """Return the library of a vehicle made from a file of the engine. It does not depend on the coefficients.
 
     Raises BuildError when it cannot be compiled or loaded.
     """
-    layout = repr(rov.layout)
+    key = f"{file.name} {rov.layout!r}"
     with _LOADING:
-        if layout not in _LOADED:
-            texts = {**sources(rov.layout), ENGINE_FILE.name: ENGINE_FILE.read_text(encoding="utf-8")}
+        if key not in _LOADED:
+            texts = {**sources(rov.layout), file.name: file.read_text(encoding="utf-8")}
             try:
-                _LOADED[layout] = _load(texts)
+                _LOADED[key] = _load(texts)
             except OSError as error:
                 raise BuildError(f"the engine cannot be loaded: {error}") from error
-        return _LOADED[layout]
+        return _LOADED[key]
 
 
 def _load(texts: dict[str, str]) -> ctypes.CDLL:

@@ -1,0 +1,690 @@
+/* An extended Kalman filter for the identification (rov_fmu/engine/filter.py): it runs through the samples of one log.
+ *
+ * The model is a stochastic differential equation around the vehicle's equation of motion:
+ *
+ *     x' = f(x, (1 + g) thrust, force)     the states of the vehicle
+ *     force_i, g, drift_i                  a slow force along each axis, a slow change of all thrust, and a slow velocity over ground:
+ *                                          Ornstein-Uhlenbeck processes, each with a size and a time constant
+ *     y = h(x, drift) + n + e              a sample: n is the sensor's coloured noise, also such a process, and e is white
+ *
+ * A change of the commands happens at an unknown time within a window. The mean uses the expected command, and the state `lateness`
+ * has the deviation of the integral of the command from its mean. The mean takes fourth-order Runge-Kutta steps; the covariance
+ * follows from the derivatives of the rates in the middle of each step. Names as in step.c: at, n, q. */
+#include <stddef.h>
+
+#include "model.h"
+
+#include "series.c"
+
+#include "step.c"
+
+#if defined _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum {
+    N_AXES = N_MONITORED,
+    N_DRIFTS = 3,
+    MOST_SENSORS = 16,
+    FORCE = N_STATES, /* the places of the states after those of the vehicle */
+    GAIN = FORCE + N_AXES,
+    DRIFT = GAIN + 1,
+    NOISE = DRIFT + N_DRIFTS,
+    LATENESS = NOISE + MOST_SENSORS,
+    N_X,
+    N_SLOW = LATENESS - FORCE, /* the Ornstein-Uhlenbeck processes */
+    N_HELD = sizeof(model_held) / sizeof(double)
+};
+
+static const double TURN = 6.283185307179586;
+static const double MARGIN = 0.005;   /* s: how near to a step a change of a command matters */
+static const double TINY = 1e-60;
+static const double OUTLYING = 4.0; /* standard deviations: larger innovations count as if they grew linearly (Huber) */
+
+/* How a sensor's value follows from the states. */
+enum { STATE, OVER_GROUND, ANGLE };
+
+/* Where the filter finds what it needs in the layout. A place is -1 where the vehicle has no such variable. */
+typedef struct {
+    int external[N_AXES];    /* the inputs of force or torque along each axis */
+    int direction[N_AXES];   /* 0 for a velocity ahead, 1 to starboard, 2 down, -1 for a turn */
+    int current[N_DRIFTS];   /* the inputs of the current: north, east, down */
+    int position[N_DRIFTS];  /* the states of the position: north, east, down */
+    int quaternion, heading; /* the first state of the quaternion, or the state of the heading */
+    int load;                /* the coefficient of the constant load along heave */
+} places;
+
+/* A log. */
+typedef struct {
+    ptrdiff_t samples, rows, sensors;
+    const double *time, *value;  /* of each sample, in the order of time */
+    const int *sensor;           /* of each sample */
+    const int *kind, *place;     /* of each sensor: STATE, OVER_GROUND or ANGLE, and the variable or the number of the axis */
+    const double *since, *told;  /* of each row of inputs: the change happens after `since`, and is told at `told` */
+    const double *start, *error; /* the states at the first sample, and their standard deviations; N_X numbers each */
+    const int *active;           /* for each state, whether it has a covariance; N_X numbers */
+    ptrdiff_t tilts;             /* the times at which the roll and pitch of a vehicle that has neither state are known, or 0 */
+    const double *tilt_time, *roll, *pitch;
+    double longest, changing;    /* the longest step, and the longest one in which a command changes, s */
+    double share;                /* the longest step relative to the fastest time constant */
+} record;
+
+/* One set of parameters. */
+typedef struct {
+    double at[N_VARIABLES];                   /* the coefficients, and the inputs besides the commands */
+    double size[N_SLOW], time_constant[N_SLOW]; /* of the slow processes */
+    double white[MOST_SENSORS];               /* the standard deviation of each sensor's white noise */
+    double unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
+    double offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
+                                                 the time between two rows */
+} parameters;
+
+/* What one run writes for each sample; each may be NULL. `pieces` and `gain` are read in a run that repeats another one. */
+typedef struct {
+    double *innovation, *variance; /* samples */
+    int *pieces;                   /* samples: the number of steps before the sample */
+    double *gain;                  /* samples x N_X: the change of the states per innovation, in the units of the set */
+    double *states, *deviations;   /* samples x N_X: the states after the sample, and their standard deviations */
+} output;
+
+/* How a run treats the samples. */
+typedef struct {
+    int repeats;        /* 0: compute `pieces` and `gain`; 1: take `pieces`; 2: take both, and no covariance */
+    double begin, span; /* the innovations are those of a prediction that starts anew at `begin` and then after each span; < 0: none */
+} mode;
+
+typedef struct {
+    double x[N_X], P[N_X][N_X];
+} belief;
+
+typedef struct {
+    const places *where;
+    const record *log;
+    const parameters *set;
+    model_numbers n;
+    model_held *thrust; /* of each row */
+    int listed[N_X], count;
+    belief now, ahead; /* after all samples so far, and the prediction */
+    ptrdiff_t row, reset, tilt;
+    double phi, theta, theta_rate; /* the measured roll and pitch at the time of the step or sample, and the rate of the pitch */
+} filter;
+
+/* Return a number, or 0 for a tiny one. What decays for long would become so small that processors compute with it a hundred times
+ * more slowly. */
+static double flushed(double value)
+{
+    return fabs(value) < TINY ? 0.0 : value;
+}
+
+/* ---- The mean ----------------------------------------------------------------------------------------------------- */
+
+/* Compute the rotation matrix from the body to the earth. */
+static void rotation(const filter *f, const double x[N_X], double R[3][3])
+{
+    if (f->where->quaternion >= 0) {
+        const double *q = x + f->where->quaternion - FIRST_STATE;
+        const double s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        R[0][0] = 1.0 - s * (q[2] * q[2] + q[3] * q[3]);
+        R[0][1] = s * (q[1] * q[2] - q[0] * q[3]);
+        R[0][2] = s * (q[1] * q[3] + q[0] * q[2]);
+        R[1][0] = s * (q[1] * q[2] + q[0] * q[3]);
+        R[1][1] = 1.0 - s * (q[1] * q[1] + q[3] * q[3]);
+        R[1][2] = s * (q[2] * q[3] - q[0] * q[1]);
+        R[2][0] = s * (q[1] * q[3] - q[0] * q[2]);
+        R[2][1] = s * (q[2] * q[3] + q[0] * q[1]);
+        R[2][2] = 1.0 - s * (q[1] * q[1] + q[2] * q[2]);
+    } else {
+        const double psi = f->where->heading >= 0 ? x[f->where->heading - FIRST_STATE] : 0.0;
+        const double cf = cos(f->phi), sf = sin(f->phi), ct = cos(f->theta), st = sin(f->theta), cp = cos(psi), sp = sin(psi);
+        R[0][0] = cp * ct;
+        R[0][1] = cp * st * sf - sp * cf;
+        R[0][2] = cp * st * cf + sp * sf;
+        R[1][0] = sp * ct;
+        R[1][1] = sp * st * sf + cp * cf;
+        R[1][2] = sp * st * cf - cp * sf;
+        R[2][0] = -st;
+        R[2][1] = ct * sf;
+        R[2][2] = ct * cf;
+    }
+}
+
+/* Take the roll and the pitch at a time, which does not decrease by much from call to call. */
+static void set_tilt(filter *f, double t)
+{
+    const record *log = f->log;
+    if (log->tilts < 2) {
+        return;
+    }
+    while (f->tilt > 0 && log->tilt_time[f->tilt] > t) {
+        f->tilt--;
+    }
+    while (f->tilt + 2 < log->tilts && log->tilt_time[f->tilt + 1] <= t) {
+        f->tilt++;
+    }
+    const double *time = log->tilt_time + f->tilt, *roll = log->roll + f->tilt, *pitch = log->pitch + f->tilt;
+    const double h = time[1] - time[0], share = fmin(fmax((t - time[0]) / h, 0.0), 1.0);
+    f->phi = roll[0] + share * (roll[1] - roll[0]);
+    f->theta = pitch[0] + share * (pitch[1] - pitch[0]);
+    f->theta_rate = (pitch[1] - pitch[0]) / h;
+}
+
+/* Return the velocity of the vehicle over ground along an axis of the earth, with its row of the rotation matrix. */
+static double over_ground(const filter *f, const double x[N_X], const double row[3], int axis)
+{
+    double found = f->where->current[axis] >= 0 ? f->set->at[f->where->current[axis]] : 0.0;
+    for (int i = 0; i < N_AXES; i++) {
+        found += f->where->direction[i] >= 0 ? row[f->where->direction[i]] * x[i] : 0.0;
+    }
+    return found;
+}
+
+/* Compute the rates of the vehicle's states. */
+static void rates(const filter *f, const double x[N_X], const double held[N_HELD], double rate[N_STATES])
+{
+    double at[N_VARIABLES], scaled[N_HELD], R[3][3];
+    const bool tilts = f->log->tilts >= 2;
+    model_held q;
+    memcpy(at, f->set->at, sizeof at);
+    memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
+    for (int i = 0; i < N_AXES; i++) {
+        at[f->where->external[i]] += x[FORCE + i];
+    }
+    if (tilts) { /* the load along heave is a net weight, which stays vertical */
+        const double load = f->where->load >= 0 ? at[f->where->load] : 0.0;
+        rotation(f, x, R);
+        for (int i = 0; i < N_AXES; i++) {
+            const int along = f->where->direction[i];
+            at[f->where->external[i]] += along >= 0 ? load * (R[2][along] - (along == 2 ? 1.0 : 0.0)) : 0.0;
+        }
+    }
+    for (int i = 0; i < N_HELD; i++) {
+        scaled[i] = held[i] * (1.0 + x[GAIN]);
+    }
+    memcpy(&q, scaled, sizeof q);
+#if !HAS_LAG
+    model_hold(at, &f->n, &q);
+#endif
+    model_derive(at, &f->n, &q);
+    memcpy(rate, at + FIRST_STATE + N_STATES, N_STATES * sizeof rate[0]);
+    for (int i = 0; i < N_DRIFTS; i++) {
+        if (f->where->position[i] >= 0) {
+            double *position = &rate[f->where->position[i] - FIRST_STATE];
+            *position = (tilts ? over_ground(f, x, R[i], i) : *position) + x[DRIFT + i];
+        }
+    }
+    if (tilts && f->where->heading >= 0) {
+        double *heading = &rate[f->where->heading - FIRST_STATE];
+        *heading = (*heading + f->theta_rate * sin(f->phi)) / (cos(f->phi) * cos(f->theta));
+    }
+}
+
+static double window(const filter *f, ptrdiff_t row)
+{
+    return f->set->width * (f->log->told[row] - f->log->since[row]);
+}
+
+/* Return the integral until t of the expected share of a row's change that has happened. */
+static double happened(const filter *f, ptrdiff_t row, double t)
+{
+    const double width = window(f, row), since = t - (f->log->told[row] + f->set->offset - 0.5 * width);
+    return since <= 0.0 ? 0.0 : since < width ? 0.5 * since * since / width : since - 0.5 * width;
+}
+
+/* Return the standard deviation of the time since a change, which is uniformly distributed over a window. */
+static double spread(const filter *f, ptrdiff_t row, double t)
+{
+    const double width = window(f, row), begin = f->log->told[row] + f->set->offset - 0.5 * width;
+    const double since = fmin(fmax(t - begin, 0.0), width);
+    return width > 0.0 ? since * sqrt(fmax(since / width * (1.0 / 3.0 - 0.25 * since / width), 0.0)) : 0.0;
+}
+
+/* Return what a row commands. The struct has numbers alone. */
+static const double *commanded(const filter *f, ptrdiff_t row)
+{
+    return (const double *)&f->thrust[row];
+}
+
+/* Compute the mean thrust over a step. Changes that end before it are behind `row`. */
+static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, double held[N_HELD])
+{
+    memcpy(held, commanded(f, row), N_HELD * sizeof held[0]);
+    for (ptrdiff_t j = row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < to; j++) {
+        const double share = (happened(f, j, to) - happened(f, j, from)) / (to - from);
+        const double *before = commanded(f, j - 1), *after = commanded(f, j);
+        for (int i = 0; i < N_HELD; i++) {
+            held[i] += share * (after[i] - before[i]);
+        }
+    }
+}
+
+/* Take one Runge-Kutta step, and compute the states in its middle. */
+static void step_mean(const filter *f, double x[N_X], const double held[N_HELD], double h, const double remains[N_SLOW],
+                      double middle[N_X])
+{
+    double k[4][N_STATES], y[N_X];
+    memcpy(y, x, sizeof y);
+    for (int stage = 0; stage < 4; stage++) {
+        const double part = stage == 2 ? h : 0.5 * h;
+        rates(f, y, held, k[stage]);
+        for (int i = 0; i < N_STATES; i++) {
+            y[i] = x[i] + part * k[stage][i];
+        }
+        if (stage == 1) {
+            memcpy(middle, y, sizeof y);
+        }
+    }
+    for (int i = 0; i < N_STATES; i++) {
+        x[i] = flushed(x[i] + h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]));
+    }
+    for (int i = 0; i < N_SLOW; i++) {
+        x[FORCE + i] = flushed(x[FORCE + i] * remains[i]);
+    }
+    x[LATENESS] = 0.0;
+}
+
+/* ---- The covariance ----------------------------------------------------------------------------------------------- */
+
+/* The entries other than 0 of a matrix, row by row. A column is the place of a listed state. */
+typedef struct {
+    int count[N_STATES], column[N_STATES][N_X];
+    double entry[N_STATES][N_X];
+} sparse;
+
+/* Compute the derivatives of the rates of the vehicle's states with respect to the listed states. */
+static void slopes(const filter *f, const double x[N_X], const double held[N_HELD], sparse *A)
+{
+    double base[N_STATES], moved[N_STATES], y[N_X];
+    memset(A->count, 0, sizeof A->count);
+    memcpy(y, x, sizeof y);
+    rates(f, x, held, base);
+    for (int c = 0; c < f->count && f->listed[c] < NOISE; c++) {
+        const int j = f->listed[c];
+        const double change = j < FORCE ? 1e-6 * (1.0 + fabs(x[j])) : 1e-3;
+        y[j] = x[j] + change;
+        rates(f, y, held, moved);
+        y[j] = x[j];
+        for (int i = 0; i < N_STATES; i++) {
+            if (moved[i] != base[i]) {
+                A->column[i][A->count[i]] = c;
+                A->entry[i][A->count[i]++] = (moved[i] - base[i]) / change;
+            }
+        }
+    }
+}
+
+/* Return how many of the listed states are those of the vehicle. They stand first. */
+static int vehicle_count(const filter *f)
+{
+    int found = 0;
+    while (found < f->count && f->listed[found] < N_STATES) {
+        found++;
+    }
+    return found;
+}
+
+/* Compute the listed rows of 1 + h A + h^2 A^2 / 2. */
+static void transition(const filter *f, const sparse *A, double h, sparse *phi)
+{
+    const int vehicle = vehicle_count(f);
+    for (int a = 0; a < vehicle; a++) {
+        const int i = f->listed[a];
+        double row[N_X] = {0.0};
+        for (int k = 0; k < A->count[i]; k++) {
+            const int b = A->column[i][k];
+            const double entry = h * A->entry[i][k];
+            row[b] += entry;
+            if (b < vehicle) {
+                const int j = f->listed[b];
+                for (int l = 0; l < A->count[j]; l++) {
+                    row[A->column[j][l]] += 0.5 * h * entry * A->entry[j][l];
+                }
+            }
+        }
+        row[a] += 1.0;
+        phi->count[a] = 0;
+        for (int b = 0; b < f->count; b++) {
+            if (row[b] != 0.0) {
+                phi->column[a][phi->count[a]] = b;
+                phi->entry[a][phi->count[a]++] = row[b];
+            }
+        }
+    }
+}
+
+/* Move the covariance over one step. `late` is the change of each rate by the growth of the lateness; `remains` is how much of each
+ * slow process remains. */
+static void step_covariance(const filter *f, double P[N_X][N_X], const sparse *phi, const double late[N_STATES], const double remains[N_SLOW])
+{
+    const int n = f->count, last = n - 1, vehicle = vehicle_count(f);
+    double moved[N_STATES][N_X];
+    for (int a = 0; a < vehicle; a++) {
+        for (int b = 0; b < n; b++) {
+            moved[a][b] = late[f->listed[a]] * P[last][b];
+        }
+        for (int c = 0; c < phi->count[a]; c++) {
+            for (int b = 0; b < n; b++) {
+                moved[a][b] += phi->entry[a][c] * P[phi->column[a][c]][b];
+            }
+        }
+    }
+    for (int a = 0; a < vehicle; a++) {
+        for (int b = 0; b <= a; b++) {
+            double sum = moved[a][last] * late[f->listed[b]];
+            for (int c = 0; c < phi->count[b]; c++) {
+                sum += moved[a][phi->column[b][c]] * phi->entry[b][c];
+            }
+            P[a][b] = P[b][a] = flushed(sum);
+        }
+        P[a][last] = P[last][a] = flushed(moved[a][last]);
+    }
+    for (int a = vehicle; a < last; a++) {
+        const int slow = f->listed[a] - FORCE;
+        const double size = f->set->size[slow];
+        for (int b = 0; b < vehicle; b++) {
+            P[a][b] = P[b][a] = flushed(remains[slow] * moved[b][a]);
+        }
+        for (int b = vehicle; b < a; b++) {
+            P[a][b] = P[b][a] = flushed(remains[slow] * remains[f->listed[b] - FORCE] * P[a][b]);
+        }
+        P[a][last] = P[last][a] = flushed(remains[slow] * P[a][last]);
+        P[a][a] = remains[slow] * remains[slow] * (P[a][a] - size * size) + size * size;
+    }
+}
+
+/* Let the lateness begin anew, uncorrelated with the other states. */
+static void reset_lateness(const filter *f, double P[N_X][N_X])
+{
+    const int last = f->count - 1;
+    for (int b = 0; b <= last; b++) {
+        P[last][b] = P[b][last] = 0.0;
+    }
+    P[last][last] = 1.0;
+}
+
+/* ---- Steps and samples -------------------------------------------------------------------------------------------- */
+
+/* Move a belief from one time to another in a number of steps. */
+static void advance(filter *f, belief *b, double from, double to, int pieces, bool has_covariance)
+{
+    const double h = (to - from) / pieces;
+    ptrdiff_t row = f->row, reset = f->reset;
+    double remains[N_SLOW];
+    sparse A, phi;
+    for (int i = 0; i < N_SLOW; i++) {
+        remains[i] = exp(-h / f->set->time_constant[i]);
+    }
+    for (int piece = 0; piece < pieces; piece++) {
+        const double begin = from + piece * h, end = begin + h;
+        double held[N_HELD], middle[N_X], late[N_STATES] = {0.0};
+        while (row + 1 < f->log->rows && f->log->told[row + 1] + f->set->offset + 0.5 * window(f, row + 1) <= begin) {
+            row++;
+        }
+        set_tilt(f, 0.5 * (begin + end));
+        mean_thrust(f, row, begin, end, held);
+        step_mean(f, b->x, held, h, remains, middle);
+        if (!has_covariance) {
+            continue;
+        }
+        if (piece % 4 == 0) { /* the derivatives of the rates change slowly */
+            slopes(f, middle, held, &A);
+            transition(f, &A, h, &phi);
+        }
+        for (ptrdiff_t j = row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < end; j++) {
+            const double growth = spread(f, j, end) - spread(f, j, begin);
+            double r0[N_STATES], r1[N_STATES];
+            if (reset < j) {
+                reset = j;
+                reset_lateness(f, b->P);
+            }
+            if (growth > 0.0) {
+                rates(f, middle, commanded(f, j - 1), r0);
+                rates(f, middle, commanded(f, j), r1);
+                for (int i = 0; i < N_STATES; i++) {
+                    late[i] += growth * (r1[i] - r0[i]);
+                }
+            }
+        }
+        step_covariance(f, b->P, &phi, late, remains);
+    }
+}
+
+/* Move the rows on that are over before a time. */
+static void pass_rows(filter *f, double time)
+{
+    const record *log = f->log;
+    while (f->row + 1 < log->rows && log->told[f->row + 1] + f->set->offset + 0.5 * window(f, f->row + 1) <= time) {
+        f->row++;
+    }
+    while (f->reset + 1 < log->rows && log->told[f->reset + 1] + f->set->offset - 0.5 * window(f, f->reset + 1) < time) {
+        f->reset++;
+    }
+}
+
+/* Return what a sensor measures without noise. */
+static double measured(const filter *f, const double x[N_X], ptrdiff_t sensor)
+{
+    const int place = f->log->place[sensor];
+    double R[3][3], value;
+    if (f->log->kind[sensor] == STATE) {
+        return x[place - FIRST_STATE];
+    }
+    rotation(f, x, R);
+    if (f->log->kind[sensor] == ANGLE) { /* the place is 0 for roll, 1 for pitch, 2 for the heading */
+        return place == 0 ? atan2(R[2][1], R[2][2]) : place == 1 ? -asin(fmax(fmin(R[2][0], 1.0), -1.0)) : atan2(R[1][0], R[0][0]);
+    }
+    value = 0.0; /* the place is the number of the direction: ahead, to starboard, down */
+    for (int i = 0; i < N_DRIFTS; i++) {
+        const double current = f->where->current[i] >= 0 ? f->set->at[f->where->current[i]] : 0.0;
+        value += R[i][place] * (x[DRIFT + i] + current);
+    }
+    for (int i = 0; i < N_AXES; i++) {
+        value += f->where->direction[i] == place ? x[i] : 0.0;
+    }
+    return value;
+}
+
+/* Return true for a state that the attitude depends on. */
+static bool turns(const filter *f, int state)
+{
+    const int quaternion = f->where->quaternion - FIRST_STATE;
+    return f->where->quaternion >= 0 ? state >= quaternion && state < quaternion + 4 : state + FIRST_STATE == f->where->heading;
+}
+
+/* Compute the derivatives of what a sensor measures with respect to the listed states. */
+static void gradient(const filter *f, const double x[N_X], ptrdiff_t sensor, double H[N_X])
+{
+    const int kind = f->log->kind[sensor], place = f->log->place[sensor];
+    double y[N_X], R[3][3] = {{0.0}};
+    double base = 0.0;
+    if (kind != STATE) {
+        memcpy(y, x, sizeof y);
+        rotation(f, x, R);
+        base = measured(f, x, sensor);
+    }
+    for (int c = 0; c < f->count; c++) {
+        const int j = f->listed[c];
+        H[c] = j == NOISE + sensor ? 1.0 : 0.0;
+        if (kind == STATE) {
+            H[c] += j == place - FIRST_STATE ? 1.0 : 0.0;
+        } else if (turns(f, j)) {
+            y[j] = x[j] + 1e-6;
+            H[c] = remainder(measured(f, y, sensor) - base, TURN) / 1e-6;
+            y[j] = x[j];
+        } else if (kind == OVER_GROUND && j < N_AXES) {
+            H[c] = f->where->direction[j] == place ? 1.0 : 0.0;
+        } else if (kind == OVER_GROUND && j >= DRIFT && j < NOISE) {
+            H[c] = R[j - DRIFT][place];
+        }
+    }
+}
+
+/* Return the innovation of a sample. Angles are compared within half a turn. */
+static double innovation(const filter *f, const belief *b, ptrdiff_t k)
+{
+    const int sensor = f->log->sensor[k];
+    const double off = f->log->value[k] - measured(f, b->x, sensor) - b->x[NOISE + sensor];
+    const bool wraps = f->log->kind[sensor] == ANGLE || f->log->place[sensor] == f->where->heading;
+    return wraps && f->log->kind[sensor] != OVER_GROUND ? remainder(off, TURN) : off;
+}
+
+/* Compute P H and return the variance H P H + white noise. */
+static double project(const filter *f, const belief *b, ptrdiff_t sensor, double PH[N_X])
+{
+    const double white = f->set->white[sensor];
+    double H[N_X], variance = white * white;
+    gradient(f, b->x, sensor, H);
+    memset(PH, 0, N_X * sizeof PH[0]);
+    for (int c = 0; c < f->count; c++) {
+        if (H[c] != 0.0) {
+            for (int a = 0; a < f->count; a++) {
+                PH[a] += H[c] * b->P[c][a];
+            }
+        }
+    }
+    for (int c = 0; c < f->count; c++) {
+        variance += H[c] * PH[c];
+    }
+    return variance;
+}
+
+/* Correct the states by an innovation. The quaternion keeps the length 1. */
+static void correct(const filter *f, belief *b, const double gain[N_X], double off)
+{
+    for (int i = 0; i < N_X; i++) {
+        b->x[i] += f->set->unit[i] * gain[i] * off;
+    }
+    if (f->where->quaternion >= 0) {
+        double *q = b->x + f->where->quaternion - FIRST_STATE;
+        const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        for (int i = 0; i < 4; i++) {
+            q[i] /= length;
+        }
+    }
+}
+
+/* Take one sample into the belief, and write its innovation, its variance and its gain. */
+static void take(const filter *f, belief *b, ptrdiff_t k, int repeats, double *off, double *variance, double gain[N_X])
+{
+    const int sensor = f->log->sensor[k];
+    *off = innovation(f, b, k);
+    if (repeats == 2) {
+        correct(f, b, gain, *off);
+        return;
+    }
+    double PH[N_X];
+    *variance = project(f, b, sensor, PH);
+    const double size = fabs(*off) / sqrt(*variance), weight = size > OUTLYING ? OUTLYING / size : 1.0;
+    memset(gain, 0, N_X * sizeof gain[0]);
+    for (int a = 0; a < f->count; a++) {
+        const double share = PH[a] / *variance;
+        gain[f->listed[a]] = weight * share / f->set->unit[f->listed[a]];
+        for (int c = 0; c < f->count; c++) {
+            b->P[a][c] -= share * PH[c];
+        }
+    }
+    correct(f, b, gain, *off);
+}
+
+/* Return how many steps the time before a sample needs: none is longer than `longest`, or than a share of the fastest time constant.
+ * Steps in which a command changes are shorter, because they take the mean of the thrust. */
+static int pieces_over(const filter *f, double from, double to)
+{
+    double fastest = 1.0 / f->log->longest;
+    sparse A;
+    slopes(f, f->now.x, commanded(f, f->row), &A);
+    for (int i = 0; i < N_STATES; i++) {
+        for (int k = 0; k < A.count[i]; k++) {
+            fastest = fmax(fastest, f->listed[A.column[i][k]] == i ? fabs(A.entry[i][k]) / f->log->share : 0.0);
+        }
+    }
+    for (ptrdiff_t j = f->row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < to + MARGIN; j++) {
+        if (f->log->told[j] + f->set->offset + 0.5 * window(f, j) > from - MARGIN) {
+            fastest = fmax(fastest, 1.0 / f->log->changing);
+        }
+    }
+    return (int)fmin(fmax(ceil((to - from) * fastest - 1e-6), 1.0), 1e5);
+}
+
+/* Run through a log. `inputs` has N_INPUTS numbers for each row, which are added to those of the set. Returns 0, or 1 when a number
+ * is not finite. `scratch` has room for one model_held per row. */
+EXPORT int run_filter(const places *where, const record *log, const parameters *set, const double *inputs, const mode *how,
+                      const output *to, model_held *scratch)
+{
+    filter f = {.where = where, .log = log, .set = set, .thrust = scratch, .reset = 0};
+    double at[N_VARIABLES], own_gain[N_X];
+    const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
+    double restart = log->time[0] + how->begin, last = log->time[0];
+    memcpy(at, set->at, sizeof at);
+    model_prepare(at, &f.n);
+    for (ptrdiff_t j = 0; j < log->rows; j++) {
+        memset(&scratch[j], 0, sizeof scratch[j]);
+        for (int i = 0; i < N_INPUTS; i++) {
+            at[i] = set->at[i] + inputs[j * N_INPUTS + i];
+        }
+        model_thrust(at, &scratch[j]);
+    }
+    for (int i = 0; i < N_X; i++) {
+        if (log->active[i]) {
+            f.listed[f.count++] = i;
+        }
+    }
+    memcpy(f.now.x, log->start, sizeof f.now.x);
+    for (int a = 0; a < f.count; a++) {
+        const int i = f.listed[a];
+        const double error = i >= FORCE && i < LATENESS ? set->size[i - FORCE] : log->error[i];
+        f.now.P[a][a] = error * error;
+    }
+    pass_rows(&f, last);
+    set_tilt(&f, last);
+    f.ahead = f.now;
+    for (ptrdiff_t k = 0; k < log->samples; k++) {
+        const double h = log->time[k] - last;
+        double off = 0.0, variance = 0.0, *gain = to->gain ? to->gain + k * N_X : own_gain;
+        if (h > 0.0) {
+            const int pieces = how->repeats ? to->pieces[k] : pieces_over(&f, last, log->time[k]);
+            to->pieces[k] = pieces;
+            advance(&f, &f.now, last, log->time[k], pieces, has_covariance);
+            if (predicts) {
+                advance(&f, &f.ahead, last, log->time[k], pieces, has_covariance);
+            }
+            last = log->time[k];
+            pass_rows(&f, last);
+            set_tilt(&f, last);
+        }
+        if (predicts && log->time[k] >= restart) {
+            f.ahead = f.now;
+            restart += how->span * (floor((log->time[k] - restart) / how->span) + 1.0);
+        }
+        if (predicts) {
+            double PH[N_X];
+            const double ahead = innovation(&f, &f.ahead, k);
+            const double its_variance = has_covariance ? project(&f, &f.ahead, log->sensor[k], PH) : 0.0;
+            take(&f, &f.now, k, how->repeats, &off, &variance, gain);
+            off = ahead;
+            variance = its_variance;
+        } else {
+            take(&f, &f.now, k, how->repeats, &off, &variance, gain);
+        }
+        if (!isfinite(off)) {
+            return 1;
+        }
+        to->innovation[k] = off;
+        if (has_covariance) {
+            to->variance[k] = variance;
+        }
+        for (int a = 0; a < f.count && to->states; a++) {
+            to->states[k * N_X + f.listed[a]] = f.now.x[f.listed[a]];
+            to->deviations[k * N_X + f.listed[a]] = sqrt(fmax(f.now.P[a][a], 0.0));
+        }
+    }
+    return 0;
+}
+
+/* Return the sizes that Python needs to lay out its arrays. */
+EXPORT void filter_sizes(int sizes[6])
+{
+    const int found[6] = {N_X, N_AXES, MOST_SENSORS, N_VARIABLES, N_INPUTS, (int)sizeof(model_held)};
+    memcpy(sizes, found, sizeof found);
+}
