@@ -16,6 +16,7 @@ from docs import compared
 from rov_fmu.cli import _commands
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
+from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.model.layout import AXES
 from rov_fmu.report.page import equations
@@ -29,7 +30,10 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Table = list[tuple[str, ...]]
-_NAMES = ("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md", "identify.md")
+_NAMES = (
+    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md"),
+    *("identify-formats.md", "identify-method.md"),
+)
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
 """The vehicles with a drawing. The refit of the VideoRay has the same thrusters."""
@@ -48,10 +52,16 @@ def tables() -> dict[str, Table]:
     }
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
     found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
-    found |= {"columns": _columns(), "messages": _messages()}
+    found |= {"columns": _columns(), "messages": _messages(), "priors": _priors()}
     plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
     found |= {name: _plan_table(of) for name, of in plans.items()}
     return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
+
+
+def _priors() -> Table:
+    """Return the deviations of the priors of an identification, with their keys in rov.toml."""
+    rows = ((f"`{key}`", f"{prior.deviation:g}", prior.words, prior.reason) for key, prior in PRIORS.items())
+    return [("key", "deviation", "of", "reason"), ("---",) * 4, *rows]
 
 
 def _columns() -> Table:

@@ -629,10 +629,11 @@ def _identify(
 
     Without a rov.toml, the command lists what the logs contain, and --draft writes a draft of it.
     """
+    from rov_fmu.identify.findings import by_heading
     from rov_fmu.interface.identify_command import identify_folder
     from rov_fmu.interface.inspect_command import lacks_description
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
-    from rov_fmu.report.console_results import axes_with_warnings, print_identification
+    from rov_fmu.report.console_results import print_identification
     from rov_fmu.report.progress import parts
 
     writes = output or report or force
@@ -650,7 +651,7 @@ def _identify(
     name = identification.vehicle.identifier
     whole = "identify", folder, "-o", f"{name}.toml", "--report", report or f"{name}.html"
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
-    if axes_with_warnings(identification):
+    if by_heading(identification.findings)["Warnings"]:
         following = f"check the warnings, then {following}"
     print_end([path for path in (output, report) if path], following)
 

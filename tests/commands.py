@@ -17,6 +17,8 @@ ROOT = Path(__file__).parent.parent
 REFIT = SHIPPED["videoray_refit"]
 TESTS = REFIT.parent / "tank_tests"
 """The tank tests that ship."""
+FROZEN_REFIT = ROOT / "tests" / "frozen" / "vehicles" / "videoray_refit" / "videoray_refit.toml"
+"""The refit of an earlier version, whose numbers stay."""
 BARE = ROOT / "verification" / "fuzzing" / "bare.toml"
 """A vehicle that builds quickly, with one axis and one thruster."""
 ALONE = re.sub(r"^(data|pictures) = .*\n", "", VIDEORAY.read_text(encoding="utf-8"), flags=re.M)

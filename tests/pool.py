@@ -7,9 +7,9 @@ from math import radians
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.model.layout import AXIS, CURVE, Axis, coefficient_name
 from rov_fmu.model.rov import Rov
+from tests.recordings import Measured
 from verification.references.pool import Array, swim
 
 Plan = Sequence[tuple[float, float]]
@@ -62,7 +62,7 @@ class Run:
         noise: float = 1.0,
         colour: float = 0.0,
         jitter: float = 0.0,
-    ) -> Recording:
+    ) -> Measured:
         """Return the recording of a sensor; velocities are over ground, and `noise` is a multiple of NOISE.
 
         `colour` is the correlation of the noise of successive samples, `jitter` the error of time stamps (s).
@@ -72,7 +72,7 @@ class Run:
         white = random.standard_normal(len(self.time))
         errors = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white) if colour else white
         values = np.interp(taken, self.time, values) + noise * NOISE[quantity] * errors
-        return Recording(file, self.axis, quantity, self.time, self.command, values)
+        return Measured(file, self.axis, quantity, self.time, self.command, values)
 
 
 def run(

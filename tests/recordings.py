@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -38,6 +37,23 @@ AXES = (SURGE, HEAVE, YAW)
 
 
 @dataclass(frozen=True, eq=False)
+class Measured:
+    """n samples of the only sensor of a test of one axis, SI units."""
+
+    file: str
+    axis: Axis
+    quantity: str
+    """`velocity`, or the position along or about the axis: distance, depth, heading."""
+    time: Array
+    command: Array
+    values: Array
+
+    @property
+    def is_position(self) -> bool:
+        return self.quantity != "velocity"
+
+
+@dataclass(frozen=True, eq=False)
 class Clean:
     """A recording without noise."""
 
@@ -47,21 +63,20 @@ class Clean:
     velocity: Array
     position: Array
 
-    def noisy(self, random: np.random.Generator, file: str = "log.csv", noise: float | None = None) -> Recording:
+    def noisy(self, random: np.random.Generator, file: str = "log.csv", noise: float | None = None) -> Measured:
         """Return the recording of the axis's sensor: depth, heading, or the velocity in surge."""
         quantity = "velocity" if self.axis is SURGE else self.axis.position
         values = self.velocity if quantity == "velocity" else self.position
         spread = NOISE[self.axis.name] if noise is None else noise
         values = values + spread * random.standard_normal(len(values))
-        return Recording(file, self.axis, quantity, self.time, self.command, values)
+        return Measured(file, self.axis, quantity, self.time, self.command, values)
 
 
-def write_log(folder: Path, name: str, recording: Recording) -> Path:
+def write_log(folder: Path, name: str, recording: Measured) -> Path:
     """Write the recording like a logger: commands in %, headings in degrees from 0 to 360."""
     heading = recording.quantity == "heading"
     values = np.degrees(recording.values) % 360.0 if heading else recording.values
     unit = "deg" if heading else "m" if recording.is_position else recording.axis.unit
-    assert recording.command is not None
     rows = [f"time [s],command [%],{recording.quantity} [{unit}]"]
     rows += [
         f"{t:.4f},{100.0 * c:g},{'' if np.isnan(v) else f'{v:.5f}'}"

@@ -46,7 +46,6 @@ LARGER_FOLDERS = {
     "tests": 13,
     "tests/fmu": 15,
     "tests/fmu/calls": 16,
-    "tests/identify": 14,
     "tests/model": 14,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""

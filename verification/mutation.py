@@ -2,7 +2,7 @@
 
 The mutants are those of cosmic-ray (Python) and universalmutator (C), which `pip install "rov-fmu[mutation]"` installs.
 
-`mutants.csv` keeps 200 mutants of the whole product of 8d6b1e9, with those that the tests kill. `--kept` applies them
+`mutants.csv` keeps those of 200 mutants of the whole product of 8d6b1e9 whose files still exist. `--kept` applies them
 to the code of today and runs the quickest of their tests first. It writes each verdict at once, so that it can be ended
 and called again. `--results` writes the verdicts of a later state to another file, and lists those that are killed no
 longer.
@@ -68,16 +68,16 @@ TESTS = {
     "rov_fmu/engine/*": "fmu/test_build_failures.py engine",
     "rov_fmu/vehicle/vehicle.py": "interface/test_model.py vehicle/test_vehicle.py vehicle",
     "rov_fmu/vehicle/*": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_writer.py vehicle",
-    "rov_fmu/identify/points/*": "identify/points/test_response_fit.py identify/points/test_thrust_fit.py identify",
-    "rov_fmu/identify/slips/*": "identify/test_slips.py identify",
-    "rov_fmu/identify/*": "identify/test_simulator.py identify/test_dive.py identify",
+    "rov_fmu/identify/tuning.py": "identify/test_tuning.py identify",
+    "rov_fmu/identify/likelihood/*": "identify/likelihood identify/test_identify.py identify",
+    "rov_fmu/identify/*": "identify/test_findings.py identify/test_identify.py identify",
     "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
-    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_left_out.py",
+    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_identify.py",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
     "rov_fmu/report/page/*": "report/test_equations.py report/test_fmu_page.py report",
-    "rov_fmu/report/*": "report/test_report_parts.py report/test_report.py report",
+    "rov_fmu/report/*": "report/test_report.py report",
     "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_samples.py study",
     "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",

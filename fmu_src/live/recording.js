@@ -1,4 +1,4 @@
-// A recording of tank tests (docs/identify.md, "Logs") that is flown again, to compare the prediction with the measurements.
+// A recording of tank tests (docs/identify-formats.md, "Logs") that is flown again, to compare the prediction with the measurements.
 
 const MOST_BYTES = 20e6;
 const MOST_ROWS = 200000;

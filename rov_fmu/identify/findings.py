@@ -1,410 +1,412 @@
-"""The sentences about an identification, by kind of finding."""
+"""What an identification has to tell: findings as functions of the result, their sentences, and their severity.
 
-from collections.abc import Callable, Iterable, Mapping
-from math import log, pi
-from pathlib import Path
-from typing import Any
+A finding is never read back: it only becomes a sentence in the terminal, in the report, and in the vehicle file.
+"""
 
-from rov_fmu.identify.effects.catalogue import EFFECTS
-from rov_fmu.io.csv_table import FORCE_UNITS
+from collections.abc import Iterable, Iterator, Sequence
+from math import isfinite, log, nan, sqrt
+from typing import Literal, get_args
+
+import numpy as np
+
+from rov_fmu.identify.result import (
+    DISAGREEMENT,
+    MOST_UNKNOWN,
+    Answer,
+    AxisResult,
+    Disturbance,
+    Effect,
+    Identification,
+    Interval,
+    Known,
+    Logging,
+    Point,
+)
+from rov_fmu.io.messages import listed
+from rov_fmu.model.layout import AXES, COUPLED_AXES
 from rov_fmu.tank import findings
+from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, SentenceForm
-from rov_fmu.vehicle.uncertainty import in_interval
+from rov_fmu.tank.log import Log
+from rov_fmu.vehicle.uncertainty import significant, with_interval
+
+Heading = Literal["Warnings", "Doubts", "Facts"]
+
+LEAST_COVERAGE = 0.8
+"""A 95 % band that contains fewer of the unseen samples is too narrow. Their errors are correlated, so that a band of a
+good model may well contain only 85 %."""
+_CONTRADICTION = 0.15
+"""Tables that differ by more than this from the model contradict it: batteries and scales explain less."""
+_FULL = 0.98
+_SATURATED = 0.2
+"""Logs are doubted in which thrusters have at least the command _FULL for this share of the time."""
+_NEGLIGIBLE = 0.005
+"""A disturbance below this share of the thrust is not told."""
+_LATER = 1.0
+"""A disturbance that is seen before this time, s, is taken to act from the start."""
+_BETA, _BETA_WITH_ADDED_MASS = (0.05, 1.1), (0.3, 3.0)
+"""The possible β: with β = 1.1 the inertia would be 10 % below the mass, which wrong forces or masses may explain."""
+
+# ---- Kinds and sentences ---------------------------------------------------------------------------------------------
+
+_OWN: dict[Heading, dict[str, SentenceForm]] = {
+    "Warnings": {
+        "do not use": "{axes}: do not use the model of this motion. {reasons}",
+        "worse than no change": (
+            "{axes}: the prediction of the {quantity} in {files} is off by {error} (RMS), and a prediction of no "
+            "change by {unchanged}"
+        ),
+        "slip": "{files}: check the {quantity}: {words}? The logs would agree much better",
+        "second start": (
+            "two fits from different starts ended at different vehicles, so the data do not decide between them. "
+            "More or longer logs would"
+        ),
+        "narrow bands": (
+            "{axes}: the 95% bands contain only {coverage:.0%} of the unseen data, so errors are larger than the "
+            "model claims"
+        ),
+        "implausible inertia": (
+            "{axes}: the vehicle moves as if its inertia were {factor} times {inertia}. Check {mass}, the positions "
+            "and directions of the thrusters, and the units of force{forces} and motion"
+        ),
+        "thrust tables": (
+            "{curve} thrust: the forces in {files} are {ratio} times those that fit the logs. Check their unit, how "
+            "many thrusters pulled together, and the battery"
+        ),
+        "unknown force": (
+            "{what} in {files}{since}. Check the tether, contact with the bottom or a wall, a current, and the payload"
+        ),
+        "change of thrust": "{what} in {files}{since}. Check the battery, and the thrusters for weed and damage",
+        "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
+        "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",
+        "coupling left out": (
+            "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and "
+            "Munk forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
+        ),
+        "implausible tuned alpha": (
+            "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "
+            "that of the thrust curves, which tests give to better than a factor of 2. Check the wanted V_ss and its "
+            "unit ({unit}), the command, and the thrust curves"
+        ),
+        "implausible tuned beta": (
+            "{beta} = {value:.3g} is not within the usual {low:g} ... {high:g}. The vehicle would move as if "
+            "its inertia were {inertia}. No known vehicle does. Check the wanted Tau (s) and {mass}"
+        ),
+    },
+    "Doubts": {
+        "nothing predicted": (
+            "{axes}: no motion was predicted that the fit had not seen, so the errors of predictions are not known. "
+            "Another log would show them"
+        ),
+        "not identified": "{of}: the tests do not determine {coefficients}{instead}",
+        "points differ": "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from the model",
+        "saturation": (
+            "{files}: the thrusters had full commands for {share:.0%} of the time. If they cannot follow, they push "
+            "less than the model says"
+        ),
+        "clock": (
+            "{files}: the commands act {time} s {beside} their rows, although the rows are {interval} s apart. Is the "
+            "clock of the commands another one?"
+        ),
+        "drift": (
+            "{axes}: over all of {files}, the predicted {quantity} drifts away by {error} (RMS), and a prediction of "
+            "no change by {unchanged}"
+        ),
+    },
+    "Facts": {
+        "coverage": "{axes}: the 95% bands contain {coverage:.0%} of the unseen data",
+        "effect": "{of}the {name} is {value}{note}",
+        "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
+        "logging": (
+            "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
+        ),
+    },
+}
+_FIRST = ("do not use", "worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip")
+"""The warnings that stand first: axes that must not be trusted, and wrong or missing data."""
+_READ: dict[Heading, frozenset[str]] = {
+    "Doubts": frozenset(
+        {
+            "too few samples",
+            "time of arrival",
+            "other clock",
+            "aligned clock",
+            "unknown direction",
+            "unknown velocity",
+            "depth by pressure",
+        }
+    ),
+    "Facts": frozenset(
+        {
+            "rows sorted",
+            "time stamps merged",
+            "rows without time",
+            "rows without command",
+            "torn rows",
+            "unread cells",
+            "no pulse",
+            "no servo pulse",
+            "beyond full thrust",
+            "constant motion",
+            "constant push",
+            "cancelling thrusters",
+            "gaps",
+            "source of commands",
+            "source",
+            "range of pulses",
+            "dropouts",
+            "damaged pieces",
+            "reversed motors",
+            "axis left out",
+            "not coupled",
+            "unused curve",
+        }
+    ),
+}
+"""The kinds of findings about reading (rov_fmu/tank/findings.py) that are no warnings."""
+SEVERITY: dict[str, Heading] = {
+    **dict.fromkeys(findings.SENTENCES, "Warnings"),
+    **{kind: heading for heading, kinds in (*_READ.items(), *_OWN.items()) for kind in kinds},
+}
+"""The heading of each kind: warnings ask for something, doubts are open questions, and facts need no action."""
+SENTENCES: dict[str, SentenceForm] = {**_OWN["Warnings"], **_OWN["Doubts"], **_OWN["Facts"], **findings.SENTENCES}
+"""The form of the sentence of each kind."""
+_HEADINGS: tuple[Heading, ...] = get_args(Heading)
+_ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
+"""The kinds in the order in which they are told under their heading."""
 
 
 def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
     """Return the sentences of findings; similar findings share one sentence."""
-    return findings.sentences(found, _SENTENCES)
+    return findings.sentences(found, SENTENCES)
+
+
+def heading(finding: Finding) -> Heading:
+    """Return the heading that a finding belongs to."""
+    return SEVERITY[finding.kind]
+
+
+def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
+    """Return the sentences of findings of all axes by their headings: the warnings of all axes come first."""
+    groups: dict[Heading, list[Finding]] = {name: [] for name in _HEADINGS}
+    for finding in found:
+        groups[heading(finding)].append(finding)
+    return {name: sentences(some) for name, some in groups.items()}
 
 
 def warnings(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of warnings and doubts."""
-    return sentences(finding for finding in found if finding.kind not in FACTS)
+    """Return the sentences of warnings and doubts, as the vehicle file has them."""
+    return sentences(finding for finding in found if heading(finding) != "Facts")
 
 
 def facts(found: Iterable[Finding]) -> tuple[str, ...]:
     """Return the sentences of the findings that only say what was found or done."""
-    return sentences(finding for finding in found if finding.kind in FACTS)
+    return sentences(finding for finding in found if heading(finding) == "Facts")
 
 
-def refusals(found: Iterable[Finding], folder: Path) -> list[str]:
-    """Return a sentence for each finding, with the whole path of its file."""
-    return findings.refusals(found, folder, _SENTENCES)
+# ---- Findings from the result ----------------------------------------------------------------------------------------
 
 
-def _inseparable_drag(values: Mapping[str, Any]) -> str:
-    """List the coefficients of drag that are not identifiable, or whose intervals are wide."""
-    coefficients = []
-    for key in ("a_d", "b_d"):
-        if key in values:
-            reason = "is not identifiable at all"
-            if f"{key} low" in values:
-                around = values[f"{key} low"].low, values[f"{key} high"].high
-                reason = "may lie anywhere from {} to {}".format(*in_interval(around, around)[2:])
-            coefficients.append(f"{values[key]} {reason}")
-    together = f" (correlation {values['correlation']:.2f})" if "correlation" in values else ""
-    return (
-        f"{values['axes']}: the tests hardly separate quadratic from linear drag: {', '.join(coefficients)}"
-        f"{together}. Only their sum at the tested velocities is identifiable"
-    )
+def findings_of(identification: Identification) -> tuple[Finding, ...]:
+    """Return all findings of an identification with those about reading, the most important kinds first."""
+    found = [*identification.folder.findings]
+    for result in identification.axes:
+        found += [*_on_trust(result), *_on_predictions(result), *_on_coefficients(identification, result)]
+        found += _on_points(result)
+    for curve, known in identification.curves.items():
+        found += _not_identified(known, f"{curve} thrust", curve=curve)
+    found += _on_forces(identification)
+    if identification.agreement > DISAGREEMENT:
+        found.append(Finding("second start"))
+    found += [_disturbance(d) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE]
+    for log_of in identification.folder.logs:
+        found += _on_log(identification, log_of)
+    found += filter(None, map(_logging, identification.logging))
+    found += [_effect(identification, effect) for effect in identification.effects if effect.kept]
+    for slip in identification.slips:
+        found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
+    return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
 
 
-def _drag_at_zero(values: Mapping[str, Any]) -> str:
-    unbounded = f" (by (11)-(13) alone {values['unbounded']:.3g})" if "unbounded" in values else ""
-    return (
-        f"{values['axes']}: {values['coefficient']} is at its bound of 0. Without the bound the fit would be "
-        f"negative{unbounded}, which is impossible"
-    )
+def size_in_words(value: float, unit: str) -> str:
+    """Return a size with two digits and its unit; angles are in degrees."""
+    factor, shown = in_degrees(unit)
+    return f"{significant(factor * value, 2)}{unit_after(shown)}"
 
 
-def _asymmetry(values: Mapping[str, Any]) -> str:
-    whose = f"{values['curve']} thrust" if values["curve"] else values["axes"]
-    by_model = (
-        f"In the model it differs by {values['modelled']:+.0%}"
-        if "modelled" in values
-        else "The model has no such difference"
-    )
-    return (
-        f"{whose}: at {values['command']:.0%}, {values['quantity']} in reverse differs by {values['measured']:+.0%} "
-        f"from that ahead. {by_model}. To leave out one direction, set {values['window']} in [windows]"
-    )
+def in_words(value: float, interval: Interval, unit: str) -> str:
+    """Return a value with its interval and its unit, such as `0.62 m/s (0.60 to 0.64)`; angles are in degrees."""
+    factor, shown = in_degrees(unit)
+    text, low, high = with_interval(factor * value, (factor * interval[0], factor * interval[1]))
+    return f"{text}{unit_after(shown)} ({low} to {high})"
 
 
-def _disagreement(values: Mapping[str, Any]) -> str:
-    low, high = f"{values['low']:.2g}", f"{values['high']:.2g}"
-    factors = low if low == high else f"{low} to {high}"
-    return (
-        f"{values['axes']}: the recordings disagree on {values['coefficients']} by more than their residuals explain, "
-        f"so the model lacks something. The intervals are made {factors} times as wide"
-    )
+def unit_after(unit: str) -> str:
+    """Return a unit as it follows a number: nothing for a ratio."""
+    return "" if unit == "1" else f" {unit}"
 
 
-def _effect(form: str, form_of_file: str = "") -> Callable[[Mapping[str, Any]], str]:
-    """Return a form that has {value}, {interval}, which may be empty, and {of}: an axis, a curve or the files.
+def relative_error(points: Iterable[Point], of: Literal["model", "held_out"]) -> float:
+    """Return the RMS of the relative errors of the points that count; NaN where there are none."""
+    off = [getattr(p, of) / p.measured - 1.0 for p in points if p.counts and p.measured]
+    off = [error for error in off if isfinite(error)]
+    return sqrt(sum(error**2 for error in off) / len(off)) if off else nan
 
-    `form_of_file` replaces the form for a single recording. The digits suit the interval. Several findings share the
-    range of their values and one interval around all.
+
+def answer_at(result: AxisResult, command: float) -> Answer | None:
+    """Return the answers for a command, or None."""
+    return next((answer for answer in result.answers if abs(answer.command - command) < 1e-6), None)
+
+
+def _on_trust(result: AxisResult) -> Iterator[Finding]:
+    axis = result.axis.name
+    if result.verdict.word == "do not use":
+        reasons = ". ".join(reason.rstrip(".") for reason in result.verdict.reasons)
+        yield Finding("do not use", axis, names={"reasons": reasons})
+    if not result.predictions:
+        yield Finding("nothing predicted", axis)
+    elif result.coverage >= LEAST_COVERAGE:
+        yield Finding("coverage", axis, numbers={"coverage": result.coverage})
+    elif result.coverage < LEAST_COVERAGE and result.verdict.word != "do not use":  # whose reasons tell this
+        yield Finding("narrow bands", axis, numbers={"coverage": result.coverage})
+
+
+def _on_predictions(result: AxisResult) -> Iterator[Finding]:
+    """Yield a finding for each prediction that is worse than one of no change."""
+    for p in result.predictions:
+        if p.error > p.unchanged:
+            names = {"quantity": p.quantity}
+            names |= {"error": size_in_words(p.error, p.unit), "unchanged": size_in_words(p.unchanged, p.unit)}
+            kind = "worse than no change" if p.is_judged else "drift"
+            yield Finding(kind, result.axis.name, file=p.file, names=names)
+
+
+def _on_coefficients(identification: Identification, result: AxisResult) -> Iterator[Finding]:
+    """Yield findings about coefficients without an interval, and about an inertia that no vehicle has."""
+    axis, half = result.axis, answer_at(result, 0.5)
+    instead = f". V_ss at 50% is {in_words(*half.steady, axis.unit)}" if half else ""
+    yield from _not_identified(result.known, axis.name, instead, axis=axis.name)
+    beta = next((known for known in result.known if known.name == axis.coefficient("beta")), None)
+    if beta and beta.interval:
+        has_added = "m_a" in identification.vehicle.layout.kinds[axis.name].keys
+        low, high = _BETA_WITH_ADDED_MASS if has_added else _BETA
+        if beta.interval[1] < low or beta.interval[0] > high:
+            inertia = f"{axis.inertia} with the added one" if has_added else axis.inertia
+            names = {"factor": significant(1.0 / beta.value, 2), "inertia": inertia, "mass": axis.inertia}
+            curves = {thruster.curve for thruster in identification.vehicle.layout.drivers(axis)}
+            files = [*dict.fromkeys(p.file for p in identification.forces if p.subject in curves)]
+            names["forces"] = f" (in {listed(files)})" if files else ""
+            yield Finding("implausible inertia", axis.name, names=names)
+
+
+def _not_identified(
+    known: Sequence[Known], of: str, instead: str = "", *, axis: str = "", curve: str = ""
+) -> Iterator[Finding]:
+    if names := [one.name for one in known if one.interval is None]:
+        words = {"of": of, "coefficients": listed(names), "instead": instead}
+        yield Finding("not identified", axis, curve, names=words)
+
+
+def _on_points(result: AxisResult) -> Iterator[Finding]:
+    """Yield findings about tables of velocities and time constants that contradict the model."""
+    for quantity in ("V_ss", "Tau"):
+        error = relative_error((p for p in result.points if p.quantity == quantity), "model")
+        if error > _CONTRADICTION:
+            yield Finding("points differ", result.axis.name, names={"quantity": quantity}, numbers={"error": error})
+
+
+def _on_forces(identification: Identification) -> Iterator[Finding]:
+    """Yield findings about tables of forces whose scale contradicts that of the logs."""
+    by_table: dict[tuple[str, str], list[float]] = {}
+    for p in identification.forces:
+        if p.counts and p.measured * p.model > 0.0:
+            by_table.setdefault((p.subject, p.file), []).append(p.measured / p.model)
+    for (curve, file), ratios in by_table.items():
+        ratio = float(np.median(ratios))
+        if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
+            yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+
+
+_REMEDIES = {
+    "the voltage": ": `voltage = true` in [fit] takes it into account",
+    "the roll": ": `attitude = true` in [fit] takes it into account",
+    "the pitch": ": `attitude = true` in [fit] takes it into account",
+    "the depth": ", as when the buoyancy changes with the pressure, or a tether pulls",
+    "the distance": ", as when a tether pulls",
+    "the command": ", as when thrusters saturate",
+    "the time": ", as when the battery runs down",
+}
+"""What each cause means, or what takes it into account."""
+
+
+def _disturbance(d: Disturbance) -> Finding:
+    """Return the finding about a disturbance that the evidence shows."""
+    axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
+    of = "torque" if d.axis and d.axis.is_rotation else "thrust"
+    size = size_in_words(d.size, d.unit)
+    if d.kind == "gain":
+        kind, what = "change of thrust", f"the thrust changes slowly by {d.size:.0%} (RMS)"
+    elif d.kind == "velocity":
+        kind, what = (
+            "velocity over ground",
+            f"{axis or 'surge and sway'}: {unknown} slow velocity over ground of {size} (RMS) acts",
+        )
+    else:
+        push = "torque" if d.axis and d.axis.is_rotation else "force"
+        kind = "unknown force"
+        what = f"{axis}: {unknown} slow {push} of {size} (RMS), {d.share:.0%} of the {of}, acts"
+    if d.cause:
+        kind = "explained disturbance"
+    elif d.share < MOST_UNKNOWN:
+        kind = "small disturbance"
+    since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"
+    names = {"what": what, "since": since, "cause": d.cause, "remedy": _REMEDIES.get(d.cause, "")}
+    return Finding(kind, axis, file=d.file, names=names)
+
+
+def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
+    """Yield findings about full commands, and about turns that the model takes for independent of the other motion."""
+    if one.commands:
+        values = np.abs(one.commands.at(one.commands.rows))
+        share = float(np.mean(np.any(values >= _FULL, axis=1)))
+        if share > _SATURATED:
+            yield Finding("saturation", file=one.file, numbers={"share": share})
+    layout = identification.vehicle.layout
+    if all(map(layout.has, COUPLED_AXES)) and not layout.coupled:
+        surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in one.channels) for a in COUPLED_AXES)
+        if yaw and (surge or sway):
+            yield Finding("coupling left out", file=one.file)
+
+
+def _logging(one: Logging) -> Finding | None:
+    """Return the finding about a logger's offset, None where it may be 0.
+
+    A row tells a command between one interval before it and the row itself. More than that is another clock.
     """
-
-    def sentence(values: Mapping[str, Any]) -> str:
-        value, interval = values["value"], ""
-        ends = [f"{value.low:.4g}", f"{value.high:.4g}"]
-        if "low" in values:
-            *ends, low, high = in_interval((value.low, value.high), (values["low"].low, values["high"].high))
-            interval = f" ({low} to {high})"
-        written = {"value": " ... ".join(dict.fromkeys(ends)), "interval": interval}
-        chosen = form if "of" in values else form_of_file or form
-        return chosen.format(**{"of": values["files"], **values, **written})
-
-    return sentence
+    low, high = one.offset_interval
+    if low <= 0.0 <= high:
+        return None
+    is_usual = high >= -1.5 * one.interval and low <= 0.5 * one.interval
+    names = {"beside": "before" if one.offset < 0.0 else "after"}
+    if is_usual:
+        return Finding("logging", file=one.file, names=names, numbers={"time": _rounded(one.offset)})
+    numbers = {"time": _rounded(one.offset), "interval": _rounded(one.interval)}
+    return Finding("clock", file=one.file, names=names, numbers=numbers)
 
 
-_LENGTH_CAUSES = {
-    1000.0: "is it in mm",
-    100.0: "is it in cm",
-    10.0: "is it in dm, or is the scale of the sensor wrong",
-    0.1: "is the unit or the scale of the sensor wrong",
-    0.01: "are metres labelled as cm",
-    0.001: "are metres labelled as mm",
-}
-_ANGLE_CAUSES = {
-    pi / 180.0: "are radians labelled as degrees",
-    180.0 / pi: "are degrees labelled as radians",
-    10.0: "is it in tenths of a degree, or is the scale of the sensor wrong",
-    100.0: "is it in hundredths of a degree",
-    0.1: "is the unit or the scale of the sensor wrong",
-}
+def _rounded(time: float) -> float:
+    """Return the size of a time with two digits."""
+    return float(significant(abs(time), 2))
 
 
-def _wrong_scale(values: Mapping[str, Any]) -> str:
-    """Explain that the numbers of a file are a multiple of what was measured."""
-    factor = float(values["factor"])
-    causes = _ANGLE_CAUSES if values["unit"].startswith("rad") else _LENGTH_CAUSES
-    others = f" If not, check {values['others']}." if values["others"] else ""
-    if values["unit"].startswith("rad"):
-        others += " Also check the positions and directions of the thrusters in rov.toml."
-    return (
-        f"{values['files']}: {values['quantity']} is about {factor:.4g} times what the thrust, the size and the other "
-        f"files predict: {causes[factor]}?{others}"
-    )
-
-
-_USUAL_BETA = 0.65
-"""β of an ROV whose added mass is about half of its mass."""
-
-
-def _weak_thrust(values: Mapping[str, Any]) -> str:
-    """Explain that all axes of a curve move as if the thrust were several times as strong.
-
-    The factor is the geometric mean of β. If the forces were larger by this factor, β would be 1. The true factor is
-    larger, because β of an ROV is below 1. The likely cause is the one that leads to the most usual β.
-    """
-    factor = float(values["factor"])
-    causes = {1.0 / of_newton: f"are they in {unit}" for unit, of_newton in FORCE_UNITS.items() if unit != "N"}
-    if values["together"] != "1":
-        causes[float(values["together"])] = f"are they of one thruster, and not of all {values['together']} together"
-    cause = causes[min(causes, key=lambda other: abs(log(_USUAL_BETA * other / factor)))]
-    return (
-        f"{values['curve']} thrust: {values['axes']} move as if the forces of thrust_{values['curve']}*.csv were at "
-        f"least {factor:.2g} times as strong: {cause}?"
-    )
-
-
-_CAUSES = {
-    "voltage": (
-        "the residuals grow when the voltage changes. A thrust that depends on the voltage would explain "
-        "this: put `voltage = true` into [fit]"
-    ),
-    "pitch": "the residuals follow the pitch. If pitch and roll are logged, `attitude = true` in [fit] takes "
-    "them into account. Otherwise the vehicle needs the axis pitch",
-    "roll": "the residuals follow the roll. If pitch and roll are logged, `attitude = true` in [fit] takes "
-    "them into account. Otherwise the vehicle needs the axis roll",
-    "depth": "the residuals follow the depth, as when the buoyancy changes with the pressure, or a tether pulls",
-    "distance": "the residuals follow the logged distance, as when a tether pulls",
-    "tether": "a force grows with the distance from the start, as when a tether pulls",
-    "saturation": "the thrust differs from its curve at the highest commands, as when thrusters saturate",
-    "drift": "the thrust or the load changes with time, as when the voltage falls",
-    "recording": "thrust or drag differ between the recordings. Did the battery, the ballast, the tether or the place "
-    "of a sensor change between them, or are columns of a log swapped or missing?",
-    "odd one": "it explains all other recordings. Check the columns, units and signs of this log, and whether the "
-    "battery, the ballast, the tether or a sensor differed",
-    "scale": "the sensors of position and velocity disagree, so one of them has a wrong scale",
-    "unknown": "an unknown force that changes slowly acts. None of the tested causes explains it",
-}
-"""What the residuals show, by cause (rov_fmu/identify/structure.py)."""
-
-
-def _unexplained(values: Mapping[str, Any]) -> str:
-    start = f"{values['start']:.0f}"
-    when = "from the start" if start == "0" else f"after the first {start} s"
-    return f"{values['axes']}: the model does not explain {values['files']} {when}: {_CAUSES[values['cause']]}"
-
-
-_OUTLIERS = "{axes}: {share:.0%} of the samples of {files} are outliers and count less"
-_OWN_SENTENCES: dict[str, SentenceForm] = {
-    # Thrust curves
-    "thrust without freedom": (
-        "{curve} thrust: {count:g} points for two coefficients leave no degree of freedom, so there are no intervals"
-    ),
-    "backward thrust": (
-        "{curve} thrust: below a command of {command:.0%}, the curve gives thrust in the wrong "
-        "direction. A dead band would explain this: measure forces at weaker commands, or give "
-        "c_0_{curve} in [known]"
-    ),
-    "backward thrust in reverse": (
-        "{curve} thrust: below a command of {command:.0%} in reverse, the curve gives thrust in the wrong "
-        "direction. A dead band would explain this: measure forces at weaker commands, or give "
-        "c_0_{curve} in [known]"
-    ),
-    "asymmetry": _asymmetry,
-    # Drag and beta from points
-    "assumed beta": (
-        "{axes}: {inertia}/{beta} is not identifiable from V_ss alone. {beta} = 1 is assumed, and every Tau follows "
-        "from it. A time constant or a recording of a step from rest makes it identifiable"
-    ),
-    "no push": (
-        "{axes}: the points at commands of {commands} are left out, because the thrust curve gives no "
-        "thrust there (dead band, or a mistake in one of the tables)"
-    ),
-    "unknown voltage": (
-        "{curves} thrust is taken as measured at {voltage:.1f} V, the mean voltage of the logs. If it was measured at "
-        "another voltage, thrust, drag and β are wrong by a common factor: write the voltage into [known], such as "
-        '{key} = {{ value = 16.0, unit = "V", source = "Multimeter" }}'
-    ),
-    "tests turn": (
-        "{axes}: at a command of {command:.0%} its thrusters also turn the vehicle, at up to {rate:.0f} deg/s. The "
-        "tables are taken as those of a vehicle that keeps its heading. If yours turned, record a log of commands, "
-        "velocities and heading instead"
-    ),
-    "untested thrust": (
-        "{axes}: commands of {low:.0%} to {high:.0%} are used, but {curve} thrust was tested from {tested_low:.0%} to "
-        "{tested_high:.0%} only"
-    ),
-    "drag without freedom": (
-        "{axes}: as many coefficients as measurements leave no degree of freedom, so there are no intervals"
-    ),
-    "inseparable drag": _inseparable_drag,
-    "drag at zero": _drag_at_zero,
-    "leave-one-out error": (
-        "{axes}: the leave-one-thrust-out error of {quantity} is {predicted:.1%} (RMS), but the residual of the fit "
-        "is only {fitted:.1%}. Single points determine much of the fit"
-    ),
-    "tables against recordings": (
-        "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from that of the recordings. The vehicle has "
-        "the coefficients of the recordings, because tables do not distinguish delay, load and current from drag"
-    ),
-    # Recordings
-    "correlated residuals": (
-        "{axes}: the residuals of {files} are correlated over {samples:.0f} samples. They contain more "
-        "than the sensor's noise: turbulence, a tether, or an error of the model. The intervals allow "
-        "for this"
-    ),
-    "outliers": _OUTLIERS,
-    "many outliers": f"{_OUTLIERS}. Does the sensor jump, or did something hold or push the vehicle for a time?",
-    "coupling left out": (
-        "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and Munk "
-        "forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
-    ),
-    "disagreement": _disagreement,
-    "impossible velocity": (
-        "{files}: the recording of {axes} is left out: {quantity} gives a velocity of {speed:.3g} "
-        "{unit}, but only {low:g} to {high:g} is possible. Are its unit and the unit of time right?"
-    ),
-    "no thrust": (
-        "{axes}: all its tests are left out, because the thrust curve of {curves} gives {force:.3g} "
-        "{unit} at a command of {command:.0%}, which does not push in the direction of the command. "
-        "Check the thrust tests, their signs and windows"
-    ),
-    "no tests of drag": (
-        "{axes}: all tests of it are left out, because no test that counts determines its drag, and "
-        "rov.toml does not give {drag}"
-    ),
-    "no fit": "{files}: the recording of {axes} is left out, because {reason}. {cause}",
-    "fitted apart": (
-        "{axes}: no vehicle fits the recordings of all these axes together, so each axis is fitted alone: {reason}"
-    ),
-    "poor prediction": (
-        "{axes}: do not trust this axis. A fit to {others} predicts the velocity of a recording with an error of "
-        "{predicted:.2g} {unit} (RMS). The error of predicting no change is {unchanged:.2g} {unit}, and the sensor's "
-        "noise is {noise:.1g} {unit}"
-    ),
-    "failed prediction": (
-        "{axes}: the motion of {files} cannot be computed with a fit to the others, so its prediction is left out. "
-        "Check its units and signs, and whether a thruster was saturated or a tether was taut"
-    ),
-    "recordings against forces": (
-        "{axes}: the recordings need another {curve} thrust than the measured forces: {joint:.3g} N instead of "
-        "{alone:.3g} N at a command of {command:.0%}. A thruster may push less in motion than when it is held, or the "
-        "scale or the battery may differ. The vehicle has the curve that fits both best"
-    ),
-    # Effects
-    "switches between rows": (
-        "{axes}: the commands change between the rows of the logs. A change is taken to be midway between two rows, "
-        "and the intervals allow for its unknown time"
-    ),
-    **{
-        kind: _effect(*(f"{{axes}}: {form}" for form in (effect.sentence, effect.sentence_of_file) if form))
-        for kind, effect in EFFECTS.items()
-    },
-    "delay not modelled": _effect(
-        "The motion in {axes} followed the commands {value} s late{interval}. The vehicle file does not "
-        "contain this delay. T_d in [commands] adds a delay to the FMU, which is the same for all axes."
-    ),
-    # Structure of the model
-    "unexplained": _unexplained,
-    "lag suggested": (
-        "{axes}: the motion in {files} follows the commands with a lag that the model does not have: put the curve of "
-        "its thrusters into `lag` of [fit]"
-    ),
-    # Units and signs
-    "implausible beta": (
-        "{axes}: {beta} = {value:.3g} is not within {low:g} ... {high:g}, the range of all known "
-        "vehicles. The vehicle moves as if its inertia were {inertia}. A wrong unit or scale (of the "
-        "motion, the commands, the thrust, {mass}) may cause it, a wrong position or direction of a "
-        "thruster, or a delay or a lag that the fit does not have"
-    ),
-    "inertia below mass": _effect(
-        "{axes}: {beta} = {value}{interval} is above 1, so the vehicle moves as if its inertia with the added mass "
-        "were less than {mass} alone. Check {mass}, the positions and directions of the thrusters, and the measured "
-        "forces"
-    ),
-    "implausible tuned alpha": (
-        "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "
-        "that of the thrust curves, which tests give to better than a factor of 2. Check the wanted V_ss and its unit "
-        "({unit}), the command, and the thrust curves"
-    ),
-    "implausible tuned beta": (
-        "{beta} = {value:.3g} is not within the usual {low:g} ... {high:g}. The vehicle would move as if "
-        "its inertia were {inertia}. No known vehicle does. Check the wanted Tau (s) and {mass}"
-    ),
-    "weak thrust": _weak_thrust,
-    "wrong scale": _wrong_scale,
-    "too fast": (
-        "{files}: {quantity} [{unit}] gives a velocity of {speed:.3g} {speed_unit}, which no ROV "
-        "reaches. Are its unit and the unit of time right?"
-    ),
-    "wrong sign": (
-        "{files}: the vehicle moves against the command. Is the sign of {quantity} or of the commands "
-        "wrong, or are thrusters swapped? {positive} is positive"
-    ),
-    "fractions as percent": (
-        "{files}: no command exceeds {percent:.2g} % of the full command, which is too weak to move an "
-        "ROV: are fractions [1] labelled as percent [%]?"
-    ),
-    "slow time constants": (
-        "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: is it in ms?"
-    ),
-    "fast time constants": (
-        "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: are seconds "
-        "labelled as ms?"
-    ),
-}
-_SENTENCES = findings.SENTENCES | _OWN_SENTENCES
-
-# ---- Facts, doubts and warnings --------------------------------------------------------------------------------------
-
-FACTS = frozenset(EFFECTS) | {
-    "rows sorted",
-    "time stamps merged",
-    "rows without time",
-    "rows without command",
-    "torn rows",
-    "unread cells",
-    "no pulse",
-    "no servo pulse",
-    "beyond full thrust",
-    "constant motion",
-    "constant push",
-    "cancelling thrusters",
-    "gaps",
-    "source of commands",
-    "source",
-    "range of pulses",
-    "dropouts",
-    "damaged pieces",
-    "reversed motors",
-    "axis left out",
-    "not coupled",
-    "unused curve",
-    "outliers",
-    "switches between rows",
-    "delay not modelled",
-}
-"""The kinds of findings that need no action."""
-FIRST = frozenset(
-    {"unreadable file", "missing column", "copy", "frozen sensors", "axis not pushed", "no fit", "poor prediction"}
-)
-"""The kinds of warnings that stand first: wrong or missing data, and axes that must not be trusted."""
-DOUBTS = frozenset(
-    {
-        "too few samples",
-        "time of arrival",
-        "other clock",
-        "aligned clock",
-        "unknown direction",
-        "unknown velocity",
-        "depth by pressure",
-        "thrust without freedom",
-        "drag without freedom",
-        "assumed beta",
-        "untested thrust",
-        "inseparable drag",
-        "drag at zero",
-        "leave-one-out error",
-        "correlated residuals",
-    }
-)
-"""The kinds of findings about open questions. Kinds in neither set are warnings."""
-
-
-def heading(finding: Finding) -> str:
-    """Return the heading that a finding belongs to."""
-    return "Facts" if finding.kind in FACTS else "Doubts" if finding.kind in DOUBTS else "Warnings"
-
-
-def by_heading(found: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
-    """Return the sentences of findings by their headings."""
-    groups: dict[str, list[Finding]] = {name: [] for name in ("Warnings", "Doubts", "Facts")}
-    for finding in found:
-        groups[heading(finding)].append(finding)
-    return {name: sentences(some) for name, some in groups.items()}
+def _effect(identification: Identification, effect: Effect) -> Finding:
+    """Return the fact about an effect that is kept."""
+    of, is_curve = effect.of, effect.of in identification.vehicle.layout.curves_by_name
+    names = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name, "note": ""}
+    names["value"] = in_words(effect.value, effect.interval, effect.unit)
+    if effect.kind == "current":
+        names["note"] = ". It belongs to the water, so the vehicle file does not have it"
+    elif effect.kind == "dead time" and not identification.vehicle.layout.has_dead_time:
+        names["note"] = ". The vehicle file does not have it; T_d in [commands] would add it"
+    axis = of if of in AXES else ""
+    return Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)

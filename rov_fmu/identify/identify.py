@@ -1,475 +1,600 @@
-"""Identify a vehicle from a folder of tank tests: thrust curves, then drag and β of every axis.
+"""Identify a vehicle from a folder of tank tests and dive logs: log -> likelihood -> posterior -> vehicle.
 
-An axis with recordings takes its coefficients from them (output error) and from the points of its tables. The
-recordings also correct the thrust curves. An axis without recordings takes its coefficients from the measured points
-V_ss and Tau. The points of tables are fitted in either case, for comparison.
+The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rov_fmu import __version__
-from rov_fmu.identify import diagnostics
-from rov_fmu.identify.adapter.recording import Recording
-from rov_fmu.identify.adapter.tank_tests import TankTests, kind_of_data
-from rov_fmu.identify.driving import connected, curves_of
-from rov_fmu.identify.findings import FIRST, facts, sentences, warnings
-from rov_fmu.identify.identification import AxisResult, Identification
-from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
-from rov_fmu.identify.points.drag_forms import Point, drag_and_beta, free_coefficients
-from rov_fmu.identify.points.quadratic_fit import fit_quadratic
-from rov_fmu.identify.points.response_fit import ResponseFit, fit_response
-from rov_fmu.identify.points.step_responses import StepResponse, steps
-from rov_fmu.identify.points.tables import TableForces, TablePoints
-from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, measured
-from rov_fmu.identify.recordings.output_error import fit_recordings
-from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
-from rov_fmu.identify.simulation.limits import MotionError, NoFitError
-from rov_fmu.identify.slips.search import beta_out_of_range, weak_thrust
-from rov_fmu.identify.together import Together
-from rov_fmu.identify.usable import UnusableError, check_push, check_recording, check_slips, is_pushed
+from rov_fmu.engine.filter import DivergedError
+from rov_fmu.identify import assess
+from rov_fmu.identify.beginning import Tests, begin, load_tests
+from rov_fmu.identify.disturbances import disturbances
+from rov_fmu.identify.findings import facts, findings_of, warnings
+from rov_fmu.identify.likelihood.curves import NO_SHAPES, fitted
+from rov_fmu.identify.likelihood.objective import Objective, TableRow
+from rov_fmu.identify.likelihood.parameters import LEAST_LAG, Beginning, Parameter, table_of
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, number
+from rov_fmu.identify.likelihood.records import Measured, Recorded
+from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
+from rov_fmu.identify.next_test import next_test
+from rov_fmu.identify.result import (
+    AxisResult,
+    Disturbance,
+    Effect,
+    Identification,
+    Interval,
+    Known,
+    Logging,
+    Point,
+    Prediction,
+    Sensor,
+    Slip,
+)
+from rov_fmu.identify.slips import slips
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import Progress, part, silent
-from rov_fmu.io.toml_file import join_names
-from rov_fmu.model.layout import REVERSE, Axis, Curve
+from rov_fmu.io.messages import Progress, silent
+from rov_fmu.model.layout import REVERSE, SURGE, SWAY, Axis, Curve, Layout
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
+from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
-_CHECKED, _FITTED = 0.1, 0.9
-"""The share of the work that is done when units and signs are checked, and when the recordings are fitted."""
-_SATURATED = 0.2
-"""If a recording cannot be fitted and its thrusters were at full command for more than this share of the time,
-saturation is the likely cause."""
-_MEAN_VOLTAGE = "Mean voltage of the recordings"
-_ASSUMED_ALPHA = "Not identifiable, because tests of motion give only the ratio of drag to thrust. Assumed to be 1"
-_ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
+_TOLD = 0.8
+"""A coefficient is identified where its standard error is at most this share of that of its prior."""
+_ROW_STEPS = 10
+"""The steps of a fit without the rows of one command."""
+_SAME = 0.01
+"""Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
+_QUICK = 4.0
+"""The reduction of J by a step at which a quick fit ends."""
+_STARTS: tuple[Mapping[str, float], ...] = (
+    {"slow": 1.0, "white": 2.0},
+    {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
+)
+"""Two starts: how many deviations of their priors some kinds of parameters are above their means, by their first word.
+
+With much noise, J has few minima far from the data.
+"""
+_CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
+"""The start if the motion diverges from both others: a heavier vehicle with less drag."""
+
+__all__ = ["identify", "load_tests"]
 
 
-def identify(tests: TankTests, on_progress: Progress = silent) -> Identification:
-    """Identify a vehicle from its tests.
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The objective at its minimum."""
 
-    Unusable tests are left out, with a finding. Raises DataFileError if no usable test remains or if the unit or sign
-    of a file is certainly wrong, and VehicleFileError.
-    """
-    while True:
+    known: Beginning
+    objective: Objective
+    best: Minimum
+    posterior: Posterior
+    """With all effects, also those without evidence."""
+    averaged: Posterior
+    """Averaged over the presence of the effects without evidence: the intervals are wide enough for these."""
+    kept: Posterior
+    """Given that the effects without evidence are absent: the values of the vehicle."""
+    difference: float
+    """How much larger J is at the end of the second start."""
+
+
+def identify(tests: Tests, on_progress: Progress = silent) -> Identification:
+    """Identify a vehicle from its tests. Raises DataFileError if nothing can be identified, and VehicleFileError."""
+    with threadpool_limits(limits=1, user_api="blas"):  # the matrices are small: more threads would wait for each other
+        return _identify(tests, on_progress)
+
+
+def _identify(tests: Tests, on_progress: Progress) -> Identification:
+    path = tests.given.description.tables.against
+    against = load_vehicle(path) if path else None
+    on_progress("reading the logs", 0.0)
+    known, logs, rows = begin(tests)
+    if not (known.fitted or known.curves):
+        own = ", ".join(sorted(tests.given.description.known))
+        raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
+    fit = fit_all(tests, known, logs, rows, on_progress)
+    on_progress("predicting what was left out", 0.85)
+    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior)]
+    slow = [*disturbances(fit.objective, fit.best, fit.posterior)]
+    vehicle = _vehicle(tests, fit)
+    for curve in vehicle.layout.curves:
+        if mistake := next(no_thrust(curve, vehicle.rov.coefficients, f"thrust_{curve.name}*.csv"), None):
+            raise DataFileError(f"{tests.folder.path}: {mistake}")
+    wrong = slips(tests, known, fit.objective, fit.best.z)
+    axes = []
+    for n, axis in enumerate(known.fitted):
+        on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
+        axes.append(_axis(tests, fit, vehicle, axis, predicted, slow, wrong))
+    names, correlation = _correlation(vehicle)
+    found = Identification(
+        folder=replace(tests.folder, findings=[*tests.findings]),
+        inputs=tests.inputs,
+        vehicle=vehicle,
+        against=against,
+        axes=tuple(axes),
+        curves={curve.name: tuple(_known(fit, vehicle, _of_curve(curve))) for curve in known.curves},
+        forces=tuple(_points(tests, fit, vehicle.rov, "thrust")),
+        effects=tuple(_effects(fit)),
+        disturbances=tuple(slow),
+        logging=tuple(_logging(fit)),
+        sensors=tuple(_sensors(fit)),
+        correlation=(names, correlation),
+        objective=fit.best.value,
+        agreement=fit.difference,
+        slips=wrong,
+    )
+    findings = findings_of(found)
+    provenance = vehicle.provenance
+    assert provenance
+    told = replace(provenance, warnings=warnings(findings), facts=facts(findings))
+    return replace(found, findings=findings, vehicle=replace(vehicle, provenance=told))
+
+
+# ---- The fit ---------------------------------------------------------------------------------------------------------
+
+
+def fit_all(
+    tests: Tests, known: Beginning, logs: Sequence[Recorded], rows: Sequence[TableRow], on_progress: Progress = silent
+) -> Fit:
+    """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples."""
+    table = table_of(known, logs, sorted({row.noise for row in rows}))
+    quick = Objective(table, logs, rows, thinned=True)
+    full = Objective(table, logs, rows)
+    ends: list[Minimum] = []
+    for n, louder in enumerate((*_STARTS, _CAREFUL)):
+        if n == len(_STARTS) and ends:
+            break
+
+        def show(step: int, n: int = n) -> None:
+            on_progress(f"start {n + 1} of 2", 0.25 * n + 0.25 * min(step / 20.0, 1.0))
+
+        start = quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
         try:
-            return _identify(tests, on_progress)
-        except UnusableError as unusable:
-            tests = unusable.left_out_of(tests)
+            ends.append(minimise(quick, start, on_step=show, enough=_QUICK, last=False))
+        except DivergedError:
+            continue
+    if not ends:
+        raise DataFileError(f"{tests.folder.path}: no simulation of the logs stays finite. Are units and signs right?")
+    ends.sort(key=lambda end: end.value)
+
+    def show_full(step: int) -> None:
+        on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
+
+    best = minimise(full, _scaled(known, full, ends[0].z), on_step=show_full)
+    scaled = _scaled(known, full, best.z)
+    if full.prior(scaled) < full.prior(best.z) - ENOUGH:
+        best = minimise(full, scaled, on_step=show_full, most=2)
+    posterior = Posterior.of(table, best.z, best.information)
+    difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
+    apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
+    if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
+        difference = 0.0
+    kept = posterior.without(posterior.absent)
+    averaged = replace(posterior.averaged, z=kept.z)
+    return Fit(known, full, best, posterior, averaged, kept, float(difference))
 
 
-def _identify(tests: TankTests, on_progress: Progress) -> Identification:
-    """Identify a vehicle from all tests. Raises UnusableError, DataFileError, VehicleFileError."""
-    given = tests.given
-    named = given.description.tables.against
-    against = load_vehicle(named) if named else None
-    on_progress("thrust curves", 0.0)
-    thrust = {curve.name: fit for curve in given.rov.layout.curves if (fit := _thrust(tests, curve))}
-    found = _Found(tests)
-    for fit in thrust.values():
-        found.take_thrust(fit)
-    results: list[AxisResult] = []
-    doubts: list[Finding] = []
-    groups = [*connected(given.rov.layout, tilts=given.requests.attitude)]
-    for n, (_, axes) in enumerate(groups):
-        on_progress(f"units and signs of {_named(axes)}", _CHECKED * n / len(groups))
-        doubts += check_slips(tests, axes, found.rov)
-        for recording in _recordings(tests, axes):
-            check_push(tests.folder, recording.axis, found.rov, [1.0])
-            check_recording(tests.folder, recording, found.rov)
-    samples = [sum(len(recording.time) for recording in _recordings(tests, axes)) for _, axes in groups]
-    shares = [_CHECKED + (_FITTED - _CHECKED) * sum(samples[:n]) / max(sum(samples), 1) for n in range(len(groups) + 1)]
-    for n, (curves, axes) in enumerate(groups):
-        of_group = part(on_progress, shares[n], shares[n + 1])
-        of_group(f"recordings of {_named(axes)}", 0.0)
-        tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
-        recorded, apart = _fit_recordings(tests, _recordings(tests, axes), found.rov, tested, of_group)
-        doubts += apart
-        for fit_of_axis in recorded.values():  # these replace the tested thrust curves
-            found.take_recordings(fit_of_axis)
-        for axis in axes:
-            result = _axis(tests, axis, found.rov, recorded.get(axis.name), tested)
-            results.append(result)
-            found.take(result)
-    for curve in found.rov.layout.curves:
-        place = "rov.toml" if f"a_t_{curve.name}" in given.known else f"thrust_{curve.name}*.csv"
-        if backward := [*no_thrust(curve, found.rov.coefficients, place)]:
-            raise DataFileError(f"{tests.folder}: {backward[0]}")
-    results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
-    fitted = [result.axis for result in results if result.estimate]
-    weak = weak_thrust(found.rov, thrust, fitted)
-    explained = {finding.axis for finding in weak}
-    uncoupled = diagnostics.on_coupling(tests.recordings, found.rov.layout)
-    findings = [*weak, *uncoupled, *tests.findings]
-    findings += (f for f in doubts if f.kind != "wrong scale" or f.axis not in explained)
-    for name, fit in thrust.items():
-        findings += diagnostics.on_thrust(name, fit, found.rov)
-    for result in results:
-        findings += result.findings
-    findings += diagnostics.on_turning(results, found.rov)
-    findings += diagnostics.on_voltage(found.rov, given.requests)
-    unexplained = [axis for axis in fitted if axis.name not in explained]
-    findings += filter(None, (beta_out_of_range(found.rov, axis, found.intervals) for axis in unexplained))
-    drifting = {finding.axis for finding in findings if finding.names.get("cause") == "drift"}
-    for n, result in enumerate(results):
-        on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))
-        test = _next_test(tests, result, found.rov, thrust, repeat=result.axis.name in drifting)
-        results[n] = replace(result, next_test=test)
-    findings.sort(key=lambda finding: finding.kind not in FIRST)
-    vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
-    return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
+def _scaled(known: Beginning, objective: Objective, z: Array) -> Array:
+    """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
 
-
-@dataclass
-class _Found:
-    """The vehicle as far as it is known, with the source of each number."""
-
-    tests: TankTests
-    tested: dict[str, str] = field(default_factory=dict)
-    """The sources of coefficients that come from thrust tests."""
-    rov: Rov = field(init=False)
-    sources: dict[str, str] = field(init=False)
-    intervals: dict[str, tuple[float, float]] = field(init=False)
-
-    def __post_init__(self) -> None:
-        given = self.tests.given
-        self.rov = given.rov
-        known = {name: q.source for name, q in given.known.items()}
-        self.sources = dict.fromkeys(given.rov.layout.coefficients, NOT_GIVEN) | known
-        self.intervals = {name: q.interval for name, q in given.known.items() if q.interval}
-
-    def take_thrust(self, fit: ThrustFit) -> None:
-        """Take the thrust curve from tests."""
-        self.rov = self.rov.extended(fit.values)
-        weighted = "(7)" if 0.0 in fit.weights else "(6)"
-        forces = count(int(fit.counts.sum()), "force")
-        source = f"{weighted} over {forces}"
-        self._take(fit.estimate, source)
-        self.tested |= dict.fromkeys(fit.estimate.names, source)
-
-    def take_recordings(self, fit: RecordingsFit) -> None:
-        """Take the coefficients from recordings, which also correct tested thrust curves."""
-        values = {name: fit.rov[name] for name in fit.estimate.names}
-        curves = [c for c in fit.rov.layout.curves if c.coefficient("n_V") in values]
-        if curves:  # with the exponent, the vehicle also gets a battery and V_0
-            self.rov = Rov(replace(self.rov.layout, voltage=fit.rov.layout.voltage), self.rov.coefficients)
-        for curve in curves:
-            V_0 = curve.coefficient("V_0")
-            values[V_0] = fit.rov[V_0]
-            is_given = curve.name in self.tests.given.requests.measured_at
-            self.sources[V_0] = "Given in rov.toml" if is_given else _MEAN_VOLTAGE
-        self.rov = self.rov.extended(values)
-        for name in fit.estimate.names:
-            tested = self.tested.get(name)
-            self.sources[name] = f"{tested}, and the recordings" if tested else _capitalized(fit.method)
-            self.intervals.pop(name, None)  # the interval from the forces only is no longer valid
-        self.intervals |= fit.estimate.intervals
-
-    def take(self, result: AxisResult) -> None:
-        """Take the chosen fit of an axis."""
-        if result.response and result.chosen == "points":
-            fitted = result.response
-            self.rov = self.rov.extended({n: fitted.rov[n] for n in (*fitted.estimate.names, *fitted.assumed)})
-            self._take(fitted.estimate, _capitalized(result.method))
-        self.sources |= result.assumed
-
-    def _take(self, estimate: Estimate, source: str) -> None:
-        self.sources |= dict.fromkeys(estimate.names, source)
-        self.intervals |= estimate.intervals
-
-    def _estimates(self, together: Together) -> dict[str, Estimated]:
-        """Return the standard errors and correlations of the identified coefficients, and those kept from the base."""
-        given = self.tests.given
-        path = given.description.tables.base
-        base = load_vehicle(path) if path else None
-        rows = base.estimates if base else {}
-        kept = {
-            name
-            for name in rows
-            if base and (q := given.known.get(name)) and (q.value, q.interval) == (base.rov[name], base.intervals[name])
-        }
-        found: dict[str, Estimated] = {}
-        for name in self.rov.layout.coefficients:
-            if name in kept:
-                others = {other: value for other, value in rows[name].correlation.items() if other in kept}
-                found[name] = Estimated(error=rows[name].error, correlation=others)
-            elif name in together.names and name in self.intervals:
-                found[name] = Estimated(error=together.error(name), correlation=together.correlation(name, found))
-        return found
-
-    def vehicle(self, results: Sequence[AxisResult], together: Together, findings: Sequence[Finding]) -> Vehicle:
-        """Return the vehicle with its provenance."""
-        given, names = self.tests.given, self.rov.layout.coefficients
-        validity = given.description.tables.validity
-        method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
-        made = Provenance(
-            f"rov-fmu {__version__} identify",
-            method,
-            self.tests.inputs,
-            warnings=warnings(findings),
-            facts=facts(findings),
-            data=kind_of_data(self.tests),
-        )
-        fits = [result.recordings for result in results if result.recordings]
-        delays = sentences(finding for fit in fits for finding in diagnostics.on_delay(fit))
-        return Vehicle(
-            **dict(given.head),
-            rov=Rov(self.rov.layout, {name: self.rov[name] for name in names}),
-            sources={name: self.sources[name] for name in names},
-            command_range=validity.command_range if validity else _command_range(results, self.rov),
-            alternatives={},
-            data=None,
-            limits=(*given.description.limits, *delays),
-            intervals={name: self.intervals[name] for name in names if name in self.intervals},
-            estimates=self._estimates(together),
-            provenance=made,
-            voltage_source="" if self.rov.layout.voltage is None else _MEAN_VOLTAGE,
-            thruster_sources=given.thruster_sources,
-        )
-
-
-def _named(axes: Iterable[Axis]) -> str:
-    return join_names(axis.name for axis in axes)
-
-
-def _capitalized(words: str) -> str:
-    return words[0].upper() + words[1:]
-
-
-# ---- Thrust and recordings -------------------------------------------------------------------------------------------
-
-
-def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
-    """Fit a thrust curve; return None where there are no tests of it."""
-    rows, window = tests.thrust.get(curve.name, ()), f"thrust_{curve.name}"
-    if not rows:
-        return None
-    weights = np.array([_weight(tests, window, row.command) for row in rows])
-    if len({abs(row.command) for row, weight in zip(rows, weights, strict=True) if weight and row.command}) < 2:
-        raise DataFileError(f"{tests.folder}: {window}*.csv: at least two commands must count")
-    commands, forces = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
-    return fit_thrust(curve, commands, forces, weights, {name: q.value for name, q in tests.given.known.items()})
-
-
-def _recordings(tests: TankTests, axes: Iterable[Axis]) -> list[Recording]:
-    """Return the recordings of the axes of which drag or β is unknown."""
-    wanted = (axis for axis in axes if drag_and_beta(axis, tests.given.known))
-    return [recording for axis in wanted for recording in tests.recordings.get(axis.name, ())]
-
-
-def _fit_recordings(
-    tests: TankTests, recordings: Sequence[Recording], base: Rov, thrust: Mapping[str, ThrustFit], on_progress: Progress
-) -> tuple[dict[str, RecordingsFit], list[Finding]]:
-    """Fit recordings of axes that share thrust curves; return the fits by axis, and findings if the axes had to be
-    fitted separately.
-
-    Where no vehicle fits all recordings, each axis is fitted alone. Raises UnusableError with the recordings that
-    cannot be fitted alone either.
+    The data do not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
     """
-    if not recordings:
-        return {}, []
-
-    def fit(some: Sequence[Recording]) -> dict[str, RecordingsFit]:
-        requests, known = tests.given.requests, tests.given.known
-        tested = [table for each in thrust.values() if (table := TableForces.of(each))]
-        points = _table_points(tests, dict.fromkeys(recording.axis for recording in some), base)
-        fits = fit_recordings(some, base, known, tested, requests=requests, points=points, on_progress=on_progress)
-        return {found.axis.name: found.widened() for found in fits}
-
-    try:
-        return fit(recordings), []
-    except (NoFitError, MotionError) as error:
-        together = error
-    axes = list(dict.fromkeys(recording.axis for recording in recordings))
-    apart: dict[str, RecordingsFit] = {}
-    for n, axis in enumerate(axes):
-        own = [recording for recording in recordings if recording.axis is axis]
-        on_progress(f"recordings of {axis.name} alone", n / len(axes))
-        if len(axes) == 1:
-            raise _unusable(tests, own, base, together, fit)
-        try:
-            apart |= fit(own)
-        except (NoFitError, MotionError) as error:
-            raise _unusable(tests, own, base, error, fit) from None
-    return apart, [Finding("fitted apart", axis.name, names={"reason": str(together)}) for axis in axes]
+    kinds = ("thrust scale", "inertia", "quadratic drag", "linear drag")
+    curves = {t.curve for axis in known.fitted for t in known.layout.drivers(axis)}
+    everything = [*(("thrust scale", name) for name in curves), *((k, a.name) for k in kinds[1:] for a in known.fitted)]
+    if any(objective.table.place(kind, of) is None for kind, of in everything) or objective.rows:
+        return z
+    direction = np.zeros(len(z))
+    for n, p in enumerate(objective.table.parameters):
+        if p.kind in kinds:
+            direction[n] = 1.0
+        elif p.kind == "load":
+            axis = next(axis for axis in known.fitted if axis.name == p.of)
+            direction[n] = z[n] + known.coefficients[axis.coefficient("F_0")] / known.full[p.of]
+    weight = direction / objective.deviation**2
+    moved = z - direction * float(weight @ (z - objective.mean)) / float(weight @ direction)
+    return np.clip(moved, objective.low, objective.high)
 
 
-def _table_points(tests: TankTests, axes: Iterable[Axis], base: Rov) -> list[TablePoints]:
-    """Return the points of tables that take part in the fit to the recordings of these axes.
-
-    Tau has no closed form where the thrusters lag, so it takes no part there.
-    """
-    found, lag = [], tests.given.requests.lag
-    for axis in axes:
-        lags = any(curve.has_lag or curve.name in lag for curve in curves_of(base.layout, axis))
-        tables = (p for p in _points(tests, axis, ()) if not lags or p.quantity == "V_ss")
-        points = [p for p in tables if is_pushed(axis, base, p.command)]
-        response = _response(axis, points, base, tests.given.known, None)
-        if response and (of_tables := TablePoints.of(response)):
-            found.append(of_tables)
-    return found
+# ---- The vehicle -----------------------------------------------------------------------------------------------------
 
 
-def _unusable(
-    tests: TankTests,
-    recordings: Sequence[Recording],
-    base: Rov,
-    error: NoFitError | MotionError,
-    fit: Callable[[Sequence[Recording]], object],
-) -> UnusableError:
-    """Return an error with the recordings of an axis that cannot be fitted even alone (or with all of them, if each
-    can), and with the likely cause.
-
-    Recordings with another reason than the first one are found when the rest is fitted again.
-    """
-    alone: dict[str, list[Recording]] = {}
-    for recording in recordings if len(recordings) > 1 else ():
-        try:
-            fit([recording])
-        except (NoFitError, MotionError) as its_error:
-            alone.setdefault(_reason(its_error), []).append(recording)
-    reason, wrong = next(iter(alone.items()), (_reason(error), list(recordings)))
-    files, axis = join_names(dict.fromkeys(recording.file for recording in wrong)), wrong[0].axis
-    names = {"reason": reason.partition(". ")[0], "cause": _likely_cause(wrong, base)}
-    return UnusableError(f"{tests.folder}: {files}: {reason}", Finding("no fit", axis.name, names=names), axis, wrong)
-
-
-def _reason(error: NoFitError | MotionError) -> str:
-    """Return why there is no fit, and what to check."""
-    return error.reason if isinstance(error, NoFitError) else f"{error}. Check the units and signs"
-
-
-def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:
-    """Return the most likely reason why a fit fails."""
-    full = max(float(np.mean(np.abs(r.reaching(base.layout)).max(axis=1) >= 0.999)) for r in recordings)
-    if full > _SATURATED:
-        return (
-            f"The thrusters are at full command for {full:.0%} of the time. There, the electric current may limit them"
-        )
-    return (
-        "Check the units and signs, the order, directions and dead band of the thrusters, and whether "
-        "the tether was taut"
+def _vehicle(tests: Tests, fit: Fit) -> Vehicle:
+    """Return the vehicle with its sources, intervals and correlations."""
+    given, kept = tests.given, fit.kept
+    layout = _layout(tests, fit)
+    coefficients = _in_file(fit, kept.z)
+    coefficients |= {  # a file has no smaller exponent
+        c.coefficient("n_V"): max(coefficients[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
+    }
+    rov = Rov(layout, {name: coefficients.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
+    known = {name: q for name, q in given.known.items() if name in layout.coefficients}
+    identified = {one.name: one.interval for one in _identified(fit, rov) if one.interval}
+    sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
+    base = given.description.base_quantities
+    sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
+    intervals = {name: q.interval for name, q in known.items() if q.interval}
+    estimates: dict[str, Estimated] = {}
+    changed = _changed(fit, rov)
+    names = [name for name in changed if name in identified or name in intervals]
+    for name in changed:
+        sources[name] = _SOURCE if name in identified else f"{sources[name]}; adapted to the tests"
+        if name not in names:
+            sources[name] = "Assumed: the tests do not determine it"
+    if names:
+        held = [name for name in changed if name not in names and not name.startswith("alpha_")]
+        _, covariance, _ = _numbers(fit, [*names, *held])
+        marginal = np.sqrt(np.diag(covariance))
+        covariance = _given_the_last(covariance, len(names))
+        errors = np.sqrt(np.diag(covariance))
+        for n, name in enumerate(names):
+            intervals[name] = identified.get(name) or _interval(rov, name, float(marginal[n]))
+            others = {
+                other: float(np.clip(covariance[n, m] / (errors[n] * errors[m]), -1.0, 1.0))
+                for m, other in enumerate(names[:n])
+                if errors[n] * errors[m] > 0.0
+            }
+            estimates[name] = Estimated(
+                error=float(errors[n]) * QUANTILE / NORMAL,
+                correlation={k: round(v, 6) for k, v in others.items() if abs(v) > 1e-6},
+            )
+    validity = given.description.tables.validity
+    made = Provenance(f"rov-fmu {__version__} identify", METHOD, tests.inputs, data=_data(fit))
+    return Vehicle(
+        **dict(given.head),
+        rov=rov,
+        sources=sources,
+        command_range=validity.command_range if validity else _command_range(fit),
+        alternatives={},
+        data=None,
+        limits=given.description.limits,
+        intervals=intervals,
+        estimates=estimates,
+        provenance=made,
+        voltage_source="" if layout.voltage is None else "Mean voltage of the logs",
+        thruster_sources=given.thruster_sources,
     )
 
 
-# ---- One axis --------------------------------------------------------------------------------------------------------
+def _given_the_last(covariance: Array, count: int) -> Array:
+    """Return the covariance of the first numbers, given the values of the others.
+
+    The vehicle file has these others without an error. Drag that shares the error of a thrust curve must not be drawn
+    with this error beside a curve that stays.
+    """
+    first, last = slice(count), slice(count, None)
+    regression = covariance[first, last] @ np.linalg.pinv(covariance[last, last], hermitian=True)
+    found = covariance[first, first] - regression @ covariance[last, first]
+    np.fill_diagonal(found, np.maximum(np.diag(found), 0.0))
+    return np.asarray(found)
+
+
+METHOD = (
+    "maximum a posteriori by an extended Kalman filter with slow forces and coloured noise (docs/identify-method.md)"
+)
+_SOURCE = "Identified from the tests, as the method says"
+
+
+def _in_file(fit: Fit, z: Array) -> dict[str, float]:
+    """Return the coefficients of the vehicle file for the coordinates of the parameters.
+
+    A file has no shapes of curves: a_t and b_t are those of the nearest curve over the tested commands.
+    """
+    table, (low, high) = fit.kept.table, _command_range(fit)
+    coefficients = table.coefficients(z.tolist())
+    shapes, rov = table.shapes(z.tolist()), Rov(table.layout, coefficients)
+    for curve in fit.known.curves:
+        if curve.name in shapes.of:
+            c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
+
+            def force(command: float, curve: Curve = curve) -> float:
+                return shapes.force(rov, curve, command)
+
+            coefficients |= fitted(curve, force, c_0, low, high)
+    return coefficients | {name: table.base[name] for name in table.exact}
+
+
+def _changed(fit: Fit, rov: Rov) -> list[str]:
+    """Return the names of the coefficients of the vehicle that the parameters change."""
+    z, changed = fit.posterior.z, dict[str, None]()
+    before = _in_file(fit, z)
+    for n in fit.posterior.of_vehicle:
+        moved = z.copy()
+        moved[n] += 0.1 * fit.posterior.table.parameters[n].deviation + 0.01
+        changed |= dict.fromkeys(name for name, value in _in_file(fit, moved).items() if value != before[name])
+    return [name for name in rov.coefficients if name in changed]
+
+
+def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
+    """Return some coefficients of the vehicle file, their covariance, and their covariance by the prior."""
+
+    def values(z: Array) -> Array:
+        coefficients = _in_file(fit, z)
+        return np.array([coefficients[name] for name in names])
+
+    return fit.averaged.numbers(values)
+
+
+def _layout(tests: Tests, fit: Fit) -> Layout:
+    """Return the layout without the effects that are absent."""
+    table = fit.kept.table
+    present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in fit.posterior.absent}
+    base, own = tests.given.base, tests.given.description.known
+    coefficients = table.coefficients(fit.kept.z.tolist())
+
+    def has_axis_key(axis: Axis, key: str) -> bool:
+        if axis.coefficient(key) in own:
+            return True
+        if key == "F_0":
+            return coefficients[axis.coefficient(key)] != 0.0
+        if key.endswith(REVERSE):
+            return axis.coefficient(key) in base or ("drag astern", axis.name) in present
+        return True
+
+    def has_curve_key(curve: Curve, key: str) -> bool:
+        if curve.coefficient(key) in own:
+            return True
+        if key.startswith("c_0"):
+            return coefficients[curve.coefficient(key)] > 0.0
+        if key in ("V_0", "n_V"):
+            return with_voltage
+        if key == "T":
+            return coefficients[curve.coefficient(key)] > LEAST_LAG * 1.0001
+        if key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
+            is_measured = curve.coefficient(key) in tests.given.known or _has_backward_rows(tests, curve)
+            return curve.coefficient(key) in base or is_measured or ("reverse thrust", curve.name) in present
+        return True
+
+    layout = table.layout
+    exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
+    with_voltage = tests.given.rov.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    return replace(
+        layout,
+        voltage=layout.voltage if with_voltage else None,
+        mix=tests.given.rov.layout.mix,
+        pulse=tests.given.rov.layout.pulse,
+        has_dead_time=tests.given.rov.layout.has_dead_time,
+        axes=tuple(replace(f, keys=tuple(k for k in f.keys if has_axis_key(f.axis, k))) for f in layout.axes),
+        curves=tuple(replace(c, keys=tuple(k for k in c.keys if has_curve_key(c, k))) for c in layout.curves),
+    )
+
+
+def _has_backward_rows(tests: Tests, curve: Curve) -> bool:
+    return any(name == curve.name and any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust"))
+
+
+def _data(fit: Fit) -> str:
+    """Return what the vehicle was identified from, in words."""
+    dives = sum(not one.log.follows_axis for one in fit.objective.logs)
+    parts = ["a dive log" if dives == 1 else f"{dives} dive logs"] if dives else []
+    if fit.objective.rows or dives < len(fit.objective.logs):
+        parts.insert(0, "tank tests")
+    return " and ".join(parts) or "given values"
+
+
+def _command_range(fit: Fit) -> tuple[float, float]:
+    """Return the weakest and the strongest command of the tests."""
+    used = [abs(row.command) for row in fit.objective.rows]
+    for one in fit.objective.logs:
+        assert one.log.commands
+        used += np.abs(one.log.commands.value).tolist()
+    used = [round(c, 6) for c in used if c > 1e-3]
+    low, high = min(used, default=0.0), max(used, default=1.0)
+    return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
+
+
+def _identified(fit: Fit, rov: Rov) -> Iterator[Known]:
+    """Yield the coefficients of the vehicle that the tests determine."""
+    names = [name for name in _changed(fit, rov) if not name.startswith("alpha_")]
+    for one in _known_of(fit, rov, names):
+        if one.interval:
+            yield one
+
+
+def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Known]:
+    """Yield coefficients with their intervals, where the tests determine them."""
+    if not names:
+        return
+    _, covariance, prior = _numbers(fit, names)
+    began = _in_file(fit, np.array([p.mean for p in fit.posterior.table.parameters]))
+    for n, name in enumerate(names):
+        error, before = float(np.sqrt(covariance[n, n])), float(np.sqrt(prior[n, n]))
+        told = error / before if before > 0.0 else 0.0
+        declaration, value = rov.layout.coefficients[name], rov[name]
+        interval: Interval | None = _interval(rov, name, error)
+        if not told <= _TOLD or not error > 0.0:
+            interval = None
+        unit = "" if declaration.unit == "1" else f" {declaration.unit}"
+        yield Known(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
+
+
+def _interval(rov: Rov, name: str, error: float) -> Interval:
+    """Return the 95 % interval of a coefficient within its bounds."""
+    declaration = rov.layout.coefficients[name]
+    low, high = around(rov[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
+    return max(low, declaration.minimum), min(high, declaration.maximum)
+
+
+def _known(fit: Fit, vehicle: Vehicle, names: Sequence[str]) -> Iterator[Known]:
+    changed = _changed(fit, vehicle.rov)
+    yield from _known_of(fit, vehicle.rov, [n for n in names if n in changed])
+
+
+def _of_curve(curve: Curve) -> list[str]:
+    return [curve.coefficient(key) for key in curve.keys]
+
+
+def _correlation(vehicle: Vehicle) -> tuple[tuple[str, ...], Array]:
+    from rov_fmu.vehicle.uncertainty import correlation
+
+    names = tuple(vehicle.estimates)
+    return names, correlation(names, vehicle.estimates)
+
+
+# ---- Parts of the result ---------------------------------------------------------------------------------------------
 
 
 def _axis(
-    tests: TankTests, axis: Axis, base: Rov, fitted: RecordingsFit | None, thrust: Mapping[str, ThrustFit]
+    tests: Tests,
+    fit: Fit,
+    vehicle: Vehicle,
+    axis: Axis,
+    predicted: Sequence[Prediction],
+    slow: Sequence[Disturbance],
+    wrong: Sequence[Slip],
 ) -> AxisResult:
-    known = tests.given.known
-    found = tuple(step for recording in tests.recordings.get(axis.name, ()) for step in steps(recording))
-    points = _points(tests, axis, [_in_time(step, fitted) for step in found])
-    driving = {curve.name: thrust[curve.name] for curve in curves_of(base.layout, axis) if curve.name in thrust}
-    check_push(tests.folder, axis, base, [p.command for p in points if p.weight > 0.0])
-    points = tuple(p if is_pushed(axis, base, p.command) else replace(p, weight=0.0) for p in points)
-    used = [p for p in points if p.weight > 0.0]
-    if fitted:  # the fit uses every sample, so points that were read off the recordings add no information
-        points = tuple(replace(p, weight=0.0) if p.is_read_off else p for p in points)
-    response = _response(axis, points, base, known, _thrust_of(fitted, driving))
-    wanted = set(drag_and_beta(axis, known))
-    if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):
-        names = {"drag": ", ".join(missing)}
-        raise UnusableError(
-            f"{tests.folder}: no steady_{axis.name}*.csv or log_{axis.name}*.csv that counts, and rov.toml does not "
-            f"give {names['drag']}",
-            Finding("no tests of drag", axis.name, names=names),
-            axis,
-        )
-    drag = None
-    if steady := [p for p in used if p.quantity == "V_ss"]:
-        x, y = np.array([p.value for p in steady]), np.array([base.force(axis, p.command) for p in steady])
-        force = base[axis.coefficient("alpha")] * y
-        groups = np.array([abs(p.command) for p in steady])
-        drag = fit_quadratic((axis.coefficient("a_d"), axis.coefficient("b_d")), x, force, groups=groups)
-    assumed = dict(response.assumed) if response and not fitted else {}
-    if points or fitted:
-        alpha, beta = axis.coefficient("alpha"), axis.coefficient("beta")
-        assumed |= {} if alpha in known else {alpha: _ASSUMED_ALPHA}
-        assumed |= {} if fitted or response or beta in known else {beta: _ASSUMED_BETA}
-    result = AxisResult(axis, points, found, drag, response, fitted, assumed, ())
-    return replace(result, findings=tuple(diagnostics.on_axis(result, base, driving)))
-
-
-def _response(
-    axis: Axis, points: Sequence[Point], base: Rov, known: Mapping[str, object], thrust: Estimate | None
-) -> ResponseFit | None:
-    """Fit the points; return None where there are too few."""
-    used = [p for p in points if p.weight > 0.0]
-    wanted = set(drag_and_beta(axis, known))
-    enough = any(p.quantity == "V_ss" for p in used) or wanted <= {axis.coefficient("beta")}
-    if not enough or not free_coefficients(axis, used, known)[0]:
-        return None
-    return fit_response(axis, points, base, known, thrust)
-
-
-def _thrust_of(fitted: RecordingsFit | None, thrust: Mapping[str, ThrustFit]) -> Estimate | None:
-    """Return the estimate of an axis's thrust curves, from its recordings where there are any."""
-    uncertain = measured(thrust.values())
-    return fitted.estimate.part(uncertain.names) if fitted and uncertain else uncertain
-
-
-def _in_time(step: StepResponse, fitted: RecordingsFit | None) -> StepResponse:
-    """Subtract the delay of the commands from the time constant, because the model has no delay."""
-    delay = fitted.delay_of(step.file) if fitted else 0.0
-    return replace(step, Tau=step.Tau - delay) if step.Tau is not None and step.Tau > delay else step
-
-
-def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tuple[Point, ...]:
-    """Return the rows of the tables, then the responses of the recordings."""
+    own = tuple(p for p in predicted if p.axis is axis)
+    answers = assess.answers(fit.averaged, axis)
+    unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
+    files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
+    names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
     points = [
-        Point(quantity, row.command, row.value, _weight(tests, axis.name, row.command), f"{row.file}, line {row.line}")
-        for quantity, rows in (("V_ss", tests.steady), ("Tau", tests.time_constants))
-        for row in rows.get(axis.name, ())
+        *_points(tests, fit, vehicle.rov, "steady", axis.name),
+        *_points(tests, fit, vehicle.rov, "time_constant", axis.name),
     ]
-    for step in found:
-        weight, source = _weight(tests, axis.name, step.command), f"{step.file}, {step.start:.1f} s"
-        for quantity, value, error in (("V_ss", step.V_ss, step.V_ss_error), ("Tau", step.Tau, step.Tau_error)):
-            if value is not None:
-                points.append(Point(quantity, step.command, value, weight, source, error))
-    return tuple(points)
+    return AxisResult(
+        axis=axis,
+        verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files]),
+        answers=answers,
+        known=tuple(_known(fit, vehicle, names)),
+        predictions=own,
+        points=tuple(points),
+        next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits),
+    )
 
 
-def _next_test(
-    tests: TankTests, result: AxisResult, rov: Rov, thrust: Mapping[str, ThrustFit], *, repeat: bool
-) -> NextTest | None:
-    """Return the test that would help an axis most, with the sensor of its recordings or a typical one."""
-    if result.estimate is None:
-        return None
-    fit = result.recordings
-    quantity = fit.simulations[0].recording.quantity if fit else result.axis.position
-    noise = max(s.noise * np.sqrt(s.correlation_time) for s in fit.simulations) if fit else NOISE[quantity]
-    sensor, limits = Sensor(quantity, max(float(noise), 1e-9)), tests.given.description.tables.limits
-    driving = {curve.name for curve in curves_of(rov.layout, result.axis)}
-    scales = {name: fit.estimate.noise for name, fit in thrust.items() if name in driving and fit.estimate.noise > 0.0}
-    return next_test(result.axis, rov, result.estimate, sensor, limits, scales, repeat=repeat)
+def _points(tests: Tests, fit: Fit, rov: Rov, kind: str, only: str | None = None) -> Iterator[Point]:
+    """Yield the rows of tables with what the vehicle says about them, also held out."""
+    quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
+    held_out = _held_out_rows(fit)
+    by_key = {(id_of(row), row.command): value for row, value in zip(fit.objective.rows, held_out, strict=True)}
+    for subject, rows in tests.rows(kind):
+        if only and subject != only:
+            continue
+        for row in rows:
+            of: Curve | Axis = (
+                next(c for c in rov.layout.curves if c.name == subject)
+                if kind == "thrust"
+                else rov.layout.kinds[subject].axis
+            )
+            one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
+            unit = "N" if kind == "thrust" else "s" if kind == "time_constant" else rov.layout.kinds[subject].axis.unit
+            out = by_key.get((id_of(one), row.command), np.nan)
+            counts = tests.counts(kind, subject, row.command)
+            numbers = row.command, row.value, one.model(rov, NO_SHAPES), out
+            yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 
 
-def _weight(tests: TankTests, window: str, command: float) -> float:
-    low, high = tests.given.description.tables.windows.get(window, (-1.0, 1.0))
-    return float(low - 1e-9 <= command <= high + 1e-9)
+def id_of(row: TableRow) -> tuple[str, str]:
+    """Return what tells the tables apart."""
+    return row.quantity, row.subject.name
 
 
-def _command_range(results: Sequence[AxisResult], rov: Rov) -> tuple[float, float]:
-    """Return the weakest command that counts and is beyond every dead band, and the strongest one."""
+def _held_out_rows(fit: Fit) -> Array:
+    """Return the value of each row of the tables by the information of all rows of other commands of its axis."""
+    objective, rows = fit.objective, fit.objective.rows
+    found = np.full(len(rows), np.nan)
+    if not rows:
+        return found
+    groups: dict[tuple[str, str, float], list[int]] = {}
+    for n, row in enumerate(rows):
+        kind = "force" if row.quantity == "force" else "motion"
+        groups.setdefault((kind, row.subject.name, abs(row.command)), []).append(n)
+    for members in groups.values():
+        chosen = np.array(members)
+        others = [row for n, row in enumerate(rows) if n not in members]
+        z = minimise(
+            Objective(objective.table, objective.logs, others, thinned=True),
+            fit.best.z,
+            most=_ROW_STEPS,
+            with_noise=False,
+        ).z
+        rov = Rov(objective.table.layout, objective.table.coefficients(z.tolist()))
+        shapes = objective.table.shapes(z.tolist())
+        found[chosen] = [rows[n].model(rov, shapes) for n in members]
+    return found
 
-    def used() -> Iterator[float]:
-        for result in results:
-            yield from (abs(p.command) for p in result.points if p.weight > 0.0)
-            for s in result.recordings.simulations if result.recordings else ():
-                recording = s.recording
-                command = recording.command if recording.command is not None else recording.reaching(rov.layout)
-                yield from np.unique(np.abs(command)).tolist()
 
-    names = [curve.coefficient(key) for curve in rov.layout.curves for key in ("c_0", "c_0" + REVERSE)]
-    widest = max((rov.coefficients.get(name, 0.0) for name in names), default=0.0)
-    commands = {round(c, 6) for c in used() if c > widest} - {0.0}
-    low, high = min(commands, default=0.0), max(commands, default=1.0)
-    return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
+def _effects(fit: Fit) -> Iterator[Effect]:
+    """Yield all optional effects with their evidence, beside those that are kept."""
+    table, gone = fit.posterior.table, fit.posterior.absent
+    for n, p in enumerate(table.parameters):
+        if p.null is None:
+            continue
+        posterior = fit.posterior.without([m for m in gone if m != n])
+        factor, unit = _in_units(fit.known, p)
+        value, error = number(p, posterior.z[n]) * factor, posterior.errors[n] * factor
+        if p.kind == "load":
+            axis = next(axis for axis in fit.known.fitted if axis.name == p.of)
+            value += fit.known.coefficients[axis.coefficient("F_0")]
+        if p.kind in ("reverse thrust", "drag astern"):
+            low, high = (float(np.exp(end)) for end in around(value, error))
+            yield Effect(p.kind, p.of, _WORDS[p.kind], float(np.exp(value)), (low, high), "1", posterior.evidence(n))
+            continue
+        yield Effect(
+            p.kind,
+            p.of,
+            " ".join(filter(None, (_WORDS[p.kind], f"to the {p.part}" if p.part else ""))),
+            value,
+            around(value, error),
+            unit,
+            posterior.evidence(n),
+        )
+
+
+_WORDS = {
+    "reverse thrust": "thrust astern relative to thrust ahead",
+    "dead band": "dead band",
+    "lag": "time constant of the thrusters",
+    "dead time": "dead time of the commands",
+    "drag astern": "drag astern relative to drag ahead",
+    "load": "constant load",
+    "current": "current",
+    "voltage": "exponent of thrust over voltage",
+}
+
+
+def _in_units(known: Beginning, p: Parameter) -> tuple[float, str]:
+    """Return what turns the number of an effect into its unit, and the unit."""
+    if p.kind == "load":
+        return known.full[p.of], next(axis for axis in known.fitted if axis.name == p.of).load
+    return 1.0, p.unit
+
+
+def _logging(fit: Fit) -> Iterator[Logging]:
+    posterior, table = fit.posterior, fit.posterior.table
+    for one in fit.objective.logs:
+        place = table.place("logging offset", one.log.file)
+        if place is None:
+            continue
+        total = np.zeros(len(posterior.z))
+        total[place] = 1.0
+        dead = table.place("dead time")
+        if dead is not None and dead in posterior.absent:  # the vehicle keeps none, so the logger has all of it
+            total[dead] = 1.0
+        offset, error = float(total @ posterior.z), float(np.sqrt(total @ posterior.covariance @ total))
+        width = table.get(posterior.z.tolist(), "logging width", one.log.file) * one.interval
+        yield Logging(one.log.file, one.interval, offset, around(offset, error), width)
+
+
+def _sensors(fit: Fit) -> Iterator[Sensor]:
+    z, table = fit.best.z.tolist(), fit.posterior.table
+    counts: dict[str, int] = {}
+    first: dict[str, Measured] = {}
+    for one in fit.objective.logs:
+        for m in one.measured:
+            name = m.channel.quantity.name
+            counts[name] = counts.get(name, 0) + len(m.channel.values)
+            first.setdefault(name, m)
+    for name, m in first.items():
+        white = table.get(z, "white noise", name)
+        coloured = white * table.get(z, "coloured noise", name)
+        time = table.get(z, "correlation time", name)
+        yield Sensor(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name])

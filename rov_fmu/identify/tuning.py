@@ -1,29 +1,28 @@
-"""The tuning guide of section 5 in closed form: α for the wanted V_ss, then β for the wanted Tau, (17), (18).
+"""The tuning guide of section 5: α for the wanted V_ss, then β for the wanted Tau, in closed form, (17), (18).
 
-It holds for any vehicle and axis, with thrust and drag by direction, dead band and constant load.
+It holds for any vehicle and axis, with thrust and drag by direction, dead band and constant load. α and β for many
+points minimise the sum of the squared relative errors, and the closed form is where this fit starts.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from math import inf, isfinite
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, inf, log
 
 import numpy as np
+from scipy.optimize import least_squares
 
-from rov_fmu.identify.least_squares import Estimate, estimate_alike, fit_named, kind_of
-from rov_fmu.identify.points.drag_forms import Point
-from rov_fmu.identify.points.response_fit import holding_force, predict
-from rov_fmu.identify.slips.search import beta_range
-from rov_fmu.io.csv_table import DataFileError, read_columns
+from rov_fmu.identify.result import Interval
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import columns_of, refuse_slips
 from rov_fmu.tank.findings import Finding
+from rov_fmu.vehicle.uncertainty import quantile
 
 ALPHA = 0.5, 2.0
 """The range of a plausible α. Thrust that is measured in a tank is known to better than a factor of 2; the paper has α
 of 1.1 to 1.2."""
+BETA, BETA_WITH_ADDED_MASS = (0.05, 1.2), (0.3, 3.0)
+"""The range of a plausible β: without added mass, the inertia is between about that of the vehicle and 20 times it."""
 
 
 class TuningError(ValueError):
@@ -31,142 +30,121 @@ class TuningError(ValueError):
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """A wanted V_ss (m/s, rad/s) or Tau (s) at a held command, a fraction of the full command."""
+
+    quantity: str
+    """V_ss or Tau."""
+    command: float
+    value: float
+
+    def by(self, rov: Rov, axis: Axis) -> float:
+        """Return the V_ss or the Tau of a vehicle at the command."""
+        V_ss, Tau = rov.response(axis, self.command)
+        return V_ss if self.quantity == "V_ss" else Tau
+
+
+@dataclass(frozen=True)
 class Tuning:
-    """A vehicle with the α and β of one axis that give the wanted points."""
+    """A vehicle with the α and β of one axis that suit the wanted points best."""
 
     axis: Axis
     rov: Rov
-    points: tuple[Point, ...]
-    estimate: Estimate | None = None
-    """The estimate, where α and β are fitted to many points."""
-
-    @property
-    def model(self) -> Array:
-        """V_ss or Tau of the tuned vehicle at every point."""
-        return predict(self.axis, self.rov, self.points)
+    points: Sequence[Wanted]
+    intervals: Mapping[str, Interval | None]
+    """The 95 % interval of each tuned coefficient, by its name; None if there are not more points than coefficients."""
 
 
-def tune(rov: Rov, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Tuning:
-    """Find α and β for V_ss (m/s, rad/s) and Tau (s) at one command; without Tau, β stays. Raises TuningError."""
-    wanted = {"V_ss": V_ss} if Tau is None else {"V_ss": V_ss, "Tau": Tau}
-    points = tuple(Point(quantity, command, value, 1.0, "") for quantity, value in wanted.items())
-    return Tuning(axis, _each_median(rov, axis, points), points)
+def tune(rov: Rov, axis: Axis, points: Sequence[Wanted]) -> Tuning:
+    """Find α and β for wanted points. Without any Tau, β stays. Raises TuningError.
 
-
-def tune_over(rov: Rov, axis: Axis, points: Sequence[Point]) -> Tuning:
-    """Fit α and β to the relative errors of many V_ss and Tau, without changing the drag.
-
-    Without any Tau, β stays. Raises TuningError.
+    The intervals of many points follow from their scatter, by Student's distribution.
     """
-    start = _each_median(rov, axis, points)
+    start = _closed_form(rov, axis, points)
     kinds = ("alpha", "beta") if any(p.quantity == "Tau" for p in points) else ("alpha",)
-    measured = np.array([p.value for p in points])
-    solution = fit_named(
-        lambda values: predict(axis, rov.replaced(values), points) / measured - 1.0,
-        {name: start[name] for name in map(axis.coefficient, kinds)},
-    )
-    found = estimate_alike(tuple(map(axis.coefficient, kinds)), solution, len(points))
-    return Tuning(axis, rov.replaced(found.named), tuple(points), found)
+    names = [axis.coefficient(kind) for kind in kinds]
+    highest = [log(rov.layout.coefficients[name].maximum) for name in names]
+
+    def tuned(logs: Array) -> Rov:
+        return start.replaced(dict(zip(names, np.exp(logs).tolist(), strict=True)))
+
+    def errors(logs: Array) -> list[float]:
+        return [p.by(tuned(logs), axis) / p.value - 1.0 for p in points]
+
+    first, ends = np.log([start[name] for name in names]), dict.fromkeys(("ftol", "xtol", "gtol"), 1e-14)
+    fit = least_squares(errors, first, jac="3-point", bounds=(-inf, highest), method="dogbox", **ends)
+    intervals: dict[str, Interval | None] = dict.fromkeys(names)
+    if (degrees := len(points) - len(names)) > 0:
+        covariance = np.linalg.inv(fit.jac.T @ fit.jac) * 2.0 * fit.cost / degrees
+        for name, x, variance, most in zip(names, fit.x, np.diag(covariance), highest, strict=True):
+            reach = min(quantile(degrees) * variance**0.5, 100.0)
+            intervals[name] = exp(x - reach), exp(min(x + reach, most))
+    return Tuning(axis, tuned(fit.x), points, intervals)
 
 
-def _each_median(rov: Rov, axis: Axis, points: Sequence[Point]) -> Rov:
-    """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError.
-
-    Tau is inversely proportional to β.
-    """
+def _closed_form(rov: Rov, axis: Axis, points: Sequence[Wanted]) -> Rov:
+    """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
     if rov.loss(axis, rov.held_inputs(axis, 1.0)):
         raise TuningError(
             f"{axis.name}: its thrust decreases with the speed of advance. Tuning cannot take this into "
             "account: remove d"
         )
     for p in points:
-        if reason := _impossible(rov, axis, p):
+        if reason := impossible(rov, axis, p):
             raise TuningError(f"{axis.name}: {reason}")
-    steady = [p for p in points if p.quantity == "V_ss"]
-    if not steady:
+    alphas = [_holding(rov, axis, p.value) / rov.force(axis, p.command) for p in points if p.quantity == "V_ss"]
+    if not alphas:
         raise TuningError(f"{axis.name}: there is no V_ss, and alpha is tuned to V_ss")
-    alphas = [holding_force(rov, axis, p.value) / rov.force(axis, p.command) for p in steady]
     tuned, beta = _with(rov, axis.coefficient("alpha"), alphas), axis.coefficient("beta")
-    plain = tuned.replaced({beta: 1.0})
-    betas = [plain.response(axis, p.command)[1] / p.value for p in points if p.quantity == "Tau"]
-    return _with(tuned, beta, [float(np.median(betas))]) if betas else tuned
+    plain = tuned.replaced({beta: 1.0})  # Tau is proportional to 1/β
+    betas = [p.by(plain, axis) / p.value for p in points if p.quantity == "Tau"]
+    return _with(tuned, beta, betas) if betas else tuned
 
 
-def tuned_values(tuning: Tuning) -> tuple[dict[str, float], str]:
-    """Return α and β by name, and a phrase about the points that they are tuned to."""
-    names = [tuning.axis.coefficient(kind) for kind in ("alpha", "beta")]
-    wanted = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in tuning.points[:2])
-    reason = f"Tuned to {wanted}{', ...' if len(tuning.points) > 2 else ''}"
-    return {name: tuning.rov[name] for name in names}, reason
+def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
+    """Set a coefficient to the median of the wanted values, each of which must be possible. Raises TuningError."""
+    maximum = rov.layout.coefficients[name].maximum
+    for value in wanted:
+        if not 0.0 < value <= maximum:
+            raise TuningError(f"{name} would have to be {value:g}, but it must be above 0 and at most {maximum:g}")
+    return rov.replaced({name: float(np.median(wanted))})
 
 
-def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
-    """Read wanted points from a CSV file with command, velocity and time constant, which may have blanks.
-
-    Raises DataFileError.
-    """
-    columns = columns_of("steady", axis) | columns_of("time_constant")
-    optional = {name: replace(column, optional=True, blanks=True) for name, column in columns.items()}
-    table = read_columns(path, optional | {"command": columns["command"]})
-    refuse_slips(table, ["command"])
-    points = []
-    for quantity, column in (("V_ss", "velocity"), ("Tau", "time constant")):
-        for n, value in enumerate(table.values.get(column, ())):
-            command, source = table.values["command"][n], f"{path.name}, line {table.lines[n]}"
-            if not isfinite(value):
-                continue
-            point = Point(quantity, command, value, 1.0, source)
-            if reason := _impossible(rov, axis, point):
-                raise table.error(n, column, reason)
-            points.append(point)
-    if not any(point.quantity == "V_ss" for point in points):
-        raise DataFileError(f"{path}: no row has a velocity, and alpha is tuned to velocities")
-    return tuple(points)
+def _holding(rov: Rov, axis: Axis, V: float) -> float:
+    """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
+    plain, form = rov.replaced({axis.coefficient("beta"): 1.0}), rov.layout.kinds[axis.name]
+    return -plain.inertia(form) * plain.acceleration_of(form, 0.0).acceleration(V)
 
 
-def implausible(tuning: Tuning) -> Iterator[Finding]:
-    """Yield a finding about an implausible α, and one about an implausible β."""
-    axis, rov = tuning.axis, tuning.rov
-    alpha, beta = map(axis.coefficient, ("alpha", "beta"))
-    if not ALPHA[0] <= rov[alpha] <= ALPHA[1]:
-        names = {"alpha": alpha, "push": axis.push, "unit": axis.unit}
-        numbers = {"value": rov[alpha], "low": ALPHA[0], "high": ALPHA[1]}
-        yield Finding("implausible tuned alpha", axis=axis.name, names=names, numbers=numbers)
-    low, high, inertia = beta_range(rov, axis)
-    if any(p.quantity == "Tau" for p in tuning.points) and not low <= rov[beta] <= high:
-        names = {"beta": beta, "inertia": inertia, "mass": axis.inertia}
-        numbers = {"value": rov[beta], "low": low, "high": high}
-        yield Finding("implausible tuned beta", axis=axis.name, names=names, numbers=numbers)
-
-
-def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:
+def impossible(rov: Rov, axis: Axis, point: Wanted) -> str | None:
     """Return the reason why no tuning gives the point, or None."""
-    command, value = point.command, point.value
-    if not 0.0 < abs(command) <= 1.0:
-        return (
-            f"a command of {command:g} must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
-        )
-    if not (force := rov.force(axis, command)):
+    c, value = point.command, point.value
+    if not 0.0 < abs(c) <= 1.0:
+        return f"a command of {c:g} must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
+    if not (force := rov.force(axis, c)):
         dead = all("c_0" in rov.layout.curve_of[t.name].keys for t in rov.layout.drivers(axis))
-        return f"a command of {command:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"
+        return f"a command of {c:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"
     if point.quantity == "Tau":
         return None if 0.0 < value < inf else f"Tau = {value:g} s must be above 0"
     if not 0.0 < abs(value) < inf:
         return f"V_ss = {value:g} {axis.unit} must be a number other than 0"
-    if holding_force(rov, axis, value) * force > 0.0:
+    if _holding(rov, axis, value) * force > 0.0:
         return None
     form, allowed = rov.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"
     if "F_0" in form.keys:
         drift = rov.acceleration_of(form, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
-    thrust = f"a command of {command:g} gives a {axis.push} of {force:g} {axis.load}"
+    thrust = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
     return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {thrust}"
 
 
-def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
-    """Set a coefficient to the median of the wanted values, each of which must be possible. Raises TuningError."""
-    maximum = kind_of(name).maximum
-    for value in wanted:
-        if not 0.0 < value <= maximum:
-            raise TuningError(f"{name} would have to be {value:g}, but it must be above 0 and at most {maximum:g}")
-    return rov.replaced({name: float(np.median(wanted))})
+def implausible(tuning: Tuning) -> Iterator[Finding]:
+    """Yield a finding about each tuned coefficient that is implausible."""
+    axis, has_added = tuning.axis, "m_a" in tuning.rov.layout.kinds[tuning.axis.name].keys
+    for kind, (low, high) in {"alpha": ALPHA, "beta": BETA_WITH_ADDED_MASS if has_added else BETA}.items():
+        value = tuning.rov[name := axis.coefficient(kind)]
+        if name in tuning.intervals and not low <= value <= high:
+            inertia = f"{1.0 / value:.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
+            names = {kind: name, "push": axis.push, "unit": axis.unit, "inertia": inertia, "mass": axis.inertia}
+            numbers = {"value": value, "low": low, "high": high}
+            yield Finding(f"implausible tuned {kind}", axis=axis.name, names=names, numbers=numbers)

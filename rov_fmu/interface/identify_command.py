@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rov_fmu.identify import identify
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
-from rov_fmu.identify.identification import Identification
+from rov_fmu.identify.identify import identify, load_tests
+from rov_fmu.identify.result import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
 from rov_fmu.io.messages import Progress
 from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
@@ -38,8 +37,8 @@ def identify_folder(
         replaced.extend(check_replaced(targets, force=force))
 
     begin("reading the folder")
-    tests = load_tank_tests(folder, check_outputs)
-    identification = identify.identify(tests, begin("identifying the vehicle"))
+    tests = load_tests(folder, check_outputs)
+    identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
     if report:
         outputs.append(_report_output(identification, report, begin("drawing the report")))

@@ -1,13 +1,19 @@
 """The command `rov-fmu tune`: the meaning of its options, and the vehicle file that it writes."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 
-from rov_fmu.identify.tuning import Tuning, TuningError, read_points, tune, tune_over, tuned_values
+from rov_fmu.identify.tuning import Tuning, TuningError, Wanted, impossible, tune
+from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import check_targets
-from rov_fmu.model.layout import Axis
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.model.layout import TUNING, Axis
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.columns import columns_of, refuse_slips
+from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
 
 
@@ -32,21 +38,43 @@ def tune_vehicle(
     if output:
         check_targets([output], [*([points] if points else []), *vehicle.files])
         check_written(output, VEHICLE_FILE)
+    if points is not None:
+        wanted = read_points(points, vehicle.rov, axis)
+    elif command is None or V_ss is None:
+        raise InputError("tune: give --command and --v-ss (and --tau), or --points")
+    else:
+        wanted = [Wanted("V_ss", command, V_ss)] + ([] if Tau is None else [Wanted("Tau", command, Tau)])
     try:
-        tuning = _tuned(vehicle, axis, command, V_ss, Tau, points)
+        tuning = tune(vehicle.rov, axis, wanted)
     except TuningError as error:
         raise InputError(f"tune: {error}") from error
     if output:
-        write_tuned(path, output, *tuned_values(tuning))
+        write_tuned(path, output, {name: tuning.rov[name] for name in map(axis.coefficient, TUNING)}, source(wanted))
     return tuning
 
 
-def _tuned(
-    vehicle: Vehicle, axis: Axis, command: float | None, V_ss: float | None, Tau: float | None, points: Path | None
-) -> Tuning:
-    """Tune to the points of a table, or else to one command."""
-    if points is not None:
-        return tune_over(vehicle.rov, axis, read_points(points, vehicle.rov, axis))
-    if command is None or V_ss is None:
-        raise InputError("tune: give --command and --v-ss (and --tau), or --points")
-    return tune(vehicle.rov, axis, command, V_ss, Tau)
+def source(wanted: Sequence[Wanted]) -> str:
+    """Return the source of coefficients that are tuned to some points."""
+    points = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in wanted[:2])
+    return f"Tuned to {points}{', ...' if len(wanted) > 2 else ''}"
+
+
+def read_points(path: Path, rov: Rov, axis: Axis) -> list[Wanted]:
+    """Read wanted points from a CSV file with command, velocity and time constant, which may have blanks.
+
+    Raises DataFileError.
+    """
+    columns = columns_of("steady", axis) | columns_of("time_constant")
+    optional = {name: replace(column, optional=True, blanks=True) for name, column in columns.items()}
+    table = read_columns(path, optional | {"command": columns["command"]})
+    refuse_slips(table, ["command"])
+    points = []
+    for quantity, column in (("V_ss", "velocity"), ("Tau", "time constant")):
+        for n, value in enumerate(table.values.get(column, ())):
+            if isfinite(value):
+                points.append(Wanted(quantity, table.values["command"][n], value))
+                if reason := impossible(rov, axis, points[-1]):
+                    raise table.error(n, column, reason)
+    if not any(point.quantity == "V_ss" for point in points):
+        raise DataFileError(f"{path}: no row has a velocity, and alpha is tuned to velocities")
+    return points

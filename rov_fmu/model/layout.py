@@ -552,11 +552,6 @@ class Layout:
         return self.has(ROLL, PITCH)
 
     @cached_property
-    def is_linked(self) -> bool:
-        """True when the motion along one axis acts on others."""
-        return self.coupled or self.has_attitude or bool(self.cross)
-
-    @cached_property
     def continued(self) -> tuple[str, ...]:
         """The variables that a step continues besides the states: with an attitude, the heading, which counts turns."""
         return ("psi",) if self.has_attitude else ()

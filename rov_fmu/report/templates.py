@@ -22,7 +22,6 @@ def page(template: str, **content: object) -> str:
         two_digits=two_digits,
         unit=pretty_unit,
         with_interval=with_interval,
-        with_error=with_error,
         sentence=sentence,
         readable=readable,
         palette=PALETTE,
@@ -44,7 +43,8 @@ def number(value: float | None, digits: int | None = None) -> str:
 
 def with_interval(value: float, interval: tuple[float, float] | None) -> list[str]:
     """Return a value and the ends of its interval for readers, with digits that suit the interval."""
-    return [_with_signs(text) for text in uncertainty.with_interval(value, interval)]
+    texts = uncertainty.with_interval(value, interval)
+    return [_with_signs(text).replace("inf", "∞").replace("nan", "–") for text in texts]
 
 
 def _with_signs(text: str) -> str:
@@ -54,13 +54,6 @@ def _with_signs(text: str) -> str:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
         text = f"{mantissa}10{str(int(exponent)).translate(RAISED)}"
     return text.replace("-", "−")
-
-
-def with_error(value: float | None, error: float | None) -> tuple[str, str]:
-    """Return a value and its standard error for readers; the digits of the value suit the error."""
-    if value is None or error is None:
-        return number(value, 4), number(error, 2)
-    return with_interval(value, (value - error, value + error))[0], two_digits(error)
 
 
 def two_digits(value: float) -> str:

@@ -79,6 +79,9 @@ _Window = Annotated[
 ]
 
 
+_Deviation = Annotated[Finite, _must_be("0 or above", lambda deviation: deviation >= 0.0)]
+
+
 def _find_vehicle(name: object, info: ValidationInfo) -> Path:
     """Return the path of the vehicle file in the folder of rov.toml, or of the one that ships. Raises ValueError."""
     if not isinstance(name, str):
@@ -110,8 +113,6 @@ class _Fit(Strict):
 
     lag: _Curves = ()
     """The curves whose lag is fitted. true means all curves."""
-    advance: _Curves = ()
-    """The curves whose loss of thrust by the speed of advance is fitted; true for all curves."""
     voltage: bool = False
     """True when thrust depends on the logged voltage: its exponent is fitted."""
     attitude: bool = False
@@ -124,8 +125,6 @@ class Requests:
 
     lag: tuple[str, ...] = ()
     """The curves whose thrusters' lag is fitted."""
-    advance: tuple[str, ...] = ()
-    """The curves whose loss of thrust by the speed of advance is fitted."""
     voltage: bool = False
     """True when thrust depends on the logged voltage."""
     attitude: bool = False
@@ -140,11 +139,7 @@ class Requests:
 
     def of(self, curves: Collection[str]) -> "Requests":
         """Return the requests for some curves."""
-        lag, advance = (tuple(name for name in names if name in curves) for names in (self.lag, self.advance))
-        return replace(self, lag=lag, advance=advance)
-
-
-NO_REQUESTS = Requests()
+        return replace(self, lag=tuple(name for name in self.lag if name in curves))
 
 
 class Dive(Strict):
@@ -197,6 +192,8 @@ class RovTables(OpenHardware):
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
     fit: _Fit = _Fit()
+    priors: dict[str, _Deviation] = Field(default={})
+    """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""
     columns: dict[str, str] = Field(default={})
     """What the headers of CSV files stand for: other headers."""
     topics: dict[str, str] = Field(default={})
@@ -363,9 +360,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
 def _requests(file: RovTables, layout: Layout, voltages: Mapping[str, str]) -> Requests:
     """Return what [fit] asks for; `voltages` has the curves by the names of their V_0."""
     curves = tuple(curve.name for curve in layout.curves)
-    requests: dict[str, Any] = {
-        key: curves if value is True and key in ("lag", "advance") else value for key, value in file.fit
-    }
+    requests: dict[str, Any] = {key: curves if value is True and key == "lag" else value for key, value in file.fit}
     measured_at = {voltages[name]: file.known[name].value for name in voltages.keys() & file.known.keys()}
     return Requests(**requests, measured_at=measured_at)
 
@@ -418,8 +413,7 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
             yield key_line(f"windows.{name}", f"there is no such key{only(name, windows, join_names(windows))}")
     curves = [curve.name for curve in layout.curves]
     requests = description.requests
-    asked = {"lag": ("T", requests.lag), "advance": ("d", requests.advance)}
-    asked["voltage"] = "n_V", tuple(curves) if requests.voltage else ()
+    asked = {"lag": ("T", requests.lag), "voltage": ("n_V", tuple(curves) if requests.voltage else ())}
     for key, (coefficient, names) in asked.items():
         for name in names:
             given = coefficient_name(coefficient, name)
@@ -434,7 +428,7 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
 _UNKNOWN_EFFECTS = {
     "table": "identification fits a_t and b_t in place of a table",
     "V_0": "identification fits the effect of the voltage if [fit] has `voltage`",
-    "d": "identification fits the loss of thrust if [fit] has `advance`",
+    "d": "identification cannot take into account that thrust decreases with the speed of advance",
 }
 """Keys of a thrust curve, and what identification does instead of using them."""
 

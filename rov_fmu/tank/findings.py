@@ -28,8 +28,6 @@ class Finding:
     """The words that the sentence needs. A number that must not become a range is given here as text."""
     numbers: Mapping[str, float] = field(default_factory=dict)
     """The numbers that the sentence needs. In a sentence about several files they become ranges."""
-    certain: bool = False
-    """True when the data cannot be right, so the file must be refused."""
 
 
 def sentences(findings: Iterable[Finding], forms: Mapping[str, SentenceForm]) -> tuple[str, ...]:
@@ -105,27 +103,22 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     # Recordings
     "nothing measured": "{files}: nothing measured of any axis",
-    "too few samples": (
-        "{files}: the recording of {axes} is left out: it has {count:#sample} of {quantity}, and needs "
-        "at least {least:g}"
-    ),
-    "constant motion": "{files}: the recording of {axes} is left out: the {quantity} never changes",
+    "too few samples": ("{files}: the {quantity} has {count:#sample} and needs at least {least:g}, so it is left out"),
+    "constant motion": "{files}: the {quantity} never changes, so it is left out",
     "no thruster": (
-        "{files}: the recording of {axes} is left out: no thruster drives it, and the effect of fins is not fitted"
+        "{files}: nothing is learnt about {axes}: no thruster drives it, and the effect of fins is not fitted"
     ),
-    "constant push": "{files}: the recording of {axes} is left out: the thrust along it never changes",
-    "cancelling thrusters": (
-        "{files}: the recording of {axes} is left out: its thrusters cancel each other all the time"
-    ),
+    "constant push": "{files}: nothing is learnt about {axes}: the thrust along it never changes",
+    "cancelling thrusters": ("{files}: nothing is learnt about {axes}: its thrusters cancel each other all the time"),
     "axis not pushed": (
         "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "
         "{axes}. If it was driven that way, check the directions of the thrusters and the signs of their commands"
     ),
     "scales differ": (
         "{files}: the {quantity} changes {factor:.3g} times as much as the velocity in {axes} implies. "
-        "One of the two sensors has a wrong scale. The {quantity} is used"
+        "One of the two sensors has a wrong scale, and both are used. Leave the wrong one out"
     ),
-    "gaps": "{files}: {count:#gap} in {axes}: {gaps}",
+    "gaps": "{files}: {count:#gap} in the {quantity}: {gaps}",
     # Logs of autopilots and bags
     "unreadable file": "{files}: left out, because it cannot be read: {reason}",
     "source": "{files}: {quantities} from {source}, {rate:.3g} Hz{words}",

@@ -46,6 +46,9 @@ def checked(log: Log) -> Log:
     if any(channel.derived_from == "pressure" for channel in used):
         findings.append(Finding("depth by pressure", file=log.file))
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
+    for channel in used:
+        if not channel.quantity.is_velocity:
+            findings += scales_differ(log.file, channel, channels)
     findings += sources(log.file, channels)
     return replace(log, channels=tuple(channels), findings=tuple(findings))
 
@@ -161,7 +164,7 @@ def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> 
     used = (c for c in channels if c.quantity.axis == axis and c.quantity.is_velocity and not c.unused)
     velocity = next(used, None)
     tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
-    if not axis or tilted or not velocity or velocity.count < LEAST_SAMPLES:
+    if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
         return []
     time, values = position.time[position.there], unwrapped(position)[position.there]
     at, speeds = velocity.time[velocity.there], velocity.values[velocity.there]

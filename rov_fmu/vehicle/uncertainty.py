@@ -128,7 +128,7 @@ def uncertainty(
         if name in estimates:
             errors.append(estimates[name].error)
         else:
-            errors.append(_half_width(name, rov[name], intervals[name], declarations[name]) / _NORMAL)
+            errors.append(_half_width(name, rov[name], intervals[name], declarations[name]) / NORMAL)
     return Uncertainty(
         names,
         np.array([rov[name] for name in names]),
@@ -171,7 +171,8 @@ def quantile(degrees_of_freedom: float) -> float:
     return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * LEVEL))
 
 
-_NORMAL = quantile(inf)
+NORMAL = quantile(inf)
+"""Half the width of a 95 % interval in standard errors, by the normal distribution."""
 _EXACT = 1e-9
 """The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
 _WIDTH_IN_UNITS = 3.0

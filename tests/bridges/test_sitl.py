@@ -23,7 +23,7 @@ from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, servo_packet
 from rov_fmu.cli import main
 from rov_fmu.engine.simulation import Array
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
@@ -31,6 +31,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed
 from tests.commands import ROOT
+from tests.tank.logs import commanded, used
 from tests.vehicles import THRUST_EFFECTS, pulsed
 
 HEAVY: Rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
@@ -417,14 +418,14 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
         assert process.wait(30) == 0
     assert said.startswith("6.000 s of flight; 1200 frames")
     (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
-    tests = load_tank_tests(folder)
-    (heave,), (surge,) = tests.recordings["heave"], tests.recordings["surge"]
+    (one,) = load_tests(folder).folder.logs
+    depth, surge = used(one, "depth"), used(one, "surge velocity")
     at = [autopilot.history[n] for n in range(0, 1180, 20)]
-    assert heave.values[: len(at)] == pytest.approx([a["position"][2] for a in at], abs=1e-8)
+    assert depth.values[: len(at)] == pytest.approx([a["position"][2] for a in at], abs=1e-8)
     bodies = [rotation(*a["attitude"]).T @ a["velocity"] for a in at]
     assert surge.values[: len(at)] == pytest.approx([body[0] for body in bodies], abs=1e-8)
     assert np.diff(surge.time) == pytest.approx(0.1, abs=1e-9)
-    assert np.ptp(surge.thrusters["3"]) > 0.4
+    assert np.ptp(commanded(one, "3")) > 0.4
 
 
 @pytest.mark.parametrize(
@@ -479,7 +480,7 @@ def test_intervals_from_flights_cover_the_truth(tmp_path: Path) -> None:
         connection.write_log()
         _add_noise(path, chance)
         (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
-        found = identify(load_tank_tests(folder))
+        found = identify(load_tests(folder))
         intervals = found.vehicle.intervals.items()
         known = [(HEAVY[name], *limits) for name, limits in intervals if name.startswith(("a_d_", "b_d_", "beta_"))]
         hits += [low <= true <= high for true, low, high in known]

@@ -182,7 +182,7 @@ MORE = [
     "report",
     "vehicle/test_vehicle.py",
     *(f"vehicle/test_{part}.py" for part in ("writer", "json_schema", "bluerov2")),
-    *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")),
+    *(f"identify/test_{part}.py" for part in ("identify", "refit", "tuning")),
     "study",
 ]
 

@@ -202,7 +202,7 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 
 
 def test_the_pages_with_commands_are_found() -> None:
-    pages = ("identify", "importers", "model", "platforms", "studies")
+    pages = ("identify", "importers", "model", "platforms", "studies", "tune")
     wanted = {"README.md", "docs/tutorial-stopping-distance.md", *(f"docs/{page}.md" for page in pages)}
     assert wanted <= {name(page) for page in SHELL_PAGES}
 

@@ -52,7 +52,7 @@ def test_the_filter_is_consistent() -> None:
         low, high = chi2.ppf([0.005, 0.995], flights * quantities)
         assert low <= end.sum() <= high
         assert whole == pytest.approx(quantities, rel=0.15)
-        assert found["nees"][False].mean() > 1.1 * whole
+        assert found["nees"][False].mean() > 1.05 * whole
         covered = found["covered"]
         for name in ("u", "r", *found["SHOWN"]):
             assert 0.9 <= covered[True][found["PLACE"][name]] <= 0.99, name

@@ -10,8 +10,9 @@ import pytest
 
 import rov_fmu
 from rov_fmu.cli import main
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
+from rov_fmu.tank.quality import unwrapped
 from tests.commands import ROOT
 
 HERE = Path(__file__).parent
@@ -32,24 +33,30 @@ def _vehicle(path: Path) -> Any:
 
 
 def _tank_tests(path: Path) -> Any:
-    tests = load_tank_tests(path.parent)
-    tables = {"thrust": tests.thrust, "steady": tests.steady, "time constants": tests.time_constants}
+    """Return the rows of tables, and of each channel: the number of samples, their duration, the sum of the values,
+    and the sums of the commands of the thrusters and of the axis."""
+    tests = load_tests(path.parent)
+    recordings = {}
+    for log in tests.folder.logs:
+        assert log.commands is not None
+        commands = float(np.abs(log.commands.at(log.commands.rows)).sum())
+        for channel in log.channels:
+            if (axis := channel.quantity.axis) and not channel.unused:
+                kind = "velocity" if channel.quantity.is_velocity else axis.position
+                recordings[f"{channel.file or log.file} {axis.name} {kind}"] = [
+                    len(channel.time),
+                    float(channel.time[-1] - log.commands.rows[0]),
+                    float(np.nansum(unwrapped(channel))),
+                    0.0 if log.follows_axis else commands,
+                    commands if log.follows_axis else None,
+                ]
+    tables = {"thrust": "thrust", "steady": "steady", "time constants": "time_constant"}
     return {
         **{
-            name: {subject: [[row.command, row.value] for row in rows] for subject, rows in table.items()}
-            for name, table in tables.items()
+            name: {subject: [[row.command, row.value] for row in rows] for subject, rows in tests.rows(kind)}
+            for name, kind in tables.items()
         },
-        "recordings": {
-            f"{recording.file} {axis} {recording.quantity}": [
-                len(recording.time),
-                float(recording.time[-1]),
-                float(np.nansum(recording.values)),
-                float(sum(np.abs(command).sum() for command in recording.thrusters.values())),
-                float(np.abs(recording.command).sum()) if recording.command is not None else None,
-            ]
-            for axis, recordings in tests.recordings.items()
-            for recording in recordings
-        },
+        "recordings": recordings,
     }
 
 

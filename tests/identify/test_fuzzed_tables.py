@@ -10,8 +10,8 @@ import pytest
 from hypothesis import strategies as st
 
 from rov_fmu.cli import main
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
-from rov_fmu.identify.tuning import read_points
+from rov_fmu.identify.beginning import load_tests
+from rov_fmu.interface.tune_command import read_points
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import AXES, HEAVE
 from rov_fmu.vehicle.published import load_tables
@@ -75,15 +75,16 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     def check(data: st.DataObject) -> None:
         mutated(tests, folder, data)
         try:
-            found = load_tank_tests(folder)
+            found = load_tests(folder)
         except (DataFileError, VehicleFileError) as error:
             check_line(str(error), folder)
             return
-        for rows in (*found.thrust.values(), *found.steady.values(), *found.time_constants.values()):
+        for rows in found.folder.rows.values():
             assert all(isfinite(row.value) and -1.0 <= row.command <= 1.0 for row in rows)
-        for recording in (r for recordings in found.recordings.values() for r in recordings):
-            assert np.isfinite(recording.time).all()
-            assert np.isfinite(recording.values).any()
+        for log in found.folder.logs:
+            assert log.commands
+            assert np.isfinite(log.commands.rows).all()
+            assert all(np.isfinite(channel.time).all() for channel in log.channels)
 
     fuzz(check, examples)
 
@@ -294,7 +295,7 @@ def test_a_message_quotes_a_cell_in_part(tests: Path) -> None:
         "command [%],velocity [m/s]\n20," + "9" * 100_000 + "\n", encoding="utf-8"
     )
     with pytest.raises(DataFileError, match=r"line 2, column 'velocity \[m/s\]' = '9+\.\.\.9+': must be a number"):
-        load_tank_tests(tests)
+        load_tests(tests)
 
 
 def test_bounds_of_points_are_those_of_tests(tmp_path: Path) -> None:

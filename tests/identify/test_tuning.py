@@ -5,12 +5,14 @@ from dataclasses import replace
 from math import e, inf, nan
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.stats import t
 
 from rov_fmu.cli import main
-from rov_fmu.identify.points.drag_forms import Point
-from rov_fmu.identify.tuning import Tuning, TuningError, _each_median, implausible, tune, tune_over, tuned_values
+from rov_fmu.identify.tuning import Tuning, TuningError, Wanted, implausible, tune
+from rov_fmu.interface.tune_command import source
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.console_results import print_tuning
@@ -27,14 +29,19 @@ def k(vehicle: Vehicle) -> Rov:
     return vehicle.rov
 
 
+def tuned_to(k: Rov, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Tuning:
+    """Tune to one command."""
+    return tune(k, axis, [Wanted("V_ss", command, V_ss)] + ([] if Tau is None else [Wanted("Tau", command, Tau)]))
+
+
 def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
     """For a turn to starboard, the left thruster pushes ahead and the right one astern, by the paper's (4)."""
-    points = [Point("V_ss", command, sign * 0.5, 1.0, "") for command, sign in ((0.3, 1), (-0.4, -1))]
-    print_tuning(tune_over(k, YAW, points))
+    points = [Wanted("V_ss", command, sign * 0.5) for command, sign in ((0.3, 1), (-0.4, -1))]
+    print_tuning(tune(k, YAW, points))
     said = capsys.readouterr().out
     assert "A command of 30% of yaw: u_l = 0.3, u_r = -0.3\n" in said
     assert "A command of -40% of yaw: u_l = -0.4, u_r = 0.4\n" in said
-    print_tuning(tune_over(pulsed(k, (1100.0, 1500.0, 1900.0)), YAW, points))
+    print_tuning(tune(pulsed(k, (1100.0, 1500.0, 1900.0)), YAW, points))
     of_pulses = capsys.readouterr().out
     assert "A command of 30% of yaw: u_l = 1620, u_r = 1380\n" in of_pulses
     assert of_pulses.partition("A command")[0] == said.partition("A command")[0]
@@ -43,15 +50,15 @@ def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.Capt
 def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
     k: Rov, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tuned = tune(k, HEAVE, 0.3, 0.175)
-    print_tuning(replace(tuned, points=(Point("V_ss", 0.3, 0.175 * (1.0 + 1e-5), 1.0, ""),)))
+    tuned = tuned_to(k, HEAVE, 0.3, 0.175)
+    print_tuning(replace(tuned, points=(Wanted("V_ss", 0.3, 0.175 * (1.0 + 1e-5)),)))
     said = capsys.readouterr().out
     assert "+0.0%" in said
     assert "-0.0%" not in said
     assert "lag" not in said
     curves = tuple(replace(curve, keys=(*curve.keys, "T")) for curve in k.layout.curves)
     late = Rov(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
-    print_tuning(tune(late, HEAVE, 0.3, 0.175, 2.209))
+    print_tuning(tuned_to(late, HEAVE, 0.3, 0.175, 2.209))
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "lag" in line)
     assert "curve top, T = 0.2 s" in line
 
@@ -61,15 +68,15 @@ def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
 @pytest.mark.parametrize(("V_ss", "Tau"), [(0.1, 0.2), (0.5, 3.0), (2.0, 20.0)])
 def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: float, Tau: float, k: Rov) -> None:
     V_ss = V_ss if command > 0.0 else -V_ss
-    tuned = tune(k, axis, command, V_ss, Tau).rov
+    tuned = tuned_to(k, axis, command, V_ss, Tau).rov
     assert tuned.response(axis, command) == pytest.approx((V_ss, Tau), rel=1e-12)
 
 
 def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
     measured = {"V_ss": {0.2: 1.34, 0.3: 1.51, 0.5: 2.61, 0.7: 4.06}, "Tau": {0.2: 3.05, 0.3: 1.95, 0.5: 1.41}}
-    points = [Point(q, c, value, 1.0, "") for q, values in measured.items() for c, value in values.items()]
-    tuning = tune_over(k, YAW, points)
-    low, high = tuning.estimate.intervals["alpha_r"] if tuning.estimate else (nan, nan)
+    points = [Wanted(q, c, value) for q, values in measured.items() for c, value in values.items()]
+    tuning = tune(k, YAW, points)
+    low, high = tuning.intervals["alpha_r"] or (nan, nan)
     alpha, beta = tuning.rov["alpha_r"], tuning.rov["beta_r"]
     assert 0.8 < low < alpha < high < 1.6
 
@@ -84,11 +91,29 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
 
 
 def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
-    assert tune(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
-    tuning = tune_over(k, SURGE, [Point("V_ss", c, V, 1.0, "") for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
+    assert tuned_to(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
+    tuning = tune(k, SURGE, [Wanted("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
     assert tuning.rov["beta_u"] == k["beta_u"]
-    assert tuning.estimate
-    assert tuning.estimate.names == ("alpha_u",)
+    assert [*tuning.intervals] == ["alpha_u"]
+
+
+def test_intervals_are_those_of_linear_regression(k: Rov) -> None:
+    """With linear drag, V_ss is proportional to α, so that its relative errors are linear in α."""
+    plain = k.replaced({"alpha_u": 1.0, "a_d_u": 0.0})
+    wanted = [Wanted("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 1.06), (0.7, 1.47), (-0.4, -0.6))]
+    ratios = np.array([p.by(plain, SURGE) / p.value for p in wanted])
+    alpha = ratios.sum() / (ratios @ ratios)
+    errors = alpha * ratios - 1.0
+    relative = np.sqrt(errors @ errors / 3.0 / (ratios @ ratios)) / alpha
+    factor = np.exp(t.ppf(0.975, 3) * relative)
+    tuning = tune(plain, SURGE, wanted)
+    assert tuning.rov["alpha_u"] == pytest.approx(alpha, rel=1e-9)
+    assert tuning.intervals["alpha_u"] == pytest.approx((alpha / factor, alpha * factor), rel=1e-6)
+
+
+def test_as_many_points_as_coefficients_have_no_intervals(k: Rov) -> None:
+    assert tuned_to(k, HEAVE, 0.3, 0.2, 2.0).intervals == {"alpha_w": None, "beta_w": None}
+    assert tuned_to(k, HEAVE, 0.3, 0.2).intervals == {"alpha_w": None}
 
 
 @pytest.mark.parametrize(
@@ -113,7 +138,7 @@ def test_what_no_tuning_gives(
     command: float, V_ss: float, Tau: float, named: str, k: Rov, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(TuningError, match=re.escape(named)):
-        tune(k, HEAVE, command, V_ss, Tau)
+        tuned_to(k, HEAVE, command, V_ss, Tau)
     options = [f"--command={command}", f"--v-ss={V_ss}", f"--tau={Tau}"]
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
 
@@ -130,43 +155,34 @@ def test_what_no_tuning_gives(
     ],
 )
 def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: list[str], k: Rov) -> None:
-    points = (Point("V_ss", 0.3, 0.2, 1.0, ""), Point("Tau", 0.3, 2.0, 1.0, ""))
+    points = (Wanted("V_ss", 0.3, 0.2), Wanted("Tau", 0.3, 2.0))
     rov = k.replaced({"alpha_w": alpha, "beta_w": beta})
-    found = [*implausible(Tuning(HEAVE, rov, points))]
+    found = [*implausible(Tuning(HEAVE, rov, points, {"alpha_w": None, "beta_w": None}))]
     assert [finding.kind for finding in found] == kinds
     for finding in found:
         of_alpha = finding.kind == "implausible tuned alpha"
         value, low, high = (alpha, 0.5, 2.0) if of_alpha else (beta, 0.05, 1.2)
         assert finding.numbers == {"value": value, "low": low, "high": high}
-    assert len([*implausible(Tuning(HEAVE, rov, points[:1]))]) == (alpha not in (0.5, 1.0, 2.0)), "beta was not tuned"
-
-
-def test_the_median_of_the_alphas_and_of_the_betas_is_where_the_fit_starts(k: Rov) -> None:
-    """Of three points with a common command, α is that of the middle V_ss, and β that of the middle Tau."""
-    points = [Point("V_ss", 0.3, V, 1.0, "") for V in (0.1, 0.2, 0.9)]
-    points += [Point("Tau", 0.3, Tau, 1.0, "") for Tau in (1.0, 2.0, 9.0)]
-    start = _each_median(k, HEAVE, points)
-    assert start.response(HEAVE, 0.3) == pytest.approx((0.2, 2.0), rel=1e-12)
+    of_alpha_alone = [*implausible(Tuning(HEAVE, rov, points[:1], {"alpha_w": None}))]
+    assert len(of_alpha_alone) == (alpha not in (0.5, 1.0, 2.0)), "beta was not tuned"
 
 
 @pytest.mark.parametrize(("count", "more"), [(2, ""), (3, ", ...")])
-def test_the_source_names_the_first_two_points(count: int, more: str, k: Rov) -> None:
-    points = tuple(Point("V_ss", c, V, 1.0, "") for c, V in ((0.3, 0.2), (0.4, 0.25), (0.5, 0.31)))
-    values, reason = tuned_values(Tuning(HEAVE, k, points[:count]))
-    assert reason == f"Tuned to V_ss = 0.2 at 30%, V_ss = 0.25 at 40%{more}"
-    assert values == {"alpha_w": k["alpha_w"], "beta_w": k["beta_w"]}
+def test_the_source_names_the_first_two_points(count: int, more: str) -> None:
+    points = [Wanted("V_ss", c, V) for c, V in ((0.3, 0.2), (0.4, 0.25), (0.5, 0.31))]
+    assert source(points[:count]) == f"Tuned to V_ss = 0.2 at 30%, V_ss = 0.25 at 40%{more}"
 
 
 @pytest.mark.parametrize("command", [1.0, -1.0])
 def test_full_command_is_allowed_and_more_is_not(command: float, k: Rov) -> None:
-    assert tune(k, HEAVE, command, command * 0.5).rov.response(HEAVE, command)[0] == pytest.approx(command * 0.5)
+    assert tuned_to(k, HEAVE, command, command * 0.5).rov.response(HEAVE, command)[0] == pytest.approx(command * 0.5)
     with pytest.raises(TuningError, match="a fraction of the full command"):
-        tune(k, HEAVE, 1.01 * command, command * 0.5)
+        tuned_to(k, HEAVE, 1.01 * command, command * 0.5)
 
 
 def test_thrust_that_falls_with_the_speed_cannot_be_tuned(k: Rov) -> None:
     with pytest.raises(TuningError, match="heave: its thrust decreases with the speed of advance"):
-        tune(k.extended({"d_top": 1.0}), HEAVE, 0.3, 0.2)
+        tuned_to(k.extended({"d_top": 1.0}), HEAVE, 0.3, 0.2)
 
 
 # ---- Of another vehicle, by direction --------------------------------------------------------------------------------
@@ -207,7 +223,7 @@ def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
     ("command", "V_ss", "Tau"), [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)]
 )
 def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float) -> None:
-    tuned = tune(BUOYANT, HEAVE, command, V_ss, Tau).rov
+    tuned = tuned_to(BUOYANT, HEAVE, command, V_ss, Tau).rov
     alpha, beta = tuned["alpha_w"], tuned["beta_w"]
     assert heave_after(100.0 * Tau, command, alpha, beta) == pytest.approx(V_ss, rel=1e-9)
     risen = (1.0 - 1.0 / e) * V_ss
@@ -217,16 +233,14 @@ def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float
 def test_both_directions_are_tuned_together() -> None:
     commands = (-0.8, -0.3, 0.3, 0.8)
     known = BUOYANT.replaced({"alpha_w": 1.3, "beta_w": 0.4})
-    wanted = [Point(q, c, known.response(HEAVE, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
+    wanted = [Wanted(q, c, known.response(HEAVE, c)[q == "Tau"]) for q in ("V_ss", "Tau") for c in commands]
     assert wanted[0].value * wanted[3].value < 0.0
-    tuning = tune_over(BUOYANT, HEAVE, wanted)
+    tuning = tune(BUOYANT, HEAVE, wanted)
     assert [tuning.rov["alpha_w"], tuning.rov["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)
-    assert tuning.estimate
-    assert tuning.estimate.degrees_of_freedom == 6.0
 
 
 def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
-    tuned = tune(BUOYANT, SWAY, 0.6, 0.4).rov
+    tuned = tuned_to(BUOYANT, SWAY, 0.6, 0.4).rov
     thrust = 22.0 * 0.5**2 + 25.0 * 0.5
     assert tuned["alpha_v"] == pytest.approx((60.0 * 0.4**2 + 2.0 * 0.4) / thrust, rel=1e-12)
     assert tuned["beta_v"] == 0.8
@@ -250,7 +264,7 @@ def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
 )
 def test_what_no_tuning_of_a_direction_gives(axis: Axis, command: float, V_ss: float, reason: str) -> None:
     with pytest.raises(TuningError, match=f"^{re.escape(reason)}$"):
-        tune(BUOYANT, axis, command, V_ss)
+        tuned_to(BUOYANT, axis, command, V_ss)
 
 
 # ---- rov-fmu tune ----------------------------------------------------------------------------------------------------

@@ -10,12 +10,13 @@ import pytest
 import tomlkit
 
 from rov_fmu.cli import main
-from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.interface.inspect_command import write_draft
 from rov_fmu.io import csv_table
 from rov_fmu.io.output import WriteError
 from rov_fmu.tank.arrays import Array
+from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion, test_mavlink, test_ulog
 from tests.tank.readers.motion import TIME
 from tests.tank.readers.test_bags import Ros, dive
@@ -71,16 +72,15 @@ def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, capsys
     end = f"Wrote {tmp_path / 'rov.toml'}. Next: edit this draft, then rov-fmu identify {tmp_path}\n"
     assert capsys.readouterr().out.endswith(end)
     assert 'base = "bluerov2"' in (tmp_path / "rov.toml").read_text(encoding="utf-8")
-    tests: TankTests = load_tank_tests(tmp_path)
-    assert tests.recordings.keys() == axes
-    (heave,) = tests.recordings["heave"]
-    there = np.isfinite(heave.values)
+    tests = load_tests(tmp_path)
+    assert axes <= {*tests.tested.logs}
+    (log,) = tests.folder.logs
     if name != "telemetry":
-        assert heave.values[there] == pytest.approx(DEPTH, abs=1e-5)
-        assert heave.thrusters["6"][there] == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
+        assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
+        assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
     if name == "three files":
-        assert tests.recordings["yaw"][0].clock == "imu.csv"
-        assert heave.context["voltage"][there] == pytest.approx(motion.VOLTAGE, abs=1e-6)
+        assert log.other_clocks == {"imu.csv"}
+        assert measured(log, "voltage") == pytest.approx(motion.VOLTAGE, abs=1e-6)
 
 
 def test_the_folder_of_a_bag_is_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -181,7 +181,7 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace("[axes.yaw]", "")  # its column may stay
     thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
     draft.write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
-    assert {*load_tank_tests(tmp_path).recordings} == {"heave"}
+    assert [*load_tests(tmp_path).given.rov.layout.kinds] == ["heave"]
 
 
 def test_a_dive_with_the_headers_of_its_owner(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -472,8 +472,8 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     assert main(["identify", str(tmp_path), "--draft"]) == 0
     (warning,) = capsys.readouterr().err.splitlines()
     assert warning.startswith(f"rov-fmu: warning: {name}: left out, because it cannot be read: ")
-    tests = load_tank_tests(tmp_path)
-    assert {*tests.recordings} == {"heave"}
+    tests = load_tests(tmp_path)
+    assert tests.tested.logs == ["heave"]
     assert f"{name}: left out, because it cannot be read" in by_heading(tests.findings)["Warnings"][0]
     log.unlink()
     for arguments in ([str(tmp_path)], [str(tmp_path), "--inspect"]):

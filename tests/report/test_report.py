@@ -2,80 +2,46 @@
 
 import re
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from functools import partial
+from io import StringIO
+from math import inf, nan
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
 from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content, python_content
-from rov_fmu.identify.adapter.tank_tests import kind_of_data, load_tank_tests
-from rov_fmu.identify.findings import _SENTENCES, DOUBTS, FACTS, by_heading
-from rov_fmu.identify.identification import Identification, compare
-from rov_fmu.identify.identify import identify
-from rov_fmu.identify.next_test import NextTest
-from rov_fmu.identify.recordings.recordings_fit import FittedEffect
+from rov_fmu.identify.result import AxisResult, Effect, Identification, NextTest
+from rov_fmu.io.output import write_whole
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
-from rov_fmu.model.rov import Rov
 from rov_fmu.report import report
+from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification
-from rov_fmu.report.overview import shown_prediction
 from rov_fmu.report.page.fmu_page import documentation_page
-from rov_fmu.report.templates import number, sentence, with_interval
-from rov_fmu.tank.findings import Finding
-from rov_fmu.vehicle.shipped import PAPER, SHIPPED, VIDEORAY
+from rov_fmu.report.templates import number, sentence, two_digits, with_interval
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import vehicle_output
 from tests.commands import TESTS
-from tests.folders import DOWN, SPEED, folder_of, pulled, read
-from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
-from tests.recordings import PLANS, clean, write_log
 from tests.report.conftest import Visit
 from tests.report.pages import check_breaks_long_words, check_is_whole, check_refers_to_itself_alone, rows, text_of
+from tests.report.results import FILES, GOOD, axis_result, example, prediction, told, without_findings
 
 report_page = partial(report.report_page, made=date(2026, 11, 23))
-PAGES = ["of_tables", "of_recordings"]
-ONE_AXIS = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
-"""The tank tests of a vehicle with one axis."""
+SECTIONS = [
+    *("overview", "warnings", "predictions", "answers", "known"),
+    *("effects", "disturbances", "logging", "tables", "inputs"),
+]
 
 
 @pytest.fixture(scope="module")
-def of_tables() -> Identification:
-    """The results of the VideoRay's tank tests that ship."""
-    return identify(load_tank_tests(TESTS))
-
-
-@pytest.fixture(scope="module")
-def of_recordings(tmp_path_factory: pytest.TempPathFactory) -> Identification:
-    """The results of thrust tests and of recordings of surge and heave."""
-    folder, random = tmp_path_factory.mktemp("logs"), np.random.default_rng(1)
-    write_rov(folder, thrust_rear=(0.0, 0.7))
-    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
-    for thruster, m in (("rear", SURGE), ("top", HEAVE)):
-        rows = [(c, k.force(m, c) + 0.05 * random.standard_normal()) for c in COMMANDS.tolist()]
-        write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
-        write_log(folder, "a&b $1", clean(k, m, PLANS[m.name][0], rate=20.0).noisy(random))
-    return identify(load_tank_tests(folder))
-
-
-@pytest.fixture(params=PAGES)
-def results(request: pytest.FixtureRequest) -> Identification:
-    found: Identification = request.getfixturevalue(request.param)
-    return found
-
-
-@pytest.fixture(scope="module")
-def pages(of_tables: Identification, of_recordings: Identification) -> Mapping[int, str]:
-    return {id(found): report_page(found) for found in (of_tables, of_recordings)}
-
-
-@pytest.fixture
-def page(results: Identification, pages: Mapping[int, str]) -> str:
-    return pages[id(results)]
+def page() -> str:
+    return report_page(example())
 
 
 def leave_plots_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,314 +55,326 @@ def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     leave_plots_out(monkeypatch)
 
 
-def sections(page: str) -> list[str]:
-    return [h2.get("id") for h2 in html.fromstring(page).iter("h2")]
+def bare() -> Identification:
+    """A result of one axis without logs, tables, effects or anything else that a report shows."""
+    result = without_findings()
+    axis = AxisResult(SURGE, GOOD, (), (), (), (), None)
+    empty: dict[str, Any] = dict.fromkeys(("forces", "effects", "disturbances", "logging", "sensors"), ())
+    folder = replace(result.folder, logs=[])
+    correlation = (), result.correlation[1][:0, :0]
+    return told(replace(result, axes=(axis,), curves={}, folder=folder, correlation=correlation, **empty))
 
 
-def test_the_page_is_whole_loads_nothing_and_answers_three_questions_first(page: str) -> None:
+def labels(page: str) -> list[str]:
+    return [svg.get("aria-label") for svg in html.fromstring(page).iter("svg")]
+
+
+def test_the_page_is_whole_loads_nothing_and_answers_the_owners_questions_first(page: str) -> None:
     check_is_whole(page)
     check_refers_to_itself_alone(page)
-    assert not list(html.fromstring(page).iter("script"))
-    assert sections(page)[:5] == ["overview", "predicts", "known", "next", "warnings"]
+    root = html.fromstring(page)
+    assert not list(root.iter("script"))
+    assert "default-src 'none'" in root.xpath("string(//meta[@http-equiv]/@content)")
+    assert [h2.get("id") for h2 in root.iter("h2")] == SECTIONS
+    assert [a.get("href") for a in root.find(".//nav").iter("a")] == [f"#{section}" for section in SECTIONS]
     assert "nan" not in re.findall(r"[a-z]+", text_of(page)), "a dash stands where there is no number"
+    cards = [" ".join(h3.text_content().split()) for h3 in root.xpath("//section[@class='overview']//h3")]
+    assert cards == ["May the model be trusted?", "How fast, how soon, how far?", "What to measure next"]
 
 
-def test_long_words_break(
-    of_tables: Identification, pages: Mapping[int, str], tmp_path: Path, visit: Callable[..., Visit]
-) -> None:
-    check_breaks_long_words(pages[id(of_tables)], tmp_path / "report.html", visit)
+def test_long_words_break(page: str, tmp_path: Path, visit: Callable[..., Visit]) -> None:
+    check_breaks_long_words(page, tmp_path / "report.html", visit)
 
 
-@pytest.mark.long
-def test_the_same_twice(results: Identification, page: str) -> None:
-    assert report_page(results) == page
+def test_the_same_twice_with_its_progress(page: str) -> None:
+    steps: list[tuple[str, float]] = []
+    assert report_page(example(), lambda step, share: steps.append((step, share))) == page
+    assert [step for step, _ in steps] == [f"drawing: {label}" for label in labels(page)]
+    assert [share for _, share in steps] == pytest.approx([n / len(steps) for n in range(len(steps))])
 
 
-def test_inputs_coefficients_and_intervals_have_their_rows(results: Identification, page: str) -> None:
+def test_the_overview_has_verdicts_answers_the_worst_prediction_and_the_number_of_warnings(page: str) -> None:
     table = rows(page)
-    for name, digest in results.tests.inputs.items():
-        ((holds, found),) = [row[1:] for row in table if len(row) == 3 and row[0] == name]
-        assert holds
-        assert found == digest
-    coefficients = {row[0]: row for row in reversed(table) if len(row) == 7}  # the first of each name
-    for name in results.vehicle.layout.coefficients:
-        row, interval = coefficients[name], results.vehicle.intervals.get(name)
-        value = results.vehicle.rov[name]
-        assert row[2:5] == (with_interval(value, interval) if interval else [number(value, 5), "", ""])
-        assert row[6] == results.vehicle.sources[name]
+    assert ["Yaw", "do not use", "The bands contain only 40 % of the unseen data. Two starts disagree."] in table
+    assert ["Surge", "good", "The bands contain 95 % of the unseen data."] in table
+    assert [
+        "Heave",
+        "0.15 m/s0.14 to 0.17",
+        "0.25 m/s0.23 to 0.28",
+        "1.00 s0.90 to 1.10",
+        "0.50 m0.45 to 0.55",
+    ] in table
+    assert labels(page)[0] == "Main prediction"
+    words = text_of(page)
+    assert (
+        "Yaw: the heading of log_2.csv, predicted anew every 10 s from the commands alone, by a fit to the other"
+        in words
+    )
+    assert "The band should contain 95 % of the samples; it contains 40 %." in words
+    assert "3 warnings should be read before the model is used." in words
+    assert "Identification from two dive logs · 2026-11-23" in words
+    assert "2 logs of 120 s, 3 forces, 9 points, commands of 20 % to 70 %." in words
 
 
-def test_fitted_coefficients_are_in_a_plot_and_a_table(results: Identification, page: str) -> None:
-    table = {row[0]: row for row in reversed(rows(page)) if len(row) in (4, 5)}
-    fitted = {name for result in results.axes if result.estimate for name in result.estimate.names}
-    for name in fitted:
-        assert table[name][1:4] == with_interval(results.vehicle.rov[name], results.vehicle.intervals[name])
-    (plot,) = [svg for svg in html.fromstring(page).iter("svg") if svg.get("aria-label") == "What is known"]
-    labels = {text.text_content() for text in plot.iter("text")}
-    assert {"a_d_u", "b_d_w"} <= fitted <= labels
-    assert not [label for label in labels if label.startswith(("alpha", "m_rov"))], "what is given, or by convention"
-
-
-def test_inertia_and_added_mass_follow_from_beta(results: Identification, page: str) -> None:
-    """The inertia is m/β, and the smallest β is that of the largest inertia."""
-    table = {row[0]: row for row in rows(page) if len(row) == 8 and row[7] in ("kg", "kg·m²")}
-    vehicle = results.vehicle
-    for axis, own, beta in (("Surge", "m_rov", "beta_u"), ("Heave", "m_rov", "beta_w"), ("Yaw", "I_r", "beta_r")):
-        fitted = any(beta in result.estimate.names for result in results.axes if result.estimate)
-        assert (axis in table) is fitted
-        if fitted:
-            low, high = vehicle.intervals[beta]
-            ends = vehicle.rov[own] / high, vehicle.rov[own] / low
-            total = vehicle.rov[own] / vehicle.rov[beta]
-            assert table[axis][1:4] == with_interval(total, ends)
-            mass = vehicle.rov[own]
-            assert table[axis][4:7] == with_interval(total - mass, (ends[0] - mass, ends[1] - mass))
-
-
-def test_warnings_points_and_predictions_of_tables(of_tables: Identification, pages: Mapping[int, str]) -> None:
-    page = pages[id(of_tables)]
-    items = [item.text_content().strip() for item in html.fromstring(page).iter("li")]
-    assert of_tables.warnings
-    assert {sentence(f"{warning}.") for warning in of_tables.warnings + of_tables.facts} <= set(items)
-    table = rows(page)
-    for comparison in compare(of_tables):
-        for n, p in enumerate(comparison.points):
-            numbers = [f"{column[n]:.4g}".replace("-", "−") for column in comparison.columns]
-            assert [row for row in table if len(row) == 9 and row[2::2][:3] == numbers and p.source in row[8]]
-    assert ["Surge, Vss", "6", "5.3 %", "9.7 %", "16.6 %"] in table
-    for words, error in (("Vss of 6 points", "9.7 %"), ("Tau of 4 points", "17.0 %")):
-        assert [row for row in table if row[1:2] == [f"{words}, each by a fit without its thrust"] and row[-1] == error]
-
-
-@pytest.mark.usefixtures("without_plots")
-def test_a_vehicle_of_another_kind_is_compared(of_tables: Identification) -> None:
-    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
-    axes = tuple(form for form in heavy.layout.axes if form.axis is not YAW)
-    rov = Rov(replace(heavy.layout, axes=axes, coupled=False), heavy.rov.coefficients)
-    results = replace(of_tables, against=replace(heavy, rov=rov))
-    for comparison in compare(results):
-        assert len(comparison.columns) == 3
-        assert np.isnan(comparison.columns[-1]).all() == (comparison.result.axis is YAW)
-    page = report_page(results)
-    assert f"“compared” is {heavy.name}" in " ".join(page.split())
-    of_yaw = [row for row in rows(page) if "steady_yaw" in row[-1]]
-    assert of_yaw
-    assert all(row[-3:-1] == ["–", "–"] for row in of_yaw)
-
-
-def test_recordings_are_drawn_listed_and_predicted(of_recordings: Identification, pages: Mapping[int, str]) -> None:
-    """The errors of predictions are in units, beside no change and the noise of the sensor."""
-    page = pages[id(of_recordings)]
-    labels = {svg.get("aria-label") for svg in html.fromstring(page).iter("svg")}
-    assert {"Thrust: rear", "Thrust: top"} <= labels
-    table = rows(page)
-    assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in table if len(row) == 6]
-    for result in of_recordings.axes[:2]:
-        file = f"log_{result.axis.name}_a&b $1.csv"
-        assert f"Recording of {result.axis.name}: {file}" in labels
-        assert sum(row[0] == file for row in table) >= len(result.steps) > 0
-        first, *others = (row for row in table if row[-1] == f"halves of {file}, each by a fit to the other")
-        assert not others
-        assert first[:3] == [result.axis.name.capitalize(), "10 s", result.axis.position]
-        predicted, unchanged, noise = (float(number) for number in first[3:6])
-        assert noise < predicted < 0.1 * unchanged
-        assert first[6] == "m"
-        whole = [row for row in table if row[1:3] == ["whole recording", "velocity"] and row[-1] == ""]
-        assert len(whole) == 2
-        assert all(float(row[3]) < 0.3 * float(row[4]) and row[6] == "m/s" for row in whole)
-
-
-def test_measured_and_fitted_values_stand_side_by_side(of_recordings: Identification, pages: Mapping[int, str]) -> None:
-    listed = {
-        row[0]: row
-        for row in rows(pages[id(of_recordings)])
-        if row[4:5] in (["thrust tests of rear"], ["thrust tests of top"])
+def test_findings_stand_under_their_headings(page: str) -> None:
+    made = example().vehicle.provenance
+    assert made
+    lists = {
+        ul.get("class"): [" ".join(li.text_content().split()) for li in ul] for ul in html.fromstring(page).iter("ul")
     }
-    assert {*listed} == {"a_t_rear", "b_t_rear", "a_t_top", "b_t_top"}
-    for name, row in listed.items():
-        measured = of_recordings.thrust[name[4:]].estimate
-        assert row[1:4] == with_interval(measured[name], measured.interval(name))
-        assert row[5] == with_interval(of_recordings.vehicle.rov[name], of_recordings.vehicle.intervals[name])[0]
-        assert row[-1] in ("agree", "they differ")
-    assert "A thruster may also push less in motion than when it is held" in text_of(pages[id(of_recordings)])
-
-
-def test_the_opening_screen_shows_an_unseen_recording_with_its_band(
-    of_recordings: Identification, pages: Mapping[int, str]
-) -> None:
-    """Most of the predicted samples are inside; the band of a prediction by half a recording is an approximation."""
-    shown = shown_prediction(of_recordings)
-    assert shown
-    assert shown.half_band is not None
-    assert 0.7 <= (shown.share_inside or 0.0) <= 1.0
-    later = shown.later
-    assert np.all(shown.half_band[later] < 0.1 * np.ptp(shown.measured))
-    page = pages[id(of_recordings)]
-    assert shown.file in text_of(page)
-    labels = [svg.get("aria-label") for svg in html.fromstring(page).iter("svg")]
-    assert labels[:2] == ["Prediction of an unseen recording", "Error of this prediction"]
-    assert "Correlation: surge" in labels
-    assert "Identification from tank tests · 2026-11-23" in text_of(page)
-    assert "a_d: quadratic drag, b_d: linear drag" in text_of(page)
-    assert "_u: surge, _w: heave" in text_of(page)
-
-
-@pytest.mark.usefixtures("without_plots")
-def test_a_band_that_misses_most_samples_has_a_consequence(
-    of_recordings: Identification, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = "so the intervals below may be too narrow"
-    assert words not in text_of(report_page(of_recordings))
-    shown = shown_prediction(of_recordings)
-    assert shown
-    assert shown.half_band is not None
-    narrow = replace(shown, half_band=0.05 * shown.half_band)
-    monkeypatch.setattr("rov_fmu.report.report.shown_prediction", lambda _: narrow)
-    assert words in text_of(report_page(of_recordings))
-
-
-def test_every_kind_of_finding_is_a_fact_a_doubt_or_a_warning() -> None:
-    assert {*_SENTENCES} >= FACTS | DOUBTS
-    assert not FACTS & DOUBTS
-    groups = by_heading([Finding("constant motion", "surge", file="A b.csv", names={"quantity": "depth"})])
-    assert groups["Facts"] == ("A b.csv: the recording of surge is left out: the depth never changes",)
+    assert lists["warnings"] == [f"{sentence(warning)}." for warning in made.warnings]
+    assert lists["facts"] == [f"{sentence(fact)}." for fact in made.facts]
+    assert "doubts" not in lists
     assert sentence("a b.csv: 3 pulses of 0 or 65535 us, -55%") == "a b.csv: 3 pulses of 0 or 65535 µs, −55 %"
 
 
-def test_a_log_of_several_axes_is_a_dive_log(of_recordings: Identification) -> None:
-    tests = of_recordings.tests
-    assert kind_of_data(tests) == "tank tests"
-    dives = {
-        axis: tuple(replace(r, file="dive.bin") for r in recordings) for axis, recordings in tests.recordings.items()
+def test_every_prediction_has_a_row_and_a_plot(page: str) -> None:
+    table = rows(page)
+    assert ["Surge", "distance", "10 s", "0.050 m", "0.70 m", "0.010 m", "95 %", FILES[1], "the other log"] in table
+    assert ["Yaw", "heading", "10 s", "52 °", "40 °", "0.57 °", "40 %", FILES[1], "the other log"] in table
+    off = [td.text_content() for td in html.fromstring(page).xpath("//td[contains(@class, 'off')]")]
+    assert off == ["52 °"], "worse than no change"
+    predicted = [label for label in labels(page) if label.startswith("Prediction of")]
+    assert len(predicted) == len(set(predicted)) == 4
+    assert predicted[1] == "Prediction of surge: surge velocity of log_2.csv, whole log"
+
+
+def test_answers_have_their_rows_and_plots(page: str) -> None:
+    table = [row for row in rows(page) if len(row) == 12]
+    ends = (0.294, 0.306), (1.633, 1.7), (0.588, 0.612)
+    row = [*with_interval(0.3, ends[0]), "m/s", *with_interval(5.0 / 3.0, ends[1]), *with_interval(0.6, ends[2]), "m"]
+    assert ["30 %", *row] in table
+    assert any(row[:2] == ["−50 %", "−45"] and row[4] == "°/s" for row in table), "yaw in degrees"
+    for axis in (SURGE, HEAVE, YAW):
+        assert {f"V_ss over the command: {axis.name}", f"Tau over the command: {axis.name}"} <= {*labels(page)}
+
+
+def test_coefficients_have_their_prior_and_interval(page: str) -> None:
+    table = rows(page)
+    row = ["a_d_u", "10.0", "9.0", "11.0", "N·s²/m²", "20 within a factor of 2, from the base", "10 %"]
+    assert row in table
+    assert ["top thrust".capitalize()] in table
+    given = {row[0]: row for row in table if len(row) == 5}
+    vehicle = example().vehicle
+    assert given["m_rov"][2:] == [number(vehicle.rov["m_rov"], 5), "kg", vehicle.sources["m_rov"]]
+    assert "a_d_u" not in given
+
+
+def test_inertia_and_added_mass_follow_from_beta(page: str) -> None:
+    """The inertia is m/β, and the smallest β is that of the largest inertia."""
+    table = {row[0]: row for row in rows(page) if len(row) == 8 and row[7] in ("kg", "kg·m²")}
+    mass = example().vehicle.rov["m_rov"]
+    total, low, high = mass / 0.8, mass / 0.9, mass / 0.7
+    assert table["Surge"][1:4] == with_interval(total, (low, high))
+    assert table["Surge"][4:7] == with_interval(total - mass, (low - mass, high - mass))
+    assert set(table) == {"Surge", "Heave", "Yaw"}
+
+
+def test_correlations_are_a_triangle(page: str) -> None:
+    (matrix,) = html.fromstring(page).xpath("//table[@class='matrix']")
+    cells = [[td.text_content() for td in tr.iter("td")] for tr in matrix.find("tbody")]
+    assert [len(row) for row in cells] == [*range(1, 9)]
+    assert cells[0] == ["−0.90"]
+    (strong,) = matrix.xpath(".//td[@class='minus']")
+    assert strong.get("style") == "--r: 54.0%"
+
+
+def test_effects_disturbances_and_sensors_have_their_rows(page: str) -> None:
+    table = rows(page)
+    assert ["Lag of the thrusters", "top", "0.120", "0.110", "0.130", "s", "50", "reported"] in table
+    assert ["Constant load", "heave", "0.010", "−0.50", "0.50", "N", "−3", "not shown by the data"] in table
+    assert ["Slow force", "Heave", "2.1 N", "16 %", FILES[1], "41", "unknown", "30"] in table
+    assert ["Change of thrust", "All", "1.0 %", "1 %", FILES[0], "–", "unknown", "2"] in table
+    assert [FILES[0], "0.1", "−0.080", "−0.090", "−0.070", "0.1"] in table
+    assert ["Yaw", "heading", "1200", "1.0 °", "0 °", "0"] in table
+
+
+def test_points_forces_and_input_files_have_their_rows(page: str) -> None:
+    table = rows(page)
+    row = ["surge", "V_ss", "30 %", "0.29", "0.3", "+3.4 %", "0.31", "+6.9 %", "m/s", "steady.csv"]
+    assert row in table
+    assert any(row[0] == "top" and row[2] == "20 %" and row[-1].endswith("(does not count)") for row in table)
+    assert "Force over the command: top" in labels(page)
+    contents = {row[0]: row[1] for row in table if len(row) == 3 and len(row[2]) == 64}
+    assert contents == {
+        "rov.toml": "",
+        FILES[0]: "log of depth",
+        FILES[1]: "log of depth",
+        "thrust_top.csv": "3 rows of force",
     }
-    assert kind_of_data(replace(tests, recordings=dives, dives=1)) == "tank tests and a dive log"
-    assert kind_of_data(replace(tests, recordings=dives, dives=1, thrust={})) == "a dive log"
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_captions_speak_of_points_only_where_there_are_some(of_recordings: Identification) -> None:
-    assert "measured points (bars" in text_of(report_page(of_recordings))
-    axes = tuple(replace(result, points=()) for result in of_recordings.axes)
-    page = text_of(report_page(replace(of_recordings, axes=axes)))
-    assert "measured points" not in page
-    assert "Steady velocity and time constant" in page
+def test_a_report_of_almost_nothing_says_so() -> None:
+    page = report_page(bare())
+    check_is_whole(page)
+    words = text_of(page)
+    for part in (
+        "Nothing was predicted: there is no data that the fit had not seen.",
+        "No effect besides thrust, drag and inertia was looked for.",
+        "None was looked for, because there is no log.",
+        "There is no log.",
+        "There are no tables of tank tests.",
+        "No further test is needed.",
+    ):
+        assert part in words
+    assert "nan" not in re.findall(r"[a-z]+", words)
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_the_next_tests_begin_with_the_worst_axis(of_tables: Identification) -> None:
-    def test_of(n: int, interval: tuple[float, float] | None, width: float) -> NextTest:
-        return NextTest(
-            of_tables.axes[n].axis, PAPER.axes[n].axis.coefficient("a_d"), interval, width, 0.4, f"do {n} < 3"
+def test_numbers_that_are_not_known_are_dashes() -> None:
+    result = without_findings()
+    surge, *others = result.axes
+    points = tuple(replace(p, held_out=nan) for p in surge.points)
+    known = tuple(replace(one, interval=None) for one in surge.known)
+    answers = tuple(replace(a, rise=(inf, (inf, inf))) for a in surge.answers)
+    axis = replace(surge, points=points, known=known, answers=answers)
+    page = report_page(told(replace(result, axes=(axis, *others))))
+    assert not {"nan", "inf"} & {*re.findall(r"[a-z]+", text_of(page))}
+    assert ["a_d_u", "10", "not determined", "N·s²/m²", "20 within a factor of 2, from the base", "10 %"] in rows(page)
+
+
+def test_errors_keep_two_digits() -> None:
+    """0.010 m beside a noise of 0.0099 m does not look like a coarser number."""
+    assert [two_digits(value) for value in (0.0099, 0.01, 0.4, 1.0, 417.0, -0.5)] == [
+        *("0.0099", "0.010", "0.40", "1.0", "420", "−0.50")
+    ]
+    assert two_digits(inf) == number(nan) == "–"
+
+
+def test_a_value_without_an_end_is_infinite() -> None:
+    assert with_interval(inf, (1.0, inf))[0] == "∞"
+    assert with_interval(-2.0, (-2.5, -1.5)) == ["−2.0", "−2.5", "−1.5"]
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_another_vehicle_is_compared_by_name() -> None:
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+    assert "“compared”" not in text_of(report_page(example()))
+    assert f"“compared” is {heavy.name}." in text_of(report_page(replace(example(), against=heavy)))
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_the_next_tests_begin_with_the_widest_interval() -> None:
+    def page_of(*tests: NextTest | None) -> list[str]:
+        results = without_findings()
+        axes = tuple(replace(one, next_test=test) for one, test in zip(results.axes, tests, strict=True))
+        (card,) = html.fromstring(report_page(replace(results, axes=axes))).xpath(
+            "//section[h3='What to measure next']"
         )
+        return [" ".join(p.text_content().split()) for p in card.iter("p")]
 
-    tests = [test_of(0, (0.9, 1.1), 0.1), test_of(1, None, np.inf), test_of(2, (0.1, 0.3), 0.5)]
-    axes = tuple(replace(result, next_test=test) for result, test in zip(of_tables.axes, tests, strict=True))
-    (listed,) = html.fromstring(report_page(replace(of_tables, axes=axes))).iter("ol")
-    items = [" ".join(item.text_content().split()) for item in listed.iter("li")]
-    assert [item.split(":")[0] for item in items] == ["Heave", "Yaw", "Surge"]
-    assert items[0] == "Heave: do 1 < 3. It makes a_d_w identifiable, which it is not yet."
-    assert items[1].endswith("would shrink to 40 % of its width.")
-
-
-@pytest.mark.usefixtures("without_plots")
-def test_other_effects_are_listed_kept_or_not(of_recordings: Identification) -> None:
-    heave = of_recordings.axes[1]
-    assert heave.recordings
-    file = heave.recordings.simulations[0].recording.file
-    acts = (
-        FittedEffect("load", "heave", "N", -0.25, (-0.3, -0.2), kept=True),
-        FittedEffect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),
-        FittedEffect("delay", file, "s", 0.001, None, kept=False),
-    )
-    axes = (of_recordings.axes[0], replace(heave, recordings=replace(heave.recordings, effects=acts)))
-    page = report_page(replace(of_recordings, axes=axes))
-    assert ["Constant load", "heave", "−0.25", "−0.30", "−0.20", "N", "kept"] in rows(page)
-    assert ["Delay from the commands to the motion", file, "0.001000", "", "", "s", "left at 0"] in rows(page)
-    assert "The fitted delay of 0.21 s is shaded." in text_of(page)
-    folded = [fold.text_content() for fold in html.fromstring(page).iter("details")]
-    assert any(
-        "Effects that were looked for in single recordings, and left at zero: 1" in fold and file in fold
-        for fold in folded
-    )
+    tests = [
+        NextTest(axis, f"do {n} < 3", "V_ss at 50 %", now, 0.1)
+        for n, (axis, now) in enumerate(((SURGE, 0.2), (HEAVE, 0.5), (YAW, 0.1)))
+    ]
+    assert page_of(*tests) == [
+        "Heave: do 1 < 3. V_ss at 50 %, now ±50 %, becomes ±10 %.",
+        "Surge: do 0 < 3. V_ss at 50 %, now ±20 %, becomes ±10 %.",
+    ]
+    (only,) = page_of(None, None, tests[2])
+    assert only == "Yaw: no test would narrow an interval by a tenth. The widest is that of V_ss at 50 %, ±10 %."
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_long_tables_are_folded_without_a_script(of_recordings: Identification) -> None:
-    surge = of_recordings.axes[0]
-    many = replace(of_recordings, axes=(replace(surge, steps=surge.steps[:1] * 201),))
+def test_long_tables_are_folded_without_a_script() -> None:
+    surge, *_ = without_findings().axes
+    many = replace(without_findings(), axes=(replace(surge, points=surge.points[:1] * 201),))
     root = html.fromstring(report_page(many))
-    (fold,) = [fold for fold in root.iter("details") if fold.find("summary").text == "Held commands: 201 rows"]
+    (fold,) = [fold for fold in root.iter("details") if fold.find("summary").text == "Points: 201 rows"]
     assert len(list(fold.iter("tr"))) == 202
     assert not [fold for fold in root.iter("details") if fold.get("open") is not None]
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_the_report_of_another_vehicle_speaks_of_it_alone(tmp_path: Path) -> None:
-    results = identify(read(tmp_path / "mine", DOWN, ONE_AXIS))
-    page = report_page(results)
-    assert sections(page)[-3:] == ["thrust", "heave", "inputs"]
-    assert not re.search(r"videoray|rear|top thruster|surge|yaw", text_of(page), re.IGNORECASE)
+def test_text_of_the_files_is_escaped() -> None:
+    odd = replace(example(), vehicle=replace(example().vehicle, name='<script>$1</script> & "Söhne"'))
+    root = html.fromstring(report_page(odd))
+    assert root.findtext(".//h1") == odd.vehicle.name
+    assert not list(root.iter("script"))
 
 
 # ---- The same in the terminal ----------------------------------------------------------------------------------------
 
 
-def test_the_printout_is_short_and_says_the_same(
-    of_recordings: Identification, capsys: pytest.CaptureFixture[str]
-) -> None:
-    surge, heave, *others = of_recordings.axes
-    assert heave.recordings
-    acts = (FittedEffect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),)
-    heave = replace(
-        heave,
-        recordings=replace(heave.recordings, effects=acts),
-        next_test=NextTest(HEAVE, "a_d_w", (10.0, 20.0), 0.5, 0.25, "a dive"),
-    )
-    print_identification(replace(of_recordings, axes=(surge, heave, *others)))
-    out = capsys.readouterr().out
-    words = [" ".join(line.split()) for line in out.splitlines()]
-    (first,) = (line for line in words if line.startswith("heave depth, 10 s"))
-    predicted, unchanged, noise = (float(n) for n in first.split()[4:10:2])
-    assert noise < predicted < 3.0 * noise < 0.1 * unchanged
-    assert first.endswith(" halves of log_heave_a&b $1.csv")
-    assert "What else acts: delay from the commands to the motion (heave 0.210 s)." in words
-    assert any(line.startswith("To measure next: heave: a dive (narrows a_d_w by 75%).") for line in words)
-    order = [
-        out.index(part)
-        for part in ("RMS errors of predictions", "Identified coefficients", "What else acts", "To measure")
+def printed(result: Identification, monkeypatch: pytest.MonkeyPatch, width: int = 80) -> list[str]:
+    """The lines that a terminal of this width shows."""
+    file = StringIO()
+
+    def terminal() -> _Console:
+        return _Console(
+            file=file, width=width, force_terminal=True, color_system=None, markup=False, highlight=False, emoji=False
+        )
+
+    monkeypatch.setattr("rov_fmu.report.console_results.console", terminal)
+    print_identification(result)
+    return [line.rstrip() for line in file.getvalue().splitlines()]
+
+
+def test_the_printout_fits_a_screen_and_answers_the_owners_questions_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = printed(example(), monkeypatch)
+    assert len(lines) <= 22, "with the files and what is next it has 24 lines"
+    assert max(map(len, lines)) <= 80
+    cells = [re.split(r"  +", line) for line in lines]
+    assert ["surge: good", "0.300 m/s ±2%", "0.500 m/s ±2%", "1.00 s ±2%", "1.00 m ±2%"] in cells
+    assert ["yaw: do not use", "27 deg/s ±30%", "45 deg/s ±30%", "1.0 s ±30%", "90 deg ±30%"] in cells
+    assert ["yaw heading, 10 s ahead", "52 deg", "40 deg", "0.57 deg", "40%"] in cells
+    text = " ".join(" ".join(lines).split())
+    parts = [
+        *(
+            "Tadpole. Two dives in a pond",
+            "V_ss at 30%",
+            "Unseen data",
+            "What else acts: lag of the thrusters (top 0.12 s)",
+        ),
+        *("Warnings (1 warning and 6 facts more in the report):", "- yaw: do not use", "- yaw: the prediction of the"),
+        "To measure next: yaw: hold 0.6 for 8 s, then -0.6 for 8 s (V_ss at 50 %, now ±60%, becomes ±30%).",
     ]
-    assert order == sorted(order)
-    assert len(words) < 24
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
 
 
-# ---- Any data -------------------------------------------------------------------------------------------------------
-
-CASES: Mapping[str, Tables] = {
-    "no more than a fit needs": {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)], "thrust_top": TOP[1:3]},
-    "one thrust": {"steady_heave": [(0.3, 0.163)]},
-    "drag at its bound": {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
-    "backward too": {"thrust_rear": [*FORCES, (-0.5, -8.0)], "steady_heave": [*STEADY["heave"], (-0.5, -0.25)]},
-    "no warning but of Tau": {},
-}
+def test_a_narrow_terminal_prints_rows_as_paragraphs(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = " ".join(" ".join(printed(example(), monkeypatch, 50)).split())
+    assert "surge: good: V_ss at 30% 0.300 m/s ±2%, V_ss at 50% 0.500 m/s ±2%" in text
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("case", CASES)
-def test_any_data(case: str, tmp_path: Path) -> None:
-    text = text_of(report_page(folder_with(tmp_path, CASES[case])))
-    assert "nan" not in re.findall(r"[a-z]+", text)
-    assert "inf" not in re.findall(r"[a-z]+", text)
+def test_the_printout_of_a_good_result_has_no_warnings(capsys: pytest.CaptureFixture[str]) -> None:
+    result = replace(
+        bare(), axes=(replace(axis_result(SURGE, GOOD, [prediction(SURGE, "surge velocity")]), next_test=None),)
+    )
+    print_identification(told(result))
+    out = capsys.readouterr().out
+    assert "No warnings; 2 facts in the report." in out
+    assert "Warnings" not in out
+    assert "What else acts" not in out
+    assert "To measure next" not in out
+    assert re.search(r"^surge velocity  +0.10 m/s", out, re.MULTILINE)
 
 
-@pytest.mark.usefixtures("without_plots")
-def test_text_of_the_files_is_escaped(of_tables: Identification) -> None:
-    odd = replace(of_tables, vehicle=replace(of_tables.vehicle, name='<script>$1</script> & "Söhne"'))
-    root = html.fromstring(report_page(odd))
-    assert root.findtext(".//h1") == odd.vehicle.name
-    assert not list(root.iter("script"))
+def test_an_axis_of_tables_alone_has_the_errors_of_its_points(capsys: pytest.CaptureFixture[str]) -> None:
+    axis = axis_result(SURGE, GOOD, [])
+    print_identification(told(replace(bare(), axes=(replace(axis, answers=()),))))
+    out = [re.split(r"  +", line) for line in capsys.readouterr().out.splitlines()]
+    assert ["surge V_ss, 2 points", "5.1%", "-", "-", "-"] in out
+    assert ["surge: good", "-", "-", "-", "-"] in out, "without answers"
+
+
+def test_intervals_of_the_printout_are_neither_too_small_nor_endless(capsys: pytest.CaptureFixture[str]) -> None:
+    wide, exact = (axis_result(SURGE, GOOD, [], share=share) for share in (1.5, 1e-4))
+    print_identification(told(replace(bare(), axes=(wide, exact))))
+    out = capsys.readouterr().out
+    assert "0.50 m/s ±>100%" in out
+    assert "0.50000 m/s ±1%" in out
+
+
+def test_effects_of_the_vehicle_have_no_owner(capsys: pytest.CaptureFixture[str]) -> None:
+    effects = (Effect("current", "", "current to the east", 0.1, (0.05, 0.15), "m/s", 9.0),)
+    print_identification(told(replace(bare(), effects=effects)))
+    assert "What else acts: current to the east (0.10 m/s)." in capsys.readouterr().out
 
 
 # ---- The file, and the FMU -------------------------------------------------------------------------------------------
@@ -418,8 +396,12 @@ def identified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A vehicle file that names its report, which is in a folder of its own."""
     leave_plots_out(monkeypatch)
     (tmp_path / "pages").mkdir()
-    options = ["-o", str(tmp_path / "vehicle.toml"), "--report", str(tmp_path / "pages" / "report.html")]
-    assert main(["identify", str(folder_of(tmp_path / "tests", DOWN, ONE_AXIS)), *options]) == 0
+    page = report.report_output(example(), tmp_path / "pages" / "report.html")
+    vehicle = load_vehicle(VIDEORAY)
+    made = example().vehicle.provenance
+    assert made
+    vehicle = replace(vehicle, alternatives={}, data=None, pictures=None, provenance=replace(made, report=page.path))
+    write_whole(page, vehicle_output(vehicle, tmp_path / "vehicle.toml"))
     return tmp_path / "vehicle.toml"
 
 

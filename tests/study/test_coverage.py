@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.build import build
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
@@ -140,7 +140,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, schedul
         (folder / "tests" / "rov.toml").write_text(f"{HEAD}[known]\n{MASS}", encoding="utf-8")
         pulls(folder / "tests", k, random)
         KINDS[kind](folder / "tests", k, random)
-        found = identify(load_tank_tests(folder / "tests")).vehicle
+        found = identify(load_tests(folder / "tests")).vehicle
         write_vehicle(found, folder / "found.toml")
         (folder / "plan.toml").write_text(PLAN.format(fmu=beside(fmus.of(found), folder), seed=seed), encoding="utf-8")
         results = study(folder / "plan.toml", folder / "results", scheduler=scheduler)

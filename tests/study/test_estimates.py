@@ -22,10 +22,10 @@ from rov_fmu.study.plan.sampling import Design
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import REFIT, without_progress
+from tests.commands import FROZEN_REFIT, without_progress
 from tests.folders import beside
 
-REFITTED = load_vehicle(REFIT)
+REFITTED = load_vehicle(FROZEN_REFIT)
 ROWS = {"a_d_u": (9.0, 0.5, {}), "b_d_u": (5.0, 0.3, {"a_d_u": -0.8}), "a_d_w": (18.0, 0.6, {})}
 MADE = replace(
     REFITTED,

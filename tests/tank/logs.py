@@ -1,4 +1,4 @@
-"""Logs for tests: made of arrays, or read with their recordings."""
+"""Logs for tests: made of arrays, or read from files, and what is in them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.identify.adapter.recording import Recording
-from rov_fmu.identify.adapter.tank_tests import recordings_of_logs
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
@@ -15,7 +13,7 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import Names
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Channel, Commands, Log, Source
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked, unwrapped
 from rov_fmu.tank.read_log import read_logs
 
 
@@ -34,25 +32,50 @@ def log(commanded: Commands, *channels: Channel, file: str = "a.csv") -> Log:
     return Log(file, commanded, channels)
 
 
+def used(log: Log, quantity: str) -> Channel:
+    """Return the channel that is used for a quantity."""
+    found = log.used(quantity)
+    assert found is not None, f"no {quantity}"
+    return found
+
+
+def measured(log: Log, quantity: str) -> Array:
+    """Return the values that were measured of a quantity; angles are unwrapped."""
+    channel = used(log, quantity)
+    return unwrapped(channel)[channel.there]
+
+
+def commanded(log: Log, thruster: str, time: Array | None = None) -> Array:
+    """Return the commands of a thruster at some times, or in all rows of commands."""
+    found = log.commands
+    assert found is not None
+    return found.at(found.rows if time is None else time)[:, found.thrusters.index(thruster)]
+
+
+def axes(log: Log) -> list[str]:
+    """Return the names of the axes whose motion a log measures and is used, in the order of its channels."""
+    return [*dict.fromkeys(c.quantity.axis.name for c in log.channels if c.quantity.axis and c.count and not c.unused)]
+
+
 @dataclass(frozen=True)
 class Read:
-    """A log that was read, and its recordings."""
+    """The logs of a file."""
 
     logs: Sequence[Log]
-    recordings: Sequence[Recording]
     findings: Sequence[Finding]
     """All but those about the sources of channels."""
 
+    @property
+    def log(self) -> Log:
+        """The only log."""
+        (found,) = self.logs
+        return found
+
 
 def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names = Names()) -> Read:  # noqa: B008 (frozen)
-    """Read a log with its recordings. Raises DataFileError, as the command does."""
+    """Read the logs of a file. Raises DataFileError, as the command does."""
     logs = [checked(one) for one in read_logs(path, layout, names, axis)]
-    findings = [finding for one in logs for finding in one.findings]
     if not any(one.commands for one in logs):
         raise DataFileError(f"{path}: no commands of thrusters were found")
-    commanded = [one for one in logs if one.commands]
-    recordings, useless, mistakes = recordings_of_logs(path.parent, commanded, layout, layout)
-    if mistakes and not recordings:
-        raise DataFileError(*mistakes)
-    findings += useless
-    return Read(logs, recordings, [finding for finding in findings if finding.kind != "source"])
+    findings = [finding for one in logs for finding in one.findings]
+    return Read(logs, [finding for finding in findings if finding.kind != "source"])

@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection.inspection import Inspection, inspect
 from rov_fmu.tank.quality import checked
 from tests.commands import ROOT
-from tests.tank.logs import channel, commands, log, read_log
+from tests.folders import rows_of
+from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log, used
 from tests.tank.readers import motion, test_bags, test_mavlink, test_ulog
 from tests.tank.readers.motion import BLUEROV2, TIME
 from tests.tank.test_several_files import ROV, table
@@ -63,7 +64,7 @@ def test_a_log_is_read_under_any_name(kind: str, tmp_path: Path) -> None:
         assert {"time", "z", "u0"} <= {*one.unread, *one.columns}
         assert one.columns["time"] == "time [s]"
     else:
-        assert read_log(other, BLUEROV2).recordings
+        assert axes(read_log(other, BLUEROV2).log)
 
 
 def test_variables_of_matlab(tmp_path: Path) -> None:
@@ -72,9 +73,9 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
     savemat(tmp_path / "dive.mat", {"log": {"t": TIME, "pwm": pulses, "z": motion.DEPTH, "note": "a dive"}})
     columns = '[columns]\n"log.t" = "time [s]"\n"log.z" = "depth [m]"\n'
     columns += "".join(f'"log.pwm({n})" = "u_{n} [us]"\n' for n in range(1, 7))
-    (heave,) = load_tank_tests(folder(tmp_path, columns)).recordings["heave"]
-    assert heave.values == pytest.approx(motion.DEPTH)
-    assert heave.thrusters["6"] == pytest.approx(motion.THRUSTERS["6"])
+    (one,) = load_tests(folder(tmp_path, columns)).folder.logs
+    assert measured(one, "depth") == pytest.approx(motion.DEPTH)
+    assert commanded(one, "6") == pytest.approx(motion.THRUSTERS["6"])
 
 
 def test_a_file_that_was_cut_short_differs_from_one_of_an_unknown_kind(tmp_path: Path) -> None:
@@ -93,9 +94,9 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
         table(tmp_path / name, "time [s],command [1],distance [m]", TIME, motion.THRUSTERS["5"], TIME)
     else:
         dive(tmp_path / name)
-    tests = load_tank_tests(folder(tmp_path))
-    assert [recording.file for some in tests.recordings.values() for recording in some] == [name]
-    assert not tests.thrust
+    tests = load_tests(folder(tmp_path))
+    assert [one.file for one in tests.folder.logs] == [name]
+    assert not rows_of(tests, "thrust")
 
 
 def test_columns_without_any_known_header_are_listed(tmp_path: Path) -> None:
@@ -121,9 +122,10 @@ def test_messages_of_rostopic_are_columns(tmp_path: Path) -> None:
     assert "%time" not in one.unread
     columns = '[columns]\n"field.position.z" = "-depth [m]"\n'
     columns += "".join(f'"field.data{n}" = "u_{n + 1} [us]"\n' for n in range(6))
-    (heave,) = load_tank_tests(folder(tmp_path, columns)).recordings["heave"]
-    assert heave.values == pytest.approx(motion.DEPTH, abs=1e-4)
-    assert heave.time[-1] == pytest.approx(9.9, abs=1e-5)
+    (log_of,) = load_tests(folder(tmp_path, columns)).folder.logs
+    depth = used(log_of, "depth")
+    assert depth.values == pytest.approx(motion.DEPTH, abs=1e-4)
+    assert depth.time[-1] - depth.time[0] == pytest.approx(9.9, abs=1e-5)
 
 
 # ---- Tables and vehicles ---------------------------------------------------------------------------------------------
@@ -138,18 +140,18 @@ def test_a_table_of_thrust_in_pulses_as_a_maker_publishes_it(titles: str, tmp_pa
     ]
     (tmp_path / "thrust_t200.csv").write_text("\n".join([titles, *rows]), encoding="utf-8")
     columns = '[columns]\n"PWM (µs)" = "command [us]"\n"Force (Kg f)" = "force [kgf]"\n' if "PWM" in titles else ""
-    thrust = load_tank_tests(folder(tmp_path, columns)).thrust["t200"]
+    thrust = rows_of(load_tests(folder(tmp_path, columns)), "thrust")["t200"]
     assert [row.command for row in thrust] == pytest.approx(np.linspace(-1, 1, 21))
     assert thrust[-1].value == pytest.approx(5.0 * 9.80665)
 
 
 def test_the_sign_of_a_table_is_changed_too(tmp_path: Path) -> None:
     (tmp_path / "thrust_t200.csv").write_text("command [%],load [N]\n50,-9\n-50,8\n", encoding="utf-8")
-    tests = load_tank_tests(folder(tmp_path, '[columns]\n"load [N]" = "-force [N]"\n'))
-    assert [row.value for row in tests.thrust["t200"]] == [9.0, -8.0]
+    tests = load_tests(folder(tmp_path, '[columns]\n"load [N]" = "-force [N]"\n'))
+    assert [row.value for row in rows_of(tests, "thrust")["t200"]] == [9.0, -8.0]
     (tmp_path / "thrust_t200.csv").write_text("command [%],load [N]\n50,-1e7\n", encoding="utf-8")
     with pytest.raises(DataFileError, match=r"'-1e7': must be at least -1e\+06"):
-        load_tank_tests(tmp_path)
+        load_tests(tmp_path)
 
 
 def test_a_vehicle_with_fins_is_read(tmp_path: Path) -> None:
@@ -158,12 +160,17 @@ def test_a_vehicle_with_fins_is_read(tmp_path: Path) -> None:
     header = "time [s],u_prop [%],u_rudder [%],surge velocity [m/s],heading [deg]\n"
     (tmp_path / "log_dive.csv").write_text(header + rows, encoding="utf-8")
     (tmp_path / "rov.toml").write_text(FOLDER.replace("bluerov2", "remus100.toml"), encoding="utf-8")
-    tests = load_tank_tests(tmp_path)
-    assert [*tests.recordings] == ["surge"]
+    tests = load_tests(tmp_path)
+    (one,) = tests.folder.logs
+    assert axes(one) == ["surge", "yaw"]
+    assert one.commands
+    assert "prop" in one.commands.thrusters
+    told = sentences(tests.findings, SENTENCES)
+    assert any("the lift of fins is not fitted" in line for line in told)
     assert (
-        "log_dive.csv: the recording of yaw is left out: no thruster drives it, and the effect of fins is not fitted"
-        in sentences(tests.findings, SENTENCES)
+        "log_dive.csv: nothing is learnt about yaw: no thruster drives it, and the effect of fins is not fitted" in told
     )
+    assert tests.tested.logs == ["surge"]
 
 
 # ---- Jumps -----------------------------------------------------------------------------------------------------------
@@ -239,8 +246,8 @@ def test_thrusters_with_a_toe_in_and_a_log_with_sway(axes: str, tmp_path: Path) 
     titles = "time [s],u_l [1],u_r [1],surge velocity [m/s],sway velocity [m/s],heading [rad]"
     left, right = np.where(TIME > 2.0, 0.5, 0.0), np.where(TIME > 5.0, 0.3, 0.0)
     table(tmp_path / "dive.csv", titles, TIME, left, right, motion.U, motion.V, motion.HEADING)
-    tests = load_tank_tests(tmp_path)
-    assert [*tests.recordings] == ["surge", "yaw"]
+    tests = load_tests(tmp_path)
+    assert [*tests.given.rov.layout.kinds] == tests.tested.logs == ["surge", "yaw"]
     assert "dive.csv: the motion in sway is left out, because the thrusters drive it only together with" in (
         "\n".join(sentences(tests.findings, SENTENCES))
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import strategies as st
 
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.vehicle.geometry import check_layout
@@ -170,11 +170,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         HEAVE_ALONE,
         "/rov.toml: fit.lag = 't200': T_t200 is given, so it cannot be fitted too",
     ),
-    (
-        f'{BLUEROV2}[fit]\nadvance = ["rear"]\n',
-        HEAVE_ALONE,
-        "/rov.toml: fit.advance = 'rear': there is no such curve, only t200",
-    ),
+    (f"{BLUEROV2}[fit]\nadvance = true\n", HEAVE_ALONE, "/rov.toml: fit.advance: "),
     (
         f"{BLUEROV2}[fit]\nvoltage = true\n",
         HEAVE_ALONE,
@@ -190,7 +186,7 @@ def test_what_is_wrong_is_told(case: int, tmp_path: Path) -> None:
     lines = words.split(" | ")
     folder = folder_of(tmp_path / "tests", rov, tables or HEAVE_ALONE)
     with pytest.raises(FileError) as caught:
-        load_tank_tests(folder)
+        load_tests(folder)
     told = str(caught.value).splitlines()
     assert [line[: len(f"{folder}{start}")] for line, start in zip(told, lines, strict=True)] == [
         f"{folder}{start}" for start in lines
@@ -210,7 +206,7 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
     }
     folder = folder_of(tmp_path / "tests", rov, tables)
     with pytest.raises(FileError) as caught:
-        load_tank_tests(folder)
+        load_tests(folder)
     starts = [
         "/rov.toml: known.m_rov.unit = 'lb'",
         "/rov.toml: windows.sway",
@@ -236,7 +232,7 @@ def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
     rov = f'base = "nowhere"\n{HEAD}'
     folder = folder_of(tmp_path / "tests", rov, {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_twist.csv": ""})
     with pytest.raises(FileError) as caught:
-        load_tank_tests(folder)
+        load_tests(folder)
     told = str(caught.value).splitlines()
     assert [line[len(str(folder)) :].split(":")[0] for line in told] == [
         "/rov.toml",
@@ -276,7 +272,7 @@ def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, li
     rov = DOWN.replace("[known]", "[body]") + HEADERS
     folder = folder_of(tmp_path / "tests", rov.replace(old, new), FILES)
     with pytest.raises(FileError) as caught:
-        load_tank_tests(folder)
+        load_tests(folder)
     (told,) = str(caught.value).splitlines()
     assert told.startswith(f"{folder}/rov.toml: {line}")
 
@@ -285,7 +281,7 @@ def test_mistakes_of_the_vehicle_and_of_the_columns_are_told_together(tmp_path: 
     rov = DOWN.replace('"kg"', '"lb"').replace("[known]", "[body]") + HEADERS.replace("depth [m]", "depth [ft]")
     folder = folder_of(tmp_path / "tests", rov, FILES)
     with pytest.raises(FileError) as caught:
-        load_tank_tests(folder)
+        load_tests(folder)
     unit, column = str(caught.value).splitlines()
     assert "body.m_rov.unit = 'lb'" in unit
     assert "columns.Depth (m) = 'depth [ft]': must be 'depth [m]' or" in column
@@ -307,7 +303,7 @@ def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int,
     def check(data: st.DataObject) -> None:
         (folder / ROV_FILE).write_bytes(changed_toml(rov.encode(), data))
         try:
-            given = load_tank_tests(folder).given
+            given = load_tests(folder).given
         except FileError as error:
             check_lines(str(error), folder)
             return

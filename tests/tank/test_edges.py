@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.io.csv_table import DataFileError
 from tests.commands import TESTS
+from tests.folders import rows_of
+from tests.tank.logs import used
 
 
 @pytest.mark.parametrize("samples", [19, 20])
@@ -19,14 +21,13 @@ def test_twenty_samples_are_enough(samples: int, tmp_path: Path) -> None:
     rows = [f"{0.1 * n:g},30,{0.01 * n:g}" for n in range(samples)] + ["5,30,"]
     log = tmp_path / "tests" / "log_heave.csv"
     log.write_text("\n".join(("time [s],command [%],depth [m]", *rows)), encoding="utf-8")
-    tests = load_tank_tests(log.parent)
-    if samples < 20:
-        assert "heave" not in tests.recordings
-        (told,) = sentences(finding for finding in tests.findings if finding.kind == "too few samples")
-        assert "19 samples of depth" in told
-    else:
-        (recording,) = tests.recordings["heave"]
-        assert len(recording.values) == 21
+    tests = load_tests(log.parent)
+    (one,) = tests.folder.logs
+    assert used(one, "depth").count == samples
+    told = sentences(finding for finding in tests.findings if finding.file == "log_heave.csv")
+    few = "log_heave.csv: the depth has 19 samples and needs at least 20, so it is left out"
+    assert told == (() if samples == 20 else (few,))
+    assert tests.tested.logs == (["heave"] if samples == 20 else [])
 
 
 @pytest.mark.parametrize("force", [0.049, 0.051])
@@ -38,9 +39,9 @@ def test_a_force_against_the_command_is_noise_up_to_a_twentieth_of_the_largest(f
     path.write_text(f"command [%],force [N]\n80,10\n-1,{10.0 * force:g}\n", encoding="utf-8")
     if force > 0.05:
         with pytest.raises(DataFileError, match="must have the sign of the command"):
-            load_tank_tests(path.parent)
+            load_tests(path.parent)
     else:
-        assert load_tank_tests(path.parent).thrust["rear"][-1].value == 10.0 * force
+        assert rows_of(load_tests(path.parent), "thrust")["rear"][-1].value == 10.0 * force
 
 
 _THRUST, _HEAVE = ("thrust_rear", "command [%],force [N]"), ("steady_heave", "command [%],velocity [m/s]")
@@ -68,10 +69,16 @@ def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str
     head = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")[0]
     (tmp_path / "rov.toml").write_text(f'base = "videoray"\n{head}', encoding="utf-8")
     name, header = table
-    rest = [f"{n},50,0" for n in range(1, 21)] if name.startswith("log") else ["60,1"] if name == "thrust_rear" else []
+    rest = (
+        [f"{n},50,{1e-4 * n:g}" for n in range(1, 21)]
+        if name.startswith("log")
+        else ["60,1"]
+        if name == "thrust_rear"
+        else []
+    )
     path = tmp_path / f"{name}.csv"
     path.write_text("\n".join((header, within, *rest)), encoding="utf-8")
-    assert set(load_tank_tests(tmp_path).inputs) == {"rov.toml", "videoray", path.name}
+    assert set(load_tests(tmp_path).inputs) == {"rov.toml", "videoray", path.name}
     path.write_text("\n".join((header, beyond, *rest)), encoding="utf-8")
     with pytest.raises(DataFileError, match="line 2, column"):
-        load_tank_tests(tmp_path)
+        load_tests(tmp_path)

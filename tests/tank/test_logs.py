@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.likelihood.records import recorded
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import PAPER
-from tests.tank.logs import Read, read_log
+from tests.tank.logs import Read, commanded, measured, read_log, used
 
 N = 40
 STEP = [0.3 * (n >= 10) for n in range(N)]
@@ -33,11 +34,6 @@ def read(folder: Path, header: str, rows: Sequence[str], axis: Axis | None = Non
     return read_log(path, layout, axis)
 
 
-def of_axis(log: Read, name: str) -> Recording:
-    (recording,) = (recording for recording in log.recordings if recording.axis.name == name)
-    return recording
-
-
 # ---- Rows that cannot be used ----------------------------------------------------------------------------------------
 
 
@@ -47,7 +43,6 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     rows[21:21] = ["2.05,,5", "2.06,on,5", "2.07,-,5", "2.08,30,x", "2.09,3,4,5"]
     rows[20:20] = ["1.9,30,", "1.9,25,77", ",30,5", "nan,30,5"]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    (recording,) = log.recordings
     assert [(finding.kind, finding.numbers["count"]) for finding in log.findings] == [
         ("rows sorted", 1),
         ("time stamps merged", 2),
@@ -58,14 +53,14 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     ]
     assert {finding.file for finding in log.findings} == {"log.csv"}
     assert log.findings[-1].names == {"column": "depth"}
-    there = np.isfinite(recording.values)
-    assert recording.time[~there] == pytest.approx([2.08])
+    depth = used(log.log, "depth")
+    assert depth.time[depth.there] == pytest.approx(0.1 * np.arange(N))
     expected = 0.01 * np.arange(N)
     expected[19] = 0.77
-    assert recording.values[there] == pytest.approx(expected)
-    assert recording.time[there] == pytest.approx(0.1 * np.arange(N))
-    assert recording.command is not None
-    assert recording.command[there] == pytest.approx([0.25 if n == 19 else STEP[n] for n in range(N)])
+    assert measured(log.log, "depth") == pytest.approx(expected)
+    assert commanded(log.log, COMMAND, depth.time[depth.there]) == pytest.approx(
+        [0.25 if n == 19 else STEP[n] for n in range(N)]
+    )
 
 
 def test_a_log_without_fault_has_no_findings(tmp_path: Path) -> None:
@@ -76,7 +71,7 @@ def test_two_logs_in_one_file_are_read_apart(tmp_path: Path) -> None:
     rows = [f"{n % 30},30,{n}" for n in range(60)]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
     assert [one.file for one in log.logs] == ["log.csv", "log.csv (from 29 s)"]
-    assert [recording.values[[0, -1]].tolist() for recording in log.recordings] == [
+    assert [measured(one, "depth")[[0, -1]].tolist() for one in log.logs] == [
         pytest.approx([0.0, 0.29]),
         pytest.approx([0.3, 0.59]),
     ]
@@ -95,8 +90,9 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     times = [*np.arange(0.0, 30.0, 0.05), *np.arange(25.0, 55.0, 0.05)]
     rows = [f"{time:.2f},{30 * (n > 9)},{n}" for n, time in enumerate(times)]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert [len(recording.time) for recording in log.recordings] == [600, 600]
-    assert log.recordings[1].values[0] == pytest.approx(6.0)
+    depths = [measured(one, "depth") for one in log.logs]
+    assert [len(depth) for depth in depths] == [600, 600]
+    assert depths[1][0] == pytest.approx(6.0)
     assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
 
 
@@ -121,9 +117,7 @@ def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "told"),
     [
-        (["0,30,1"] * 100, "it has 1 sample of depth, and needs at least 20"),
         ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
-        ([f"{n},30,-" for n in range(N)], "it has 0 samples of depth, and needs at least 20"),
         ([f"12.5.2026,30,{n}" for n in range(N)], r"both a time and a command: '12.5.2026' is no time in time \[s\]"),
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
         ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
@@ -136,10 +130,10 @@ def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, t
 
 def test_as_a_european_spreadsheet_saves_it(tmp_path: Path) -> None:
     rows = [f"{n / 10}; {100 * STEP[n]} ;{n / 100};".replace(".", ",") for n in range(N)]
-    (recording,) = read(tmp_path, "TIME [s] ;Command[%]; Depth [M];", rows, HEAVE).recordings
-    assert recording.time == pytest.approx(0.1 * np.arange(N))
-    assert recording.command == pytest.approx(STEP)
-    assert recording.values == pytest.approx(0.01 * np.arange(N))
+    log = read(tmp_path, "TIME [s] ;Command[%]; Depth [M];", rows, HEAVE).log
+    assert used(log, "depth").time == pytest.approx(0.1 * np.arange(N))
+    assert commanded(log, COMMAND) == pytest.approx(STEP)
+    assert measured(log, "depth") == pytest.approx(0.01 * np.arange(N))
 
 
 # ---- Several commands ------------------------------------------------------------------------------------------------
@@ -153,59 +147,50 @@ def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
         motion = f"{n / 50},{(350 + n) % 360},{n / 100}"
         rows.append(f"{n / 10},{1500 + 400 * left:.0f},{right},{100 * top},{motion},ok")
     header = "time [s],u_l [us],u_r [1],t [%],depth [m],heading [deg],Surge Velocity [m/s],mode"
-    log = read(tmp_path, header, rows)
-    surge, heave, yaw = (of_axis(log, name) for name in ("surge", "heave", "yaw"))
-    assert heave.quantity == "depth"
-    assert heave.values == pytest.approx(np.arange(90) / 50)
-    assert yaw.values == pytest.approx(np.radians(350 + np.arange(90)))
-    assert surge.quantity == "velocity"
-    assert heave.thrusters["t"] == pytest.approx([0.5] * 30 + [0.0] * 60)
-    assert heave.thrusters["r"] == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
-    assert {recording.command is None for recording in log.recordings} == {True}, "no axis was driven alone"
-    assert not log.findings
-
-
-def test_a_command_of_the_axis_where_the_thrusters_follow_its_pattern(tmp_path: Path) -> None:
-    rows = [f"{n / 10},{STEP[n]},{-STEP[n]},0,{n}" for n in range(N)]
-    (recording,) = read(tmp_path, "time [s],u_l [1],u_r [1],u_t [1],heading [deg]", rows, YAW).recordings
-    assert recording.command == pytest.approx(STEP)
+    found = read(tmp_path, header, rows)
+    log = found.log
+    assert measured(log, "depth") == pytest.approx(np.arange(90) / 50)
+    assert measured(log, "heading") == pytest.approx(np.radians(350 + np.arange(90)))
+    assert measured(log, "surge velocity") == pytest.approx(np.arange(90) / 100)
+    assert commanded(log, "l") == pytest.approx([0.0] * 30 + [0.4] * 60)
+    assert commanded(log, "r") == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
+    assert commanded(log, "t") == pytest.approx([0.5] * 30 + [0.0] * 60)
+    assert not found.findings
 
 
 def test_names_of_the_fmu(tmp_path: Path) -> None:
     rows = [f"{n / 10},{STEP[n]},{-STEP[n]},{STEP[n]},{n / 10},{n / 100},{n}" for n in range(N)]
-    log = read(tmp_path, "time [s],u_l [1],u_r [1],u_t [1],r [deg/s],w [m/s],u [V]", rows)
-    assert {recording.axis: recording.quantity for recording in log.recordings} == {HEAVE: "velocity", YAW: "velocity"}
-    assert of_axis(log, "yaw").values == pytest.approx(np.radians(0.1 * np.arange(N)))
+    log = read(tmp_path, "time [s],u_l [1],u_r [1],u_t [1],r [deg/s],w [m/s],u [V]", rows).log
+    assert {c.quantity.name for c in log.channels if not c.unused} == {"heave velocity", "yaw velocity"}
+    assert measured(log, "yaw velocity") == pytest.approx(np.radians(0.1 * np.arange(N)))
 
 
-def test_position_wins_unless_the_velocity_alone_has_samples(tmp_path: Path) -> None:
-    header = "time [s],u_t [1],depth [m],heave velocity [m/s]"
-    full = [f"{n / 10},{STEP[n]},{n},{n / 100}" for n in range(N)]
-    assert of_axis(read(tmp_path, header, full), "heave").quantity == "depth"
-    few = [f"{n / 10},{STEP[n]},{n if n < 10 else ''},{n / 100}" for n in range(N)]
-    assert of_axis(read(tmp_path, header, few), "heave").quantity == "velocity"
+def test_a_position_and_a_velocity_of_an_axis_are_both_used(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{n},{n / 100}" for n in range(N)]
+    log = read(tmp_path, "time [s],u_t [1],depth [m],heave velocity [m/s]", rows).log
+    one = recorded(log, PAPER)
+    assert one
+    assert [(sensor.axis, sensor.is_velocity) for sensor in one.record.sensors] == [(HEAVE, False), (HEAVE, True)]
 
 
-def test_axes_that_the_thrusters_do_nothing_along_are_told(tmp_path: Path) -> None:
-    rows = [f"{n / 10},{STEP[n]},{STEP[n]},{n},{n},1.5" for n in range(N)]
-    log = read(tmp_path, "time [s],u_l [1],u_r [1],surge distance [m],heading [deg],depth [m]", rows)
-    assert [recording.axis for recording in log.recordings] == [SURGE]
-    assert log.findings == [
-        Finding("missing column", file="log.csv", names={"column": "u_t"}),
-        Finding("constant motion", axis="heave", file="log.csv", names={"quantity": "depth"}),
-        Finding("cancelling thrusters", axis="yaw", file="log.csv"),
-    ]
+def test_a_thruster_without_a_column_is_told(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{STEP[n]},{n}" for n in range(N)]
+    found = read(tmp_path, "time [s],u_l [1],u_r [1],surge distance [m]", rows)
+    assert not commanded(found.log, "t").any()
+    assert found.findings == [Finding("missing column", file="log.csv", names={"column": "u_t"})]
 
 
 def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) -> None:
     rows = [f"{n / 10},{0.8 * (n > 9)},{STEP[n]},{n}" for n in range(N)]
-    (recording,) = read(tmp_path, "time [s],u_ahead [1],u_turn [1],heading [deg]", rows, layout=MIXED).recordings
-    assert (recording.thrusters["l"][-1], recording.thrusters["r"][-1]) == pytest.approx((0.95, 0.65))
-    (recording,) = read(tmp_path, "time [s],l [1],R [1],heading [deg]", rows, layout=MIXED).recordings
-    assert (recording.thrusters["l"][-1], recording.thrusters["r"][-1]) == pytest.approx((0.8, 0.3))
+
+    def ends(header: str, rows: Sequence[str]) -> list[float]:
+        log = read(tmp_path, header, rows, layout=MIXED).log
+        return [commanded(log, thruster)[-1] for thruster in "lr"]
+
+    assert ends("time [s],u_ahead [1],u_turn [1],heading [deg]", rows) == pytest.approx([0.95, 0.65])
+    assert ends("time [s],l [1],R [1],heading [deg]", rows) == pytest.approx([0.8, 0.3])
     rows = [f"{n / 10},{0.9 * (n > 9)},{0.9 * (n > 9)},{n}" for n in range(N)]
-    (recording,) = read(tmp_path, "time [s],u_ahead [1],u_turn [1],heading [deg]", rows, layout=MIXED).recordings
-    assert (recording.thrusters["l"][-1], recording.thrusters["r"][-1]) == pytest.approx((1.0, 0.45))
+    assert ends("time [s],u_ahead [1],u_turn [1],heading [deg]", rows) == pytest.approx([1.0, 0.45])
 
 
 # ---- Pulses ----------------------------------------------------------------------------------------------------------
@@ -224,15 +209,14 @@ def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) ->
 )
 def test_a_pulse_is_a_command_by_neutral_and_span(unit: str, pulse: float, command: float, tmp_path: Path) -> None:
     rows = [f"{n / 10},{pulse if n >= 20 else 1900 if n >= 10 else 1500},{n}" for n in range(N)]
-    (recording,) = read(tmp_path, f"time [s],command [{unit}],depth [m]", rows, HEAVE).recordings
-    assert recording.command is not None
-    assert recording.command[-1] == pytest.approx(command)
+    log = read(tmp_path, f"time [s],command [{unit}],depth [m]", rows, HEAVE).log
+    assert commanded(log, COMMAND)[-1] == pytest.approx(command)
 
 
 def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 28]
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
-    assert of_axis(log, "heave").thrusters["t"][[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
+    assert commanded(log.log, "t")[[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
     for kind in ("no pulse", "beyond full thrust"):
         assert Finding(kind, file="log.csv", names={"column": "u_t"}, numbers={"count": 2}) in log.findings
 
@@ -283,31 +267,21 @@ def test_what_cannot_be_is_one_clear_line(case: str, tmp_path: Path) -> None:
     assert len(str(error.value).splitlines()) == 1
 
 
-def test_nothing_of_use_is_a_line_for_each_axis(tmp_path: Path) -> None:
-    rows = [f"{n / 10},0.3,{n},1" for n in range(N)]
-    with pytest.raises(DataFileError) as error:
-        read(tmp_path, "time [s],u_t [1],depth [m],heading [deg]", rows)
-    path = tmp_path / "log.csv"
-    assert str(error.value).splitlines() == [
-        f"{path}: the recording of heave is left out: the thrust along it never changes",
-        f"{path}: the recording of yaw is left out: the heading never changes",
-    ]
-
-
 def test_a_heading_is_unwrapped_over_blanks(tmp_path: Path) -> None:
     rows = [f"{n / 10},{STEP[n]},{-STEP[n]},{(350 + 5 * n) % 360 if n % 2 else ''}" for n in range(2 * N) if n < N] + [
         f"{N / 10 + n / 10},0.3,-0.3,{(350 + 5 * (N + n)) % 360}" for n in range(10)
     ]
-    (recording,) = read(tmp_path, "time [s],u_l [1],u_r [1],heading [deg]", rows).recordings
-    assert recording.values[-1] == pytest.approx(radians(350 + 5 * (N + 9)))
+    log = read(tmp_path, "time [s],u_l [1],u_r [1],heading [deg]", rows).log
+    assert measured(log, "heading")[-1] == pytest.approx(radians(350 + 5 * (N + 9)))
 
 
 def test_a_log_of_one_axis_tells_of_the_conditions(tmp_path: Path) -> None:
     rows = [f"{n / 10},{STEP[n]},{0.1 * n},{15000 - n},{n},-5,3" for n in range(N)]
     header = "time [s],command [1],velocity [m/s],Battery [mV],roll [deg],theta [deg],depth [m]"
-    (recording,) = read(tmp_path, header, rows, SURGE).recordings
-    assert recording.axis is SURGE
-    assert recording.context.keys() == {"voltage", "roll", "pitch", "depth"}
-    assert recording.context["voltage"] == pytest.approx(15.0 - 0.001 * np.arange(N))
-    assert recording.context["roll"] == pytest.approx(np.radians(np.arange(N)))
-    assert recording.context["pitch"] == pytest.approx(radians(-5) * np.ones(N))
+    log = read(tmp_path, header, rows, SURGE).log
+    assert log.axis is SURGE
+    names = {"surge velocity", "voltage", "roll angle", "pitch angle", "depth"}
+    assert {c.quantity.name for c in log.channels} == names
+    assert measured(log, "voltage") == pytest.approx(15.0 - 0.001 * np.arange(N))
+    assert measured(log, "roll angle") == pytest.approx(np.radians(np.arange(N)))
+    assert measured(log, "pitch angle") == pytest.approx(radians(-5) * np.ones(N))

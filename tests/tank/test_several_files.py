@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.identify.adapter.recording import Recording
-from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.log import Log
+from tests.tank.logs import commanded, measured, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import TIME
 
@@ -43,30 +44,30 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def read(folder: Path) -> tuple[TankTests, dict[str, Recording]]:
-    tests = load_tank_tests(folder)
-    return tests, {name: recording for name, (recording,) in tests.recordings.items()}
+def read(folder: Path) -> tuple[tuple[Finding, ...], Log]:
+    tests = load_tests(folder)
+    (log,) = tests.folder.logs
+    return tests.findings, log
 
 
 def mistakes(folder: Path) -> list[str]:
     with pytest.raises(FileError) as error:
-        load_tank_tests(folder)
+        load_tests(folder)
     return str(error.value).replace(f"{folder}/", "").splitlines()
 
 
 def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
-    tests, recordings = read(folder)
-    assert {name: (one.file, one.clock) for name, one in recordings.items()} == {
-        "heave": ("depth.csv", ""),
-        "yaw": ("heading.csv", ""),
-    }
-    heave = recordings["heave"]
-    there = np.isfinite(heave.values)
-    assert there.sum() == 50
-    assert heave.values[there] == pytest.approx(1.0 + 0.1 * heave.time[there], abs=1e-6)
-    assert heave.thrusters["5"] == pytest.approx(np.where(heave.time > 0.999, 0.5, 0.0))
-    assert recordings["yaw"].context["voltage"][50] == pytest.approx(16.0 - recordings["yaw"].time[50], abs=1e-6)
-    assert tests.inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
+    _, log = read(folder)
+    assert not log.other_clocks
+    files = {"depth": "depth.csv", "heading": "heading.csv", "voltage": "depth.csv"}
+    assert {quantity: used(log, quantity).file for quantity in files} == files
+    expected = {"depth": (50, 1.0, 0.1), "heading": (40, 2.0, 0.3), "voltage": (50, 16.0, -1.0)}
+    for quantity, (count, start, rate) in expected.items():
+        channel = used(log, quantity)
+        assert channel.count == count
+        assert channel.values == pytest.approx(start + rate * (channel.time - 1000.0), abs=1e-6)
+    assert commanded(log, "5", 1000.0 + TIME) == pytest.approx(np.where(TIME > 0.999, 0.5, 0.0))
+    assert load_tests(folder).inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
 
 
 def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:
@@ -74,8 +75,8 @@ def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:
         shutil.copy(folder / f"{name}.csv", folder / f"{name}_2.csv")
     again = FILES.replace(".csv", "_2.csv")
     (folder / "rov.toml").write_text(f"{ROV}[dives.june]\n{again}\n[dives.may]\n{FILES}\n", encoding="utf-8")
-    tests, _ = read(folder)
-    (line,) = (line for line in sentences(tests.findings, SENTENCES) if "copy" in line)
+    findings, _ = read(folder)
+    (line,) = (line for line in sentences(findings, SENTENCES) if "copy" in line)
     assert line.startswith("commands.csv, depth.csv, heading.csv: left out as a copy of commands_2.csv, depth_2.csv, h")
 
 
@@ -88,13 +89,12 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
     if declared:
         other = f'{ROV}[dives.may]\n{FILES}\nother_clock = ["heading.csv"]\n'
         (folder / "rov.toml").write_text(other, encoding="utf-8")
-    tests, recordings = read(folder)
-    yaw = recordings["yaw"]
-    assert (yaw.clock, recordings["heave"].clock) == ("heading.csv", "")
-    there = np.isfinite(yaw.values)
+    findings, log = read(folder)
+    assert log.other_clocks == {"heading.csv"}
     late = 2.0 if declared else 0.0
-    assert yaw.values[there] == pytest.approx(2.0 + 0.3 * (yaw.time[there] - late), abs=1e-5)
-    (line,) = (line for line in sentences(tests.findings, SENTENCES) if "clock" in line)
+    since = used(log, "heading").time - 1000.0 - late
+    assert measured(log, "heading") == pytest.approx(2.0 + 0.3 * since, abs=1e-5)
+    (line,) = (line for line in sentences(findings, SENTENCES) if "clock" in line)
     assert line == (
         "heading.csv: it has another clock than the commands. The fit finds the difference, up to 5 s"
         if declared
@@ -130,8 +130,8 @@ def test_unknown_columns_are_named(folder: Path) -> None:
     table(folder / "depth.csv", "t,Pressure depth", 1000.0 + TIME, 100.0 * motion.DEPTH)
     names = '[columns]\n"Pressure depth" = "depth [cm]"\nt = "time [s]"\n'
     (folder / "rov.toml").write_text(f"{ROV}{names}[dives.may]\n{FILES}\n", encoding="utf-8")
-    _, recordings = read(folder)
-    assert recordings["heave"].values[np.isfinite(recordings["heave"].values)] == pytest.approx(motion.DEPTH, abs=1e-6)
+    _, log = read(folder)
+    assert measured(log, "depth") == pytest.approx(motion.DEPTH, abs=1e-6)
 
 
 @pytest.mark.parametrize(

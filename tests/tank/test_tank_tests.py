@@ -10,16 +10,20 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.identify.adapter.tank_tests import TankTests, load_tank_tests
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.model.layout import HEAVE
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS, without_progress
+from tests.folders import rows_of
+from tests.tank.logs import measured, used
 
 
 @pytest.fixture
@@ -34,16 +38,17 @@ def folder(tmp_path: Path) -> Path:
 def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table_9(
     vehicle: Vehicle,
 ) -> None:
-    found = load_tank_tests(TESTS)
+    found = load_tests(TESTS)
     tables = {table.axis.name: table for table in load_tables(vehicle)}
+    steady, Taus_of = rows_of(found, "steady"), rows_of(found, "time_constant")
     for axis, table in tables.items():
-        forward = {row.command: row.value for row in found.steady[axis] if row.command > 0.0}
+        forward = {row.command: row.value for row in steady[axis] if row.command > 0.0}
         assert forward == {float(c) / 100.0: float(V) for c, V in table.steady.items()}
-        Taus = {row.command: row.value for row in found.time_constants.get(axis, ())}
+        Taus = {row.command: row.value for row in Taus_of.get(axis, ())}
         assert Taus == {
             float(row.command) / 100.0: float(Tau) for row in table.rows if (Tau := row.scaled.Tau.measured) is not None
         }
-    upward = [(row.command, row.value) for row in found.steady["heave"] if row.command < 0.0]
+    upward = [(row.command, row.value) for row in steady["heave"] if row.command < 0.0]
     assert upward == [(-0.7, -0.37), (-0.5, -0.25), (-0.3, -0.17), (-0.2, -0.13)][::-1]
     known = found.given.known
     assert {name: q.value for name, q in known.items()} == {
@@ -59,7 +64,7 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
 
 def test_the_table_columns_of_rov_toml_serves_tables_too(folder: Path) -> None:
     """An entry about logs leaves the headers of tables as they are."""
-    before = load_tank_tests(folder)
+    before = rows_of(load_tests(folder), "steady")
     (folder / "thrust_top_a.csv").write_text("Throttle (%),Pull (kgf)\n50,2\n", encoding="utf-8")
     (folder / "steady_yaw_a.csv").write_text("Throttle (%),Rate\n50,60\n", encoding="utf-8")
     (folder / "time_constant_yaw.csv").write_text("command [%],Tau\n50,300\n", encoding="utf-8")
@@ -78,21 +83,22 @@ def test_the_table_columns_of_rov_toml_serves_tables_too(folder: Path) -> None:
     columns = "".join(f'"{title}" = "{meant}"\n' for title, meant in names.items())
     given = re.sub(r"[ab]_t_top = .*\n", "", rov.read_text(encoding="utf-8"))
     rov.write_text(f"{given}\n[columns]\n{columns}", encoding="utf-8")
-    found = load_tank_tests(folder)
-    assert found.thrust["top"] == (Row("thrust_top_a.csv", 2, 0.5, 2.0 * 9.80665),)
-    assert found.steady["yaw"][-1] == Row("steady_yaw_a.csv", 2, 0.5, radians(60.0))
-    assert found.time_constants["yaw"] == (Row("time_constant_yaw.csv", 2, 0.5, 0.3),)
-    assert found.steady["surge"] == before.steady["surge"]
+    found = load_tests(folder)
+    assert rows_of(found, "thrust")["top"] == [Row("thrust_top_a.csv", 2, 0.5, 2.0 * 9.80665)]
+    steady = rows_of(found, "steady")
+    assert steady["yaw"][-1] == Row("steady_yaw_a.csv", 2, 0.5, radians(60.0))
+    assert rows_of(found, "time_constant")["yaw"] == [Row("time_constant_yaw.csv", 2, 0.5, 0.3)]
+    assert steady["surge"] == before["surge"]
     rov.write_text(f'{rov.read_text(encoding="utf-8")}"Pul" = "force [kgf]"\n', encoding="utf-8")
     with pytest.raises(VehicleFileError, match=r"columns.Pul = 'force \[kgf\]': no CSV file has such a column"):
-        load_tank_tests(folder)
+        load_tests(folder)
 
 
 def test_unknown_headers_of_a_table_are_named_beside_the_expected_ones(folder: Path) -> None:
     (folder / "thrust_top_a.csv").write_text("Throttle (%),Pull (kgf)\n50,2\n", encoding="utf-8")
     (folder / "thrust_top_b.csv").write_text("command [%],Pull (kgf)\n50,2\n", encoding="utf-8")
     with pytest.raises(DataFileError) as error:
-        load_tank_tests(folder)
+        load_tests(folder)
     hint = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
     one, other, *_ = str(error.value).splitlines()
     assert one == (
@@ -109,21 +115,22 @@ def test_columns_in_any_order_and_unit(folder: Path) -> None:
     (folder / "thrust_rear_b.csv").write_text("force [N],command [%]\n-3,-20\n", encoding="utf-8")
     (folder / "time_constant_yaw.csv").write_text("command [%],time constant [ms]\n20,3050\n", encoding="utf-8")
     without_curve(folder, "rear")
-    found = load_tank_tests(folder)
-    assert [(row.command, row.value) for row in found.steady["yaw"]] == [(0.2, pytest.approx(pi / 2)), (-0.4, -pi)]
-    assert found.thrust["rear"] == (
+    found = load_tests(folder)
+    yaw = rows_of(found, "steady")["yaw"]
+    assert [(row.command, row.value) for row in yaw] == [(0.2, pytest.approx(pi / 2)), (-0.4, -pi)]
+    assert rows_of(found, "thrust")["rear"] == [
         Row("thrust_rear_a.csv", 2, 0.5, 12.5),
         Row("thrust_rear_a.csv", 3, 0.0, 0.0),
         Row("thrust_rear_b.csv", 2, -0.2, -3.0),
-    )
-    assert found.time_constants["yaw"][0].value == pytest.approx(3.05)
+    ]
+    assert rows_of(found, "time_constant")["yaw"][0].value == pytest.approx(3.05)
 
 
 @pytest.mark.parametrize(("header", "newton"), [("force [kgf]", 9.80665), ("thrust [lbf]", 4.4482216152605)])
 def test_a_spring_balance_in_other_units(header: str, newton: float, folder: Path) -> None:
     (folder / "thrust_rear.csv").write_text(f"command [%],{header}\n50,1.5\n-20,-0.3\n", encoding="utf-8")
     without_curve(folder, "rear")
-    forces = [row.value for row in load_tank_tests(folder).thrust["rear"]]
+    forces = [row.value for row in rows_of(load_tests(folder), "thrust")["rear"]]
     assert forces == pytest.approx([1.5 * newton, -0.3 * newton], rel=1e-15)
 
 
@@ -133,59 +140,58 @@ def without_curve(folder: Path, name: str) -> None:
     path.write_text(re.sub(rf"^[ab]_t_{name} .*$", "", path.read_text(encoding="utf-8"), flags=re.M), encoding="utf-8")
 
 
-def log(folder: Path, axis: str, header: str, rows: list[str]) -> TankTests:
+def log(folder: Path, axis: str, header: str, rows: list[str]) -> tuple[Log, tuple[Finding, ...]]:
     (folder / f"log_{axis}.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
-    return load_tank_tests(folder)
+    tests = load_tests(folder)
+    (found,) = tests.folder.logs
+    return found, tests.findings
 
 
-def test_recording_with_heading_of_a_compass_and_blanks(folder: Path) -> None:
+def test_log_with_heading_of_a_compass_and_blanks(folder: Path) -> None:
     rows = [f"{100 + n / 10},30,{(350 + 2 * n) % 360 if n % 2 == 0 else ''},1013" for n in range(60)]
-    (recording,) = log(folder, "yaw", "time [s],command [%],heading [deg],pressure [hPa]", rows).recordings["yaw"]
-    assert recording.is_position
-    assert recording.time[0] == 0.0
-    assert recording.time[-1] == pytest.approx(5.9)
-    there = np.isfinite(recording.values)
-    assert there.tolist() == [n % 2 == 0 for n in range(60)]
-    assert recording.values[there] == pytest.approx([radians(350 + 2 * n) for n in range(0, 60, 2)])
+    found, _ = log(folder, "yaw", "time [s],command [%],heading [deg],pressure [hPa]", rows)
+    heading = used(found, "heading")
+    assert heading.time[heading.there] == pytest.approx(100.0 + 0.2 * np.arange(30))
+    assert measured(found, "heading") == pytest.approx([radians(350 + 2 * n) for n in range(0, 60, 2)])
 
 
-def test_recording_with_depth_and_velocity_goes_by_the_depth(folder: Path) -> None:
-    rows = [f"{n},0.3,{10 * n},0.1" for n in [*range(30), 29]]
-    found = log(folder, "heave", "time [ms],command [1],depth [cm],velocity [m/s]", rows)
-    (recording,) = found.recordings["heave"]
-    assert recording.quantity == "depth"
-    assert recording.values[-1] == pytest.approx(2.9)
-    assert recording.time[-1] == pytest.approx(0.029)
-    assert found.findings == (Finding("time stamps merged", file="log_heave.csv", numbers={"count": 1}),)
+def test_log_with_depth_and_velocity(folder: Path) -> None:
+    rows = [f"{n},0.3,{10 * n},{0.1 + 0.001 * n}" for n in [*range(30), 29]]
+    found, findings = log(folder, "heave", "time [ms],command [1],depth [cm],velocity [m/s]", rows)
+    assert measured(found, "depth")[-1] == pytest.approx(2.9)
+    assert measured(found, "heave velocity")[-1] == pytest.approx(0.129)
+    assert used(found, "depth").time[-1] == pytest.approx(0.029)
+    assert findings == (Finding("time stamps merged", file="log_heave.csv", numbers={"count": 1}),)
 
 
 def test_as_spreadsheets_save_them(folder: Path) -> None:
-    before = load_tank_tests(folder).steady
+    before = rows_of(load_tests(folder), "steady")
     path = folder / "steady_surge.csv"
     text = path.read_text(encoding="utf-8").replace(",", " , ").replace("\n", "\r\n")
     path.write_bytes(("\ufeff" + text + "\r\n ,\r\n").encode())
-    assert load_tank_tests(folder).steady == before
+    assert rows_of(load_tests(folder), "steady") == before
 
 
 def test_names_in_any_case(folder: Path) -> None:
-    before = load_tank_tests(folder)
+    before = load_tests(folder)
     (folder / "time_constant_heave.csv").rename(folder / "time_constant_heave.CSV")
     (folder / "steady_yaw.csv").rename(folder / "Steady_YAW.Csv")
     (folder / "Log_Heave.csv").write_text(LOG + "\n".join(f"{n},30,{n}" for n in range(30)) + "\n", encoding="utf-8")
     (folder / "steady_surge.csv.txt").write_text("not a test", encoding="utf-8")
-    found = load_tank_tests(folder)
-    assert [row.value for row in found.time_constants["heave"]] == [r.value for r in before.time_constants["heave"]]
-    assert [row.value for row in found.steady["yaw"]] == [row.value for row in before.steady["yaw"]]
-    assert [recording.file for recording in found.recordings["heave"]] == ["Log_Heave.csv"]
+    found = load_tests(folder)
+    for kind, axis in (("time_constant", "heave"), ("steady", "yaw")):
+        now, then = (rows_of(tests, kind)[axis] for tests in (found, before))
+        assert [row.value for row in now] == [row.value for row in then]
+    assert [(one.file, one.axis) for one in found.folder.logs] == [("Log_Heave.csv", HEAVE)]
     assert {"time_constant_heave.CSV", "Steady_YAW.Csv", "Log_Heave.csv"} <= set(found.inputs)
 
 
 def test_names_that_differ_by_case_are_two_files(folder: Path) -> None:
-    before = load_tank_tests(folder).steady["surge"]
+    before = rows_of(load_tests(folder), "steady")["surge"]
     (folder / "Steady_Surge.CSV").write_text(STEADY + "20,0.3\n", encoding="utf-8")
     if (folder / "steady_surge.csv").read_text(encoding="utf-8") == STEADY + "20,0.3\n":
         pytest.skip("this file system takes both names for one file")
-    found = load_tank_tests(folder).steady["surge"]
+    found = rows_of(load_tests(folder), "steady")["surge"]
     assert sorted(found, key=lambda row: row.file) == [Row("Steady_Surge.CSV", 2, 0.2, 0.3), *before]
 
 
@@ -195,7 +201,7 @@ def test_a_vehicle_to_compare_with_is_a_file_in_the_folder(folder: Path, capsys:
     rov.write_text(text, encoding="utf-8")
     refused(folder, (f"{rov}: against = 'mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
     write_vehicle(load_vehicle(VIDEORAY), folder / "mine.toml")
-    against = load_tank_tests(folder).given.description.tables.against
+    against = load_tests(folder).given.description.tables.against
     assert against
     assert against.samefile(folder / "mine.toml")
 
@@ -207,10 +213,11 @@ def test_a_copy_of_a_file_is_left_out(folder: Path) -> None:
         (folder / name).write_text(log, encoding="utf-8")
     shutil.copy(folder / "steady_surge.csv", folder / "steady_surge_copy.csv")
     shutil.copy(folder / "steady_surge.csv", folder / "steady_heave.csv")
-    found = load_tank_tests(folder)
-    assert [recording.file for recording in found.recordings["heave"]] == ["log_heave_1.csv"]
-    assert {row.file for row in found.steady["surge"]} == {"steady_surge.csv"}
-    assert "steady_heave.csv" in {row.file for row in found.steady["heave"]}
+    found = load_tests(folder)
+    assert [one.file for one in found.folder.logs] == ["log_heave_1.csv"]
+    steady = rows_of(found, "steady")
+    assert {row.file for row in steady["surge"]} == {"steady_surge.csv"}
+    assert "steady_heave.csv" in {row.file for row in steady["heave"]}
     assert not {"log_heave_2.csv", "steady_surge_copy.csv"} & found.inputs.keys()
     copies = [finding for finding in found.findings if finding.kind == "copy"]
     assert {heading(finding) for finding in copies} == {"Warnings"}
@@ -275,7 +282,7 @@ def test_every_mistake_of_a_rov_file_is_told(folder: Path) -> None:
     text = text.replace('"videoray"', '"nowhere.toml"').replace('"videoray_refit"', '"video ray"')
     path.write_text(text + "\n[validity]\ncommand_min = 0.7\ncommand_max = 0.2\n", encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
-        load_tank_tests(folder)
+        load_tests(folder)
     wrong = (
         "against = 'nowhere.toml'",
         "vehicle.identifier = 'video ray'",
@@ -294,21 +301,40 @@ def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str
     refused(tmp_path, ("no tests",), capsys)
 
 
+NO_PUSH, STILL = [f"{n / 10},0,{n / 10}" for n in range(50)], [f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)]
+
+
 @pytest.mark.parametrize(
     ("rows", "reason"),
     [
-        ([f"{n / 10},0,{n / 10}" for n in range(50)], "the command is always 0"),
-        ([f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)], "depth never changes"),
-        ([f"{n / 10},{30 * (n > 9)},{-0.02 * max(n - 9, 0):.2f}" for n in range(100)], "against the command"),
+        (NO_PUSH, "nothing is learnt about heave: the thrust along it never changes"),
+        (STILL, "the depth never changes, so it is left out"),
+        (STILL[:19], "the depth has 19 samples and needs at least 20, so it is left out"),
     ],
 )
-def test_a_recording_that_teaches_nothing_is_refused_where_there_is_no_other(
+def test_a_log_that_teaches_nothing_is_refused_where_there_is_no_other_test(
     rows: list[str], reason: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for path in folder.glob("[st]*.csv"):
         path.unlink()
+    log = folder / "log_heave.csv"
+    log.write_text(LOG + "\n".join(rows) + "\n", encoding="utf-8")
+    refused(folder, (f"{log}: {reason}: nothing is identifiable",), capsys)
+    (folder / "log_heave_2.csv").write_text(log.read_text(encoding="utf-8") + "9,,\n", encoding="utf-8")
+    with pytest.raises(DataFileError) as error:
+        load_tests(folder)
+    assert [line.partition(": ")[0] for line in str(error.value).splitlines()] == [
+        str(folder / name) for name in ("log_heave.csv", "log_heave_2.csv")
+    ]
+
+
+def test_of_a_log_against_the_command_no_axis_is_good(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for path in folder.glob("[st]*.csv"):
+        path.unlink()
+    rows = [f"{n / 10},{30 * (n > 9)},{-0.02 * max(n - 9, 0):.2f}" for n in range(100)]
     (folder / "log_heave.csv").write_text(LOG + "\n".join(rows) + "\n", encoding="utf-8")
-    refused(folder, (str(folder / "log_heave.csv"), reason), capsys)
+    assert main(["identify", str(folder)]) == 0
+    assert "heave: do not use" in capsys.readouterr().out
 
 
 def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,16 +17,16 @@ from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import ALONE, REFIT
+from tests.commands import ALONE, FROZEN_REFIT, REFIT
 from tests.vehicle.test_vehicle import refusal
 
-TEXT = REFIT.read_text(encoding="utf-8")
+TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
 ROW = "b_d_u = { error = 1.30987, correlation = { a_d_u = -0.883478 } }"
 
 
 @pytest.fixture(scope="module")
 def refit() -> Vehicle:
-    return load_vehicle(REFIT)
+    return load_vehicle(FROZEN_REFIT)
 
 
 def of(values: list[float], errors: list[float], correlation: list[list[float]]) -> Uncertainty:
@@ -55,15 +55,18 @@ def test_estimates_read_back_as_they_were_written(refit: Vehicle, tmp_path: Path
 
 def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_path: Path) -> None:
     path = tmp_path / "tuned.toml"
-    assert main(["tune", str(REFIT), "--axis=heave", "--command=0.3", "--v-ss=0.17", "--tau=2", "-o", str(path)]) == 0
+    assert (
+        main(["tune", str(FROZEN_REFIT), "--axis=heave", "--command=0.3", "--v-ss=0.17", "--tau=2", "-o", str(path)])
+        == 0
+    )
     tuned = load_vehicle(path)
     assert {*refit.estimates} - {*tuned.estimates} == {"beta_w"}
     assert all(tuned.estimates[name] == refit.estimates[name] for name in tuned.estimates)
-    write_tuned(REFIT, path, {"a_d_u": 9.0}, "a test")
+    write_tuned(FROZEN_REFIT, path, {"a_d_u": 9.0}, "a test")
     others = load_vehicle(path).estimates
     assert "a_d_u" not in others
     assert others["b_d_u"] == refit.estimates["b_d_u"].model_copy(update={"correlation": {}})
-    write_tuned(REFIT, path, {name: 1.01 * refit.rov[name] + 0.1 for name in refit.estimates}, "a test")
+    write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit.rov[name] + 0.1 for name in refit.estimates}, "a test")
     assert "estimates" not in path.read_text(encoding="utf-8")
 
 
@@ -160,7 +163,7 @@ def test_a_correlation_of_1_is_allowed(tmp_path: Path) -> None:
 
 
 def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
-    """The intervals in the shipped refit end 1.96 standard errors to either side."""
+    """The intervals of the earlier refit end 1.96 standard errors to either side."""
     found = refit.uncertainty
     place = {name: n for n, name in enumerate(found.names)}
     assert {*found.names} == {*refit.intervals} == {*refit.estimates}
@@ -174,6 +177,11 @@ def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
     assert (np.diag(found.correlation) == 1.0).all()
     assert found.correlation[place["a_d_u"], place["a_d_w"]] == 0.0
     assert np.linalg.eigvalsh(found.correlation)[0] > 0.01
+
+
+def test_each_interval_of_the_refit_that_ships_is_an_estimate() -> None:
+    shipped = load_vehicle(REFIT)
+    assert {*shipped.uncertainty.names} == {*shipped.intervals} == {*shipped.estimates}
 
 
 def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ measured velocity is that of the thrust curve, (11)-(13). The forces behind the 
 recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import partial
@@ -16,7 +16,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rov_fmu.identify.points.quadratic_fit import fit_quadratic, quadratic
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, check_targets, folder_made, write_whole
 from rov_fmu.model.layout import SURGE
@@ -183,7 +182,8 @@ def _drag(ax: Axes, k: Rov, table: ResponseTable) -> None:
     v = np.array([float(V) for V in table.steady.values()])
     force = np.array([k.force(axis, float(c) / 100.0) for c in table.steady])
     end = 1.1 * float(v.max())
-    _curve(ax, 1.0, end, fit_quadratic(names, v, force).unbounded, "--", "grey", "least squares of the points")
+    through, *_ = np.linalg.lstsq(np.column_stack([v**2, v]), force, rcond=None)
+    _curve(ax, 1.0, end, through, "--", "grey", "least squares of the points")
     _curve(ax, 1.0, end, (k[names[0]], k[names[1]]), "-", "blue", axis.equations[0])
     ax.plot(v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label=f"Table {table.steady_number}")
     finish(ax, "", f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
@@ -204,6 +204,7 @@ def _steps(ax: Axes, k: Rov, table: ResponseTable) -> None:
         with_formulas(*legend.get_texts())
 
 
-def _curve(ax: Axes, scale: float, end: float, curve: tuple[float, float], dashes: str, color: str, label: str) -> None:
+def _curve(ax: Axes, scale: float, end: float, curve: Sequence[float], dashes: str, color: str, label: str) -> None:
+    a, b = curve
     x = np.linspace(0.0, end, 61)
-    ax.plot(scale * x, quadratic(x) @ curve, dashes, color=LIGHT[color], linewidth=1.8, label=label)
+    ax.plot(scale * x, a * x**2 + b * x, dashes, color=LIGHT[color], linewidth=1.8, label=label)

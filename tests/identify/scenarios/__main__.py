@@ -1,30 +1,32 @@
 """Run scenarios and print a table: python -m tests.identify.scenarios NAME ... --seeds N.
 
-A name is that of a scenario or a part of it; without any, all scenarios are run. `--verbose` prints every estimate,
-every warning and every refusal.
+A name is that of a scenario or a part of it; without any, all scenarios are run. The judgement follows the table.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
 
-from tests.identify.scenarios.catalogue import SCENARIOS, Scenario
-from tests.identify.scenarios.judge import FAMILY, biases, coverages, invented, problems
-from tests.identify.scenarios.outcome import Outcome, outcome
+from tests.identify.scenarios.catalogue import SCENARIOS
+from tests.identify.scenarios.judge import band_widths, broken, by_number, promises, ratios_to_gate
+from tests.identify.scenarios.outcome import Outcome, Row, outcome, read_gate, rows, write_rows
+from tests.identify.scenarios.scenario import Expected
 
 _HEADER = (
-    f"{'scenario':42} {'covered':>8} {'bias of a_d, b_d, beta':>29} {'alarms':>7} {'invented':>8} {'refused':>7} "
-    f"{'CPU s':>7}"
+    f"{'scenario':40} {'covered':>9} {'bias':>7} {'/gate':>6} {'bands':>6} {'width':>6} {'false':>5} {'alarms':>6} "
+    f"{'unusable':>8} {'refused':>7} {'CPU s':>6}"
 )
 
 
 @click.command(help=__doc__)
 @click.argument("names", nargs=-1)
 @click.option("--seeds", default=2, show_default=True, help="The number of seeds.")
-@click.option("--verbose", is_flag=True)
-def main(names: tuple[str, ...], seeds: int, verbose: bool) -> None:
+@click.option("--csv", "table", type=click.Path(path_type=Path), help="Write the numbers of all seeds to this file.")
+@click.option("--verbose", is_flag=True, help="Print every estimate, effect, cause and verdict.")
+def main(names: tuple[str, ...], seeds: int, table: Path | None, verbose: bool) -> None:
     """Run the scenarios whose names contain one of the words; a whole name runs that scenario alone."""
     chosen = {
         name: scenario
@@ -33,43 +35,53 @@ def main(names: tuple[str, ...], seeds: int, verbose: bool) -> None:
     }
     if not chosen:
         raise click.UsageError(f"no such scenario, only: {', '.join(SCENARIOS)}")
+    gate, all_rows, all_promises = read_gate(), list[Row](), []
     click.echo(_HEADER)
     for name, scenario in chosen.items():
         with TemporaryDirectory() as folder:
             outcomes = [outcome(scenario, seed, Path(folder) / str(seed)) for seed in range(seeds)]
-        click.echo(row(name, scenario, outcomes))
-        for line in problems(outcomes, scenario, FAMILY):
-            click.echo(f"    {line[:160]}")
+        click.echo(line(name, outcomes, scenario.expected, ratios_to_gate(name, outcomes, gate)))
         if verbose:
-            click.echo("\n".join(f"        {line}" for line in details(scenario, outcomes)))
+            click.echo("\n".join(f"    seed {seed}: {text}" for seed, o in enumerate(outcomes) for text in details(o)))
+        all_promises += [(name, promise) for promise in promises(name, outcomes, scenario.expected, gate)]
+        all_rows += [row for n, o in enumerate(outcomes) for row in rows(name, n, o, scenario.expected.effects)]
+        if table:  # after each scenario, so that a long run may be stopped
+            write_rows(table, all_rows)
+    failed = broken([each.within(name) for name, each in all_promises])
+    click.echo("\n".join(["", *failed, f"{len(failed)} of {len(all_promises)} promises are broken"]))
 
 
-def row(name: str, scenario: Scenario, outcomes: list[Outcome]) -> str:
-    """Return the row of a scenario. The biases are the largest ones over the axes."""
-    found = coverages(outcomes, scenario)
-    means = {b.name: b.mean for b in biases(outcomes, scenario)}
-    worst = [
-        max((m for n, m in means.items() if n.startswith(key)), key=abs, default=float("nan"))
-        for key in ("a_d", "b_d", "beta")
+def line(name: str, outcomes: Sequence[Outcome], expected: Expected, ratios: dict[str, float]) -> str:
+    """Return the row of a scenario. Bias, width and the ratio to the gate are the largest ones over the numbers."""
+    estimates = [e for o in outcomes for e in o.estimates]
+    means = [float(np.mean([e.error for e in some])) for some in by_number(outcomes).values() if some[0].truth]
+    bands = [band.coverage for o in outcomes for band in o.bands]
+    nothing = float("nan")
+    return (
+        f"{name:40} {f'{sum(e.covered for e in estimates)}/{len(estimates)}':>9} "
+        f"{100.0 * max(means, key=abs, default=nothing):+6.1f}% {max(ratios.values(), default=nothing):6.2f} "
+        f"{100.0 * float(np.mean(bands)) if bands else nothing:5.0f}% "
+        f"{max(band_widths(outcomes).values(), default=nothing):6.2f} "
+        f"{sum(bool(o.false_effects(expected.effects)) for o in outcomes):5} {sum(bool(o.alarms) for o in outcomes):6} "
+        f"{sum(bool(o.unusable) for o in outcomes):8} {sum(bool(o.error) for o in outcomes):7} "
+        f"{float(np.mean([o.seconds for o in outcomes])):6.1f}"
+    )
+
+
+def details(found: Outcome) -> list[str]:
+    """Return a line for every estimate, effect, disturbance, verdict, band and refusal."""
+    lines = found.error.splitlines()
+    for e in found.estimates:
+        low, high = e.interval or (float("nan"), float("nan"))
+        mark = "" if e.covered else "  not covered"
+        lines.append(f"{e.axis} {e.quantity} {e.value:.4g} ({low:.4g} to {high:.4g}), {e.truth:.4g}{mark}")
+    lines += [f"effect: {kind} of {of} {value:.3g}" for kind, of, value in found.effects]
+    lines += [f"disturbance: {axis}, {cause or 'unknown'}" for axis, cause in found.disturbances]
+    lines += [f"verdict: {axis} {word}" for axis, word in found.verdicts.items()]
+    lines += [
+        f"band: {b.axis} {b.quantity} {b.coverage:.0%}, RMS {b.error**0.5:.3g}, claimed {b.claimed**0.5:.3g}"
+        for b in found.bands
     ]
-    covered = f"{sum(c.covered for c in found)}/{sum(c.total for c in found)}"
-    seconds = float(np.mean([o.seconds for o in outcomes]))
-    alarms, refused = sum(bool(o.alarms) for o in outcomes), sum(bool(o.error) for o in outcomes)
-    made_up = sum(bool(invented(o, scenario)) for o in outcomes)
-    bias = " ".join(f"{100.0 * mean:+7.1f} %" for mean in worst)
-    return f"{name:42} {covered:>8} {bias} {alarms:7} {made_up:8} {refused:7} {seconds:7.1f}"
-
-
-def details(scenario: Scenario, outcomes: list[Outcome]) -> list[str]:
-    """Return a line for every estimate, warning and refusal."""
-    lines, truth = [], scenario.truth
-    for seed, o in enumerate(outcomes):
-        lines += [f"seed {seed}: {line}" for line in o.error.splitlines()]
-        for name, estimate in o.coefficients.items():
-            low, high = estimate.interval or (float("nan"), float("nan"))
-            mark = "" if low <= truth[name] <= high else "  not covered"
-            lines.append(f"seed {seed}: {name} {estimate.value:.4g} ({low:.4g} to {high:.4g}), {truth[name]:.4g}{mark}")
-        lines += [f"seed {seed}: {sentence}" for sentence in o.sentences]
     return lines
 
 

@@ -1,278 +1,245 @@
-"""Fly a scenario, write its logs, identify the vehicle, and keep what is judged."""
+"""Identify the vehicle of a scenario, and keep what is judged: all of it is read from the result object."""
 
+import csv
+import shutil
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import lfilter
 
-from rov_fmu.identify.adapter.tank_tests import load_tank_tests
-from rov_fmu.identify.effects import catalogue as effects
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.result import Identification, Interval, Prediction, Word
 from rov_fmu.io.messages import FileError
-from rov_fmu.model.rov import Rov
-from rov_fmu.tank.findings import Finding
-from tests.folders import HEAD, folder_of
-from tests.identify.scenarios.catalogue import Logs, Scenario, Sensor, voltage
-from tests.recordings import PLANS
-from verification.references import pool, rigid_pool
-from verification.references.pool import Array, Commands, Conditions
+from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, steady_name
 
-Random = np.random.Generator
-Motion = Mapping[str, Array]
-
-ALARMS = frozenset({"unexplained", "poor prediction", "scales differ"})
-"""The kinds of findings that say that the model does not explain the data, or that the data contradict each other."""
-EFFECTS = frozenset(effects.EFFECTS)
-"""The kinds of findings that report an effect in the model or taken out of the data."""
-
-_PATTERNS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
-    "videoray": {"surge": {"l": 1.0, "r": 1.0}, "heave": {"t": 1.0}, "yaw": {"l": 1.0, "r": -1.0}},
-    "bluerov2_heavy": {
-        "surge": {"1": -1.0, "2": -1.0, "3": 1.0, "4": 1.0},
-        "sway": {"1": 1.0, "2": -1.0, "3": 1.0, "4": -1.0},
-        "yaw": {"1": 1.0, "2": -1.0, "3": -1.0, "4": 1.0},
-        "heave": {"5": 1.0, "6": 1.0, "7": 1.0, "8": 1.0},
-        "roll": {"5": 1.0, "6": -1.0, "7": 1.0, "8": -1.0},
-        "pitch": {"5": -1.0, "6": -1.0, "7": 1.0, "8": 1.0},
-    },
+GATE = Path(__file__).with_name("gate.csv")
+"""The outcomes of the identification before this one, which the widths of intervals are compared with."""
+FIELDS = (
+    "scenario",
+    "seed",
+    "axis",
+    "quantity",
+    "covered",
+    "error",
+    "width",
+    "alarms",
+    "false_effects",
+    "causes",
+    "cpu",
+)
+"""The columns of a table of outcomes. A row without a quantity is about a whole identification."""
+_POSSIBLE = {
+    "lag": (0.0, 2.0),
+    "dead time": (0.0, 1.0),
+    "dead band": (0.0, 0.3),
+    "current": (-1.0, 1.0),
+    "reverse thrust": (0.2, 5.0),
+    "drag astern": (0.4, 2.5),
+    "voltage": (0.0, 4.0),
 }
-"""The thrusters that a stick or a test of each axis drives, with their signs, by vehicle."""
-_STICKS: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "videoray": {"surge": (0.7, 5.0), "heave": (0.7, 6.0), "yaw": (0.3, 3.0)},
-    "bluerov2_heavy": {
-        "surge": (0.24, 5.0),
-        "sway": (0.24, 5.0),
-        "heave": (0.35, 5.0),
-        "roll": (0.06, 1.5),
-        "pitch": (0.06, 1.5),
-        "yaw": (0.14, 3.0),
-    },
-}
-"""The largest deflection of each stick, and the typical time for which it stays (s), by vehicle."""
-_REST = 3.0
-"""The time before the first command of a pilot, s."""
-_GAP = 4.0
-_UNITS = {"m": ("m", 1.0), "rad": ("deg", 180.0 / np.pi)}
-"""The unit of a logged position, and its factor, by the unit of the position."""
-
-
-# ---- Flights ---------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Flight:
-    """One recording before it is measured: the commands, and when rows are logged."""
-
-    file: str
-    commands: Commands
-    command: Array | None
-    """The command of the axis since each switch, in a test of one axis."""
-    time: Array
-    """n: the true times of the rows, s."""
-    sensors: tuple[Sensor, ...]
-    conditions: Conditions
-
-
-def flights(scenario: Scenario, random: Random) -> Iterator[Flight]:
-    """Yield the recordings of a scenario."""
-    logs, patterns, given = scenario.logs, _PATTERNS[scenario.vehicle], scenario.conditions
-    conditions = [replace(given, current=current) for current in scenario.currents] or [given] * logs.count
-    if logs.plan == "pilot":
-        for n in range(logs.count):
-            sticks = {axis.name: _stick(random, logs, *_STICKS[scenario.vehicle][axis.name]) for axis in logs.axes}
-            switches = np.unique(np.concatenate([times for times, _ in sticks.values()]))
-            thrusters: dict[str, Array] = {}
-            for name, (times, levels) in sticks.items():
-                held = levels[np.searchsorted(times, switches, side="right") - 1]
-                for thruster, sign in patterns[name].items():
-                    thrusters[thruster] = thrusters.get(thruster, np.zeros(len(switches))) + sign * held
-            thrusters = {name: np.clip(values, -1.0, 1.0) for name, values in thrusters.items()}
-            commands = Commands(switches, thrusters)
-            yield Flight(f"log_{n}.csv", commands, None, _rows(random, logs, commands), scenario.sensors, conditions[n])
-        return
-    for axis in logs.axes:
-        sensors = tuple(sensor for sensor in scenario.sensors if sensor.axis is axis)
-        for n, plan in enumerate(PLANS[axis.name][: logs.count]):
-            levels, holds = (np.array(column) for column in zip(*plan, strict=True))
-            switches = np.concatenate([[0.0], np.cumsum(holds)[:-1]])
-            if logs.between_rows:
-                switches[1:] += random.uniform(0.0, 1.0 / logs.rate, len(switches) - 1)
-            commands = Commands(switches, {name: sign * levels for name, sign in patterns[axis.name].items()})
-            rows = _rows(random, logs, commands)
-            yield Flight(f"log_{axis.name}_{n}.csv", commands, levels, rows, sensors, conditions[n])
-
-
-def _stick(random: Random, logs: Logs, most: float, hold: float) -> tuple[Array, Array]:
-    """Return when a stick moves, and where it stays: a third of the time in the middle, else on alternating sides."""
-    at, side, times, levels = _REST, most, [0.0], [0.0]
-    while at < logs.seconds:
-        level = 0.0 if random.random() < 1.0 / 3.0 else side * random.uniform(0.4, 1.0)
-        side = -side if level else side
-        times.append(at if logs.between_rows else round(at * logs.rate) / logs.rate)
-        levels.append(level)
-        at += hold * random.uniform(0.5, 1.5)
-    return np.array(times), np.array(levels)
-
-
-def _rows(random: Random, logs: Logs, commands: Commands) -> Array:
-    """Return the true times of the rows."""
-    n = round(logs.seconds * logs.rate)
-    time = (np.arange(n) + logs.scatter * random.uniform(-0.5, 0.5, n) * (np.arange(n) > 0)) / logs.rate
-    if logs.gaps:
-        driven = np.any([values != 0.0 for values in commands.thrusters.values()], axis=0)
-        ends = np.append(commands.switches[1:], logs.seconds)
-        long = driven & (ends - commands.switches > _GAP + 2.0)
-        for hold in random.choice(np.flatnonzero(long), logs.gaps, replace=False):
-            begin = random.uniform(commands.switches[hold] + 1.0, ends[hold] - _GAP - 1.0)
-            time = time[(time < begin) | (time > begin + _GAP)]
-    return time
-
-
-def moved(truth: Rov, commands: Commands, at: Array, conditions: Conditions) -> Motion:
-    """Return the motion at ascending times, with the surge and sway velocity over ground as `u ground`, `v ground`."""
-    simulate = rigid_pool.motion if truth.layout.has_attitude else pool.motion
-    found = simulate(truth, commands, np.maximum(at, 0.0), conditions)
-    if "phi" not in found:
-        tilts = [conditions.tilt.at(t)[:2] if conditions.tilt else (0.0, 0.0) for t in at.tolist()]
-        found["phi"], found["theta"] = np.array(tilts).T
-    (north, east), phi, theta, psi = conditions.current, found["phi"], found["theta"], found["psi"]
-    along = north * np.cos(psi) + east * np.sin(psi)
-    across = east * np.cos(psi) - north * np.sin(psi)
-    found["u ground"] = found["u"] + along * np.cos(theta)
-    if "v" in found:
-        found["v ground"] = found["v"] + across * np.cos(phi) + along * np.sin(theta) * np.sin(phi)
-    return found
-
-
-_PLACES = {"distance": "x", "depth": "z", "heading": "psi", "roll angle": "phi", "pitch angle": "theta"}
-
-
-def true_values(sensor: Sensor, motion: Motion) -> Array:
-    """Return what a sensor without errors measures. A distance is that north, on a straight course."""
-    if sensor.quantity == "velocity":
-        return motion.get(f"{sensor.axis.velocity} ground", motion[sensor.axis.velocity])
-    return motion[_PLACES[sensor.quantity]]
-
-
-# ---- Logs ------------------------------------------------------------------------------------------------------------
-
-
-def write(scenario: Scenario, seed: int, folder: Path) -> Path:
-    """Write rov.toml and the logs of a scenario to a folder."""
-    random, truth = np.random.default_rng(seed), scenario.truth
-    tables = {}
-    for flight in flights(scenario, random):
-        table = _table(scenario, truth, flight, random)
-        lines = [",".join(table)]
-        lines += [",".join("" if np.isnan(x) else f"{x:.8g}" for x in row) for row in zip(*table.values(), strict=True)]
-        tables[flight.file] = "\n".join(lines) + "\n"
-    return folder_of(folder, f'base = "{scenario.vehicle}"\n{HEAD}{scenario.rov_file}', tables)
-
-
-def _table(scenario: Scenario, truth: Rov, flight: Flight, random: Random) -> dict[str, Array]:
-    """Return the columns of a log by their headers."""
-    logs, rows = scenario.logs, flight.time
-    stamps = rows + logs.jitter * random.standard_normal(len(rows))
-    table = {"time [s]": stamps}
-    if flight.command is not None:
-        held = np.searchsorted(flight.commands.switches, rows + 1e-9, side="right") - 1
-        table["command [%]"] = 100.0 * flight.command[held]
-    else:
-        followed = flight.commands.at(rows + 1e-9)
-        table |= {f"u_{t.name} [%]": 100.0 * followed[t.name] for t in truth.layout.thrusters}
-    lates = {sensor.late for sensor in flight.sensors} | {0.0}
-    at = np.unique(np.concatenate([rows - late for late in lates]))
-    motion = moved(truth, flight.commands, at, flight.conditions)
-    for sensor in flight.sensors:
-        values = true_values(sensor, motion)[np.searchsorted(at, rows - sensor.late)]
-        table[_header(sensor, flight)] = _measured(sensor, values, rows, logs, random)
-    there = np.searchsorted(at, rows)
-    for name in logs.columns:
-        if name == "voltage":
-            table["voltage [V]"] = np.array([voltage(t) for t in rows.tolist()])
-        else:
-            table[f"{name} [deg]"] = np.degrees(motion["phi" if name == "roll" else "theta"][there])
-    return table
-
-
-def _header(sensor: Sensor, flight: Flight) -> str:
-    """Return the header of a sensor's column."""
-    axis = sensor.axis
-    if sensor.quantity == "velocity":
-        return f"velocity [{axis.unit}]" if flight.command is not None else f"{axis.name} velocity [{axis.unit}]"
-    unit, _ = _UNITS[axis.position_unit]
-    name = sensor.quantity.removesuffix(" angle")
-    return f"{name} [{unit}]" if flight.command is not None or name != "distance" else f"{axis.name} {name} [{unit}]"
-
-
-def _measured(sensor: Sensor, values: Array, rows: Array, logs: Logs, random: Random) -> Array:
-    """Return the values of a sensor in the rows, with noise and in the unit of the log; NaN where it has none."""
-    noise = random.standard_normal(len(rows))
-    if logs.correlation_time:
-        colour = np.exp(-1.0 / (logs.rate * logs.correlation_time))
-        noise = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], noise)
-    values = sensor.scale * values + sensor.noise * noise
-    if sensor.resolution:
-        values = np.round(values / sensor.resolution) * sensor.resolution
-    if sensor.axis.is_rotation and sensor.wraps:
-        values = (values + np.pi) % (2.0 * np.pi) - np.pi
-    if sensor.quantity != "velocity":
-        values = _UNITS[sensor.axis.position_unit][1] * values
-    return np.where(np.arange(len(rows)) % sensor.every == 0, values, np.nan)
-
-
-# ---- Identification --------------------------------------------------------------------------------------------------
+"""The possible values of effects by kind: s, s, commands, m/s, two ratios, and an exponent."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A coefficient as it was identified, with its 95 % interval."""
+    """A number as it was identified, with its 95 % interval, and its true value."""
 
+    axis: str
+    """Empty for a number of a thrust curve."""
+    quantity: str
+    """A coefficient, or `V_ss 30 %`."""
     value: float
-    interval: tuple[float, float] | None
+    interval: Interval | None
+    truth: float
+    narrowed: float = 0.0
+    """The standard error relative to that of the prior. 1 if the data told nothing."""
+
+    @property
+    def covered(self) -> bool:
+        """True if the interval contains the truth. Without an interval it does not."""
+        return self.interval is not None and self.interval[0] <= self.truth <= self.interval[1]
+
+    @property
+    def error(self) -> float:
+        """The relative error; NaN where the truth is 0."""
+        return self.value / self.truth - 1.0 if self.truth else float("nan")
+
+    @property
+    def width(self) -> float:
+        """The width of the interval; NaN without one."""
+        return self.interval[1] - self.interval[0] if self.interval else float("nan")
+
+
+@dataclass(frozen=True)
+class Band:
+    """A prediction of held-out samples, in squares, so that those of many seeds can be added."""
+
+    axis: str
+    quantity: str
+    coverage: float
+    """The share of the samples inside the 95 % band."""
+    error: float
+    """The mean square of measured minus predicted."""
+    claimed: float
+    """The same as the model claims it."""
 
 
 @dataclass(frozen=True)
 class Outcome:
     """What the identification of one seed of a scenario gave."""
 
-    coefficients: Mapping[str, Estimate]
-    """The coefficients that are judged; empty where the identification was refused."""
-    rov: Rov | None
-    """The identified vehicle; None where the identification was refused."""
-    findings: tuple[Finding, ...]
-    sentences: tuple[str, ...]
-    error: str
-    """The message of a refusal or of a crash, or which intervals exclude their values; empty without."""
-    seconds: float
-    """The processor time of reading and identification."""
+    estimates: tuple[Estimate, ...] = ()
+    effects: tuple[tuple[str, str, float], ...] = ()
+    """The kind of each effect that is reported, what has it, and its value."""
+    disturbances: tuple[tuple[str, str], ...] = ()
+    """The axis of each disturbance that is reported (`thrust` for all of them), and its cause: empty if unknown."""
+    verdicts: Mapping[str, Word] = field(default_factory=dict)
+    """By axis."""
+    bands: tuple[Band, ...] = ()
+    error: str = ""
+    """The message of a refusal or of a crash; empty without."""
+    seconds: float = 0.0
+    """The processor time of reading and identification, s."""
 
     @property
-    def alarms(self) -> tuple[Finding, ...]:
-        """The findings that say that the model does not explain the data."""
-        return tuple(finding for finding in self.findings if finding.kind in ALARMS)
+    def unusable(self) -> tuple[str, ...]:
+        """The axes whose model should not be used."""
+        return tuple(axis for axis, word in self.verdicts.items() if word == "do not use")
+
+    @property
+    def alarms(self) -> tuple[str, ...]:
+        """The axes whose model does not explain the data: those with a disturbance, and those not to use."""
+        return tuple(dict.fromkeys([*(axis for axis, _ in self.disturbances), *self.unusable]))
+
+    @property
+    def impossible(self) -> tuple[str, ...]:
+        """The effects whose value no vehicle has."""
+        return tuple(
+            f"{kind} of {of or 'the vehicle'} {value:.3g}"
+            for kind, of, value in self.effects
+            if not _POSSIBLE.get(kind, (-inf, inf))[0] <= value <= _POSSIBLE.get(kind, (-inf, inf))[1]
+        )
+
+    def false_effects(self, true: Sequence[str]) -> tuple[str, ...]:
+        """Return what has an effect that is not there. `true` has the kinds that are, perhaps of one thing only."""
+        return tuple(
+            sorted({f"{kind} of {of}" for kind, of, _ in self.effects if not {kind, f"{kind} of {of}"} & {*true}})
+        )
 
 
 def outcome(scenario: Scenario, seed: int, folder: Path) -> Outcome:
-    """Write the logs of a scenario to a folder and identify the vehicle from them."""
-    write(scenario, seed, folder)
+    """Write the tests of a scenario to a new folder, identify the vehicle from them, and return what is judged.
+
+    Where a scenario holds logs out by hand, the numbers are those of the fit that never read them. The predictions of
+    these logs are those that a result makes by all other logs.
+    """
+    scenario.write(seed, folder)
     begin = time.process_time()
     try:
-        found = identify(load_tank_tests(folder))
+        result = identify(load_tests(folder))
+        seconds = time.process_time() - begin
+        predictions = [p for axis in (_with_unseen(folder) or result).axes for p in axis.predictions]
     except FileError as error:
-        return Outcome({}, None, (), (), str(error), time.process_time() - begin)
+        return Outcome(error=str(error), seconds=time.process_time() - begin)
     except Exception as error:  # a crash is judged like a refusal, so that the other seeds are still run
-        return Outcome({}, None, (), (), f"{type(error).__name__}: {error}", time.process_time() - begin)
-    seconds, vehicle = time.process_time() - begin, found.vehicle
-    coefficients = {
-        name: Estimate(vehicle.rov[name], vehicle.intervals.get(name))
-        for name in scenario.coefficients
-        if name in vehicle.rov.coefficients
-    }
-    wrong = [name for name, (low, high) in vehicle.intervals.items() if not low <= vehicle.rov[name] <= high]
-    excluded = f"intervals exclude their values: {', '.join(wrong)}" if wrong else ""
-    return Outcome(coefficients, vehicle.rov, found.findings, sentences(found.findings), excluded, seconds)
+        return Outcome(error=f"{type(error).__name__}: {error}", seconds=time.process_time() - begin)
+    held_out = {path.name for path in (folder / UNSEEN).glob("*")}
+    kept = [p for p in predictions if p.file in held_out or not held_out]
+    return read_result(result, scenario.truths(seed), [p for p in kept if p.is_position == (p.span < inf)], seconds)
+
+
+def _with_unseen(folder: Path) -> Identification | None:
+    """Identify the vehicle once more, from all logs, if some are held out by hand."""
+    if not (folder / UNSEEN).is_dir():
+        return None
+    whole = folder.with_name(f"{folder.name}_whole")
+    shutil.copytree(folder, whole, ignore=shutil.ignore_patterns(UNSEEN))
+    shutil.copytree(folder / UNSEEN, whole, dirs_exist_ok=True)
+    return identify(load_tests(whole))
+
+
+def read_result(result: Identification, truths: Truths, predictions: Sequence[Prediction], seconds: float) -> Outcome:
+    """Return what is judged of a result."""
+    return Outcome(
+        tuple(_estimates(result, truths)),
+        tuple((effect.kind, effect.of, effect.value) for effect in result.effects if effect.kept),
+        tuple((d.axis.name if d.axis else "thrust", d.cause) for d in result.disturbances if d.kept),
+        {each.axis.name: each.verdict.word for each in result.axes},
+        tuple(map(_band, predictions)),
+        seconds=seconds,
+    )
+
+
+def _estimates(result: Identification, truths: Truths) -> Iterator[Estimate]:
+    """Yield each number that has a truth. One that the result does not have has no interval, and covers nothing.
+
+    Answers to negative commands are judged where there are some.
+    """
+    found: dict[tuple[str, str], tuple[float, Interval | None, float]] = {}
+    for each in result.axes:
+        found |= {(each.axis.name, k.name): (k.value, k.interval, k.narrowed) for k in each.known}
+        found |= {(each.axis.name, steady_name(a.command)): (*a.steady, 0.0) for a in each.answers}
+    for known in result.curves.values():
+        found |= {("", k.name): (k.value, k.interval, k.narrowed) for k in known}
+    for key, truth in truths.items():
+        if key in found or not key[1].startswith("V_ss -"):
+            value, interval, narrowed = found.get(key, (float("nan"), None, 1.0))
+            yield Estimate(*key, value, interval, truth, narrowed)
+
+
+def _band(prediction: Prediction) -> Band:
+    """Return the coverage and the errors of a prediction, by its samples and not by what the result says of them."""
+    error = prediction.measured - prediction.predicted
+    there = np.isfinite(error)
+    error, deviation = error[there], prediction.deviation[there]
+    inside = np.abs(error) <= 1.96 * deviation
+    return Band(
+        prediction.axis.name,
+        prediction.quantity,
+        float(np.mean(inside)),
+        float(np.mean(error**2)),
+        float(np.mean(deviation**2)),
+    )
+
+
+# ---- Tables ----------------------------------------------------------------------------------------------------------
+
+Row = Mapping[str, str]
+
+
+def rows(name: str, seed: int, found: Outcome, true_effects: Sequence[str]) -> Iterator[Row]:
+    """Yield the rows of a table for an outcome."""
+    which = {"scenario": name, "seed": str(seed)}
+    for e in found.estimates:
+        numbers = {"error": e.error, "width": e.width}
+        texts = {key: f"{value:.4g}" if isfinite(value) else "" for key, value in numbers.items()}
+        yield {**which, "axis": e.axis, "quantity": e.quantity, "covered": str(int(e.covered)), **texts}
+    alarms = f"refused: {found.error.splitlines()[0]}" if found.error else str(len(found.alarms))
+    false = "; ".join(found.false_effects(true_effects))
+    causes = "; ".join(f"{axis}: {cause or 'unknown'}" for axis, cause in found.disturbances)
+    yield {**which, "alarms": alarms, "false_effects": false, "causes": causes, "cpu": f"{found.seconds:.1f}"}
+
+
+def write_rows(path: Path, table: Sequence[Row]) -> None:
+    """Write a table of outcomes."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+
+
+def read_gate(path: Path = GATE) -> dict[tuple[str, int, str, str], tuple[bool, float]]:
+    """Return whether each interval of the gate covers, and its width, by scenario, seed, axis and quantity."""
+    with path.open(encoding="utf-8") as file:
+        return {
+            (row["scenario"], int(row["seed"]), row["axis"], row["quantity"]): (
+                row["covered"] == "1",
+                float(row["width"] or "nan"),
+            )
+            for row in csv.DictReader(file)
+            if row["quantity"]
+        }

@@ -5,12 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rov_fmu.identify.adapter.recording import Recording
 from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.tank.logs import Read
+from tests.tank.logs import Read, commanded, measured, used
 
 BLUEROV2: Layout = load_vehicle(SHIPPED["bluerov2"]).rov.layout
 TIME: Array = np.linspace(0.0, 9.9, 100)
@@ -51,19 +50,18 @@ def quaternion(R: Array) -> tuple[float, float, float, float]:
     return float(w), float(x / (4.0 * w)), float(y / (4.0 * w)), float(z / (4.0 * w))
 
 
-def check(log: Read, *, axes: str = "surge sway heave yaw", distance: bool = True, within: float = 1e-6) -> None:
+def check(read: Read, *, distance: bool = True, within: float = 1e-6) -> None:
     """Check that a log of the BlueROV2 gives this motion again, in SI units."""
-    recordings: dict[str, Recording] = {recording.axis.name: recording for recording in log.recordings}
-    assert [*recordings] == axes.split()
-    values = {"surge": U, "sway": V, "heave": DEPTH, "yaw": HEADING}
-    for name, recording in recordings.items():
-        there = np.isfinite(recording.values)
-        time = TIME[0] + recording.time[there]
-        assert there.sum() >= len(TIME) - 1
-        assert recording.values[there] == pytest.approx(np.interp(time, TIME, values[name]), abs=within)
-        for thruster, command in THRUSTERS.items():
-            assert recording.thrusters[thruster][there] == pytest.approx(command[-there.sum() :], abs=2e-3)
-        context = {"roll": ROLL, "pitch": PITCH, "depth": DEPTH, "voltage": VOLTAGE}
-        context |= {"distance": np.hypot(NORTH - NORTH[0], EAST - EAST[0])} if distance else {}
-        for condition, expected in context.items():
-            assert recording.context[condition][there] == pytest.approx(np.interp(time, TIME, expected), abs=within)
+    log = read.log
+    assert log.commands is not None
+    start = log.commands.rows[0]
+    expected = {"surge velocity": U, "sway velocity": V, "depth": DEPTH, "heading": HEADING}
+    expected |= {"roll angle": ROLL, "pitch angle": PITCH, "voltage": VOLTAGE}
+    expected |= {"distance": np.hypot(NORTH - NORTH[0], EAST - EAST[0])} if distance else {}
+    for quantity, values in expected.items():
+        channel = used(log, quantity)
+        assert channel.count == (11 if quantity == "voltage" else len(TIME))
+        at = channel.time[channel.there] - start
+        assert measured(log, quantity) == pytest.approx(np.interp(at, TIME, values), abs=within), quantity
+    for thruster, command in THRUSTERS.items():
+        assert commanded(log, thruster) == pytest.approx(command, abs=2e-3)

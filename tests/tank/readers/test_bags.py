@@ -16,7 +16,7 @@ from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.readers.bags import _RC_OUT
-from tests.tank.logs import Read, read_log
+from tests.tank.logs import Read, axes, commanded, measured, read_log, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, TIME
 
@@ -131,7 +131,7 @@ def test_a_bag_is_read_in_si_units_and_in_the_frames_of_the_sea(version: int, su
     ros = Ros(version)
     log = read_log(ros.write(tmp_path, dive(ros), suffix), BLUEROV2)
     motion.check(log)
-    file = log.recordings[0].file
+    file = log.log.file
     assert told(log) == (
         f"{file}: the commands of the thrusters are those of /thrusters",
         f"{file}: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
@@ -151,10 +151,11 @@ def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path
     assert f"{path.name}: 100 messages of /thrusters without a time in the header: the time of arrival is used" in (
         told(log)
     )
-    (heave,) = (recording for recording in log.recordings if recording.axis.name == "heave")
-    (step,) = np.flatnonzero(np.diff(heave.thrusters["5"]))
-    first = heave.time[np.isfinite(heave.values)][0]
-    assert heave.time[step + 1] - first == pytest.approx(TIME[10] + LATE - TIME[1], abs=1e-6)
+    commands = log.log.commands
+    assert commands is not None
+    (step,) = np.flatnonzero(np.diff(commanded(log.log, "5")))
+    first = used(log.log, "depth").time[0]
+    assert commands.rows[step + 1] - first == pytest.approx(TIME[10] + LATE - TIME[0], abs=1e-6)
 
 
 def test_arrivals_are_moved_to_the_clock_of_the_headers(tmp_path: Path) -> None:
@@ -183,13 +184,14 @@ def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> 
         pressure = ros.message("sensor_msgs/msg/FluidPressure", header=header, fluid_pressure=2e5)
         battery = ros.message("sensor_msgs/msg/BatteryState", header=header, voltage=motion.VOLTAGE[n])
         messages += [("/imu", time - LATE, imu), ("/pressure", time, pressure), ("/battery", time - LATE, battery)]
-    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
-    assert [recording.axis.name for recording in log.recordings] == ["heave", "yaw"]
-    (heave, yaw) = log.recordings
-    assert heave.values[np.isfinite(heave.values)] == pytest.approx(motion.DEPTH)
-    assert heave.thrusters["6"][np.isfinite(heave.values)] == pytest.approx(motion.THRUSTERS["6"])
-    assert np.nanmax(np.abs(yaw.values - np.interp(yaw.time, TIME - LATE, motion.HEADING))) < 0.02
-    assert heave.context["pitch"].min() == pytest.approx(-0.2, abs=1e-3)
+    log = read_log(ros.write(tmp_path, messages), BLUEROV2).log
+    assert axes(log) == ["heave", "roll", "pitch", "yaw"]
+    assert measured(log, "depth") == pytest.approx(motion.DEPTH)
+    assert commanded(log, "6", used(log, "depth").time) == pytest.approx(motion.THRUSTERS["6"])
+    assert measured(log, "heading") == pytest.approx(motion.HEADING, abs=1e-6)
+    late = used(log, "depth").time - used(log, "heading").time
+    assert late == pytest.approx(LATE * np.ones(len(TIME)), abs=1e-6)
+    assert measured(log, "pitch angle").min() == pytest.approx(-0.2, abs=1e-3)
 
 
 def test_depth_by_pressure(tmp_path: Path) -> None:
@@ -199,8 +201,8 @@ def test_depth_by_pressure(tmp_path: Path) -> None:
         pressure = 101325.0 + 9806.65 * motion.DEPTH[n]
         header = ros.header(time)
         messages += [("/p", time, ros.message("sensor_msgs/msg/FluidPressure", header=header, fluid_pressure=pressure))]
-    (heave,) = (log := read_log(ros.write(tmp_path, messages), BLUEROV2)).recordings
-    assert heave.values == pytest.approx(motion.DEPTH)
+    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
+    assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
     assert any("fresh water" in line for line in told(log))
 
 
@@ -219,10 +221,10 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     names, mistakes = names_of(BLUEROV2, RovTables(topics=table))
     assert not mistakes
     log = read_log(path, BLUEROV2, names=names)
-    (heave,) = log.recordings
-    assert heave.values == pytest.approx(motion.DEPTH)
-    assert heave.thrusters["2"] == pytest.approx(motion.THRUSTERS["2"])
-    assert log.logs[0].names >= table.keys()
+    assert axes(log.log) == ["heave"]
+    assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
+    assert commanded(log.log, "2") == pytest.approx(motion.THRUSTERS["2"])
+    assert log.log.names >= table.keys()
 
 
 def test_outputs_of_an_unknown_unit_are_refused(tmp_path: Path) -> None:

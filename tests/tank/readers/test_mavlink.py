@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rov_fmu.identify.adapter.recording import Recording
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, SWAY, Layout
+from rov_fmu.model.layout import HEAVE, Layout
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.tank.logs import Read, read_log
+from tests.folders import BLUEROV2, folder_of
+from tests.tank.logs import commanded, measured, read_log, used
 
 BOOT = 1_700_000_000.0  # s since 1970: when the vehicle began to count
 LATE = 0.05  # s, from the vehicle to the ground station
@@ -32,11 +33,6 @@ def bluerov2() -> Layout:
 
 def pulse(command: float) -> int:
     return round(1500.0 + 400.0 * command)
-
-
-def of_axis(log: Read, name: str) -> Recording:
-    (recording,) = (recording for recording in log.recordings if recording.axis.name == name)
-    return recording
 
 
 # ---- .tlog -----------------------------------------------------------------------------------------------------------
@@ -87,30 +83,29 @@ def dive(start: float = 100.0) -> list[tuple[float, Any]]:
 
 
 def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> None:
-    log = read_log(tlog(tmp_path / "Dive.TLOG", dive()), bluerov2)
-    (recording,) = log.recordings
-    assert (recording.axis, recording.quantity, recording.file) == (HEAVE, "depth", "Dive.TLOG")
-    there = np.isfinite(recording.values)
-    assert recording.values[there] == pytest.approx([1.0 + 0.02 * max(n - 10, 0) for n in range(N)])
-    assert recording.time[there] == pytest.approx(0.1 * np.arange(N) + 0.03, abs=2e-3)
-    assert recording.command is not None
-    assert recording.command == pytest.approx(np.where(recording.time < 0.999, 0.0, 0.5))
-    assert recording.thrusters["6"] == pytest.approx(recording.command)
-    assert not recording.thrusters["1"].any()
-    assert [(f.kind, f.axis, f.file) for f in log.findings] == [
-        ("unknown direction", "", "Dive.TLOG"),
-        ("constant motion", "yaw", "Dive.TLOG"),
-    ]
+    read = read_log(tlog(tmp_path / "Dive.TLOG", dive()), bluerov2)
+    log = read.log
+    assert log.file == "Dive.TLOG"
+    assert log.commands is not None
+    start = log.commands.rows[0]
+    assert log.commands.rows - start == pytest.approx(0.1 * np.arange(N), abs=2e-3)
+    assert measured(log, "depth") == pytest.approx([1.0 + 0.02 * max(n - 10, 0) for n in range(N)])
+    assert used(log, "depth").time - start == pytest.approx(0.1 * np.arange(N) + 0.03, abs=2e-3)
+    for thruster in ("5", "6"):
+        assert commanded(log, thruster) == pytest.approx(np.where(np.arange(N) < 10, 0.0, 0.5))
+    assert not commanded(log, "1").any()
+    assert [(f.kind, f.axis, f.file) for f in read.findings] == [("unknown direction", "", "Dive.TLOG")]
 
 
 def test_the_conditions_of_a_telemetry_log(bluerov2: Layout, tmp_path: Path) -> None:
     """Before its first measurement, the voltage is reported as 65535."""
     voltages = [battery(100.0, 65535), battery(101.0, 16000), battery(105.0, 15600)]
-    (recording,) = read_log(tlog(tmp_path / "a.tlog", [*dive(), *voltages]), bluerov2).recordings
-    context = recording.context
-    assert context["voltage"] == pytest.approx(np.interp(recording.time, [1.0, 5.0], [16.0, 15.6]), abs=1e-3)
-    assert context["roll"] == pytest.approx(0.1 * np.ones(len(recording.time)))
-    assert context["pitch"] == pytest.approx(-0.2 * np.ones(len(recording.time)))
+    log = read_log(tlog(tmp_path / "a.tlog", [*dive(), *voltages]), bluerov2).log
+    assert measured(log, "voltage") == pytest.approx([16.0, 15.6], abs=1e-3)
+    voltage = used(log, "voltage")
+    assert np.diff(voltage.time[voltage.there]) == pytest.approx([4.0], abs=2e-3)
+    assert measured(log, "roll angle") == pytest.approx(0.1 * np.ones(N))
+    assert measured(log, "pitch angle") == pytest.approx(-0.2 * np.ones(N))
 
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
@@ -123,16 +118,17 @@ def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path
         messages += [servos(0.1 * n, 1500, 1500, 1500, 1500, pulse(down), 1100, 1500, 1500, pulse(-down))]
         messages += [altitude(0.1 * n, -0.01 * n)]
     log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), bluerov2)
-    assert of_axis(log, "heave").thrusters["6"][-1] == 0.5
+    assert commanded(log.log, "6")[-1] == 0.5
     assert log.findings == [Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"})]
 
 
 def test_a_clock_of_servos_that_begins_anew(bluerov2: Layout, tmp_path: Path) -> None:
     start = 2.0**32 * 1e-6 - 3.0
-    recording = of_axis(read_log(tlog(tmp_path / "dive.tlog", dive(start)), bluerov2), "heave")
-    assert recording.time[-1] == pytest.approx(0.1 * (N - 1) + 0.03, abs=2e-3)
-    assert recording.command is not None
-    assert recording.time[np.flatnonzero(recording.command)[0]] == pytest.approx(1.0, abs=2e-3)
+    log = read_log(tlog(tmp_path / "dive.tlog", dive(start)), bluerov2).log
+    assert log.commands is not None
+    since = log.commands.rows - log.commands.rows[0]
+    assert used(log, "depth").time[-1] - log.commands.rows[0] == pytest.approx(0.1 * (N - 1) + 0.03, abs=2e-3)
+    assert since[np.flatnonzero(commanded(log, "5"))[0]] == pytest.approx(1.0, abs=2e-3)
 
 
 def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> None:
@@ -142,10 +138,10 @@ def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> N
         hud = mavlink.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, -0.5 - 0.01 * n, 0.0)
         messages += [servos(0.1 * n, *[1500] * 4, *[1500 + 4 * n] * 2), attitude(0.1 * n, 0.0), (0.1 * n + 0.02, hud)]
     log = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2, HEAVE)
-    recording = of_axis(log, "heave")
-    there = np.isfinite(recording.values)
-    assert recording.time[there] == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
-    assert recording.values[there] == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
+    assert log.log.commands is not None
+    since = used(log.log, "depth").time - log.log.commands.rows[0]
+    assert since == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
+    assert measured(log.log, "depth") == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
     assert (
         Finding("time of arrival", file="dive.tlog", names={"topics": "VFR_HUD"}, numbers={"count": N}) in log.findings
     )
@@ -163,18 +159,12 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
         local = mavlink.MAVLink_local_position_ned_message(100 * n, 0, 0, 0, V * cos(psi), V * sin(psi), 0)
         flags = mavlink.MAVLink_ekf_status_report_message(831 if n >= 10 else 165, 0, 0, 0, 0, 0)
         messages += [(0.1 * n - 0.01, flags), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
-    log = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2)
-    surge = of_axis(log, "surge")
-    there = np.isfinite(surge.values)
-    assert surge.values[there] == pytest.approx(cos(-0.2) * 0.01 * np.arange(10, N), abs=1e-6)
-    sway = log.logs[0].used("sway velocity")
-    assert sway is not None
-    assert sway.values[10:] == pytest.approx(sin(0.1) * sin(-0.2) * 0.01 * np.arange(10, N), abs=1e-6)
-    assert surge.command is not None
-    assert surge.command[-1] == pytest.approx(0.4)
-    assert {recording.axis.name for recording in log.recordings} == {"surge"}
-    assert Finding("cancelling thrusters", axis="sway", file="dive.tlog") in log.findings
-    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
+    read = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2)
+    log, speed = read.log, 0.01 * np.arange(10, N)
+    assert measured(log, "surge velocity") == pytest.approx(cos(-0.2) * speed, abs=1e-6)
+    assert measured(log, "sway velocity") == pytest.approx(sin(0.1) * sin(-0.2) * speed, abs=1e-6)
+    assert [commanded(log, thruster)[-1] for thruster in "1234"] == pytest.approx([-0.4, -0.4, 0.4, 0.4])
+    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in read.findings
 
 
 def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
@@ -182,8 +172,8 @@ def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout
     tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
     tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
     log = read_log(path, bluerov2)
-    assert not of_axis(log, "heave").thrusters["1"].any()
-    assert of_axis(log, "heave").thrusters["5"][0] == 0.0
+    assert not commanded(log.log, "1").any()
+    assert commanded(log.log, "5")[0] == 0.0
     names = {"vehicles": "1 and 2", "vehicle": "1"}
     assert Finding("several vehicles", file="dive.tlog", names=names) in log.findings
     assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
@@ -197,10 +187,7 @@ def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp
     content[before + 20 : before + 24] = b"\x07" * 4
     path.write_bytes(content[:-7])
     log = read_log(path, bluerov2)
-    there = np.isfinite(of_axis(log, "heave").values)
-    assert of_axis(log, "heave").values[there] == pytest.approx(
-        [1.0 + 0.02 * max(n - 10, 0) for n in range(N) if n != 10]
-    )
+    assert measured(log.log, "depth") == pytest.approx([1.0 + 0.02 * max(n - 10, 0) for n in range(N) if n != 10])
     assert Finding("damaged pieces", file="dive.tlog", numbers={"count": 1}) in log.findings
 
 
@@ -267,18 +254,16 @@ def turn() -> list[bytes]:
 
 
 def test_a_dataflash_log_tells_of_a_turn(bluerov2: Layout, tmp_path: Path) -> None:
-    log = read_log(dataflash(tmp_path / "00000012.BIN", turn()), bluerov2)
-    (recording,) = log.recordings
-    assert recording.quantity == "heading"
-    assert recording.values == pytest.approx([radians(-10.0 + 2.0 * max(n - 10, 0)) for n in range(N)])
-    assert recording.time == pytest.approx(0.1 * np.arange(N))
-    assert {name: values[-1] for name, values in recording.thrusters.items()} == pytest.approx(
-        {"1": 0.25, "2": -0.25, "3": -0.25, "4": 0.25, "5": 0.0, "6": 0.0}
-    )
-    assert recording.context["roll"] == pytest.approx(radians(4.0) * np.ones(N))
-    assert recording.context["voltage"] == pytest.approx(16.0 * np.ones(N))
-    names = {"quantity": "depth"}
-    assert log.findings == [Finding("constant motion", axis="heave", file="00000012.BIN", names=names)]
+    read = read_log(dataflash(tmp_path / "00000012.BIN", turn()), bluerov2)
+    log = read.log
+    assert measured(log, "heading") == pytest.approx([radians(-10.0 + 2.0 * max(n - 10, 0)) for n in range(N)])
+    assert log.commands is not None
+    assert used(log, "heading").time - log.commands.rows[0] == pytest.approx(0.1 * np.arange(N))
+    ends = [commanded(log, thruster)[-1] for thruster in "123456"]
+    assert ends == pytest.approx([0.25, -0.25, -0.25, 0.25, 0.0, 0.0])
+    assert measured(log, "roll angle") == pytest.approx(radians(4.0) * np.ones(N))
+    assert measured(log, "voltage") == pytest.approx(16.0 * np.ones(N))
+    assert not read.findings
 
 
 def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp_path: Path) -> None:
@@ -288,8 +273,8 @@ def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp
         time, down = 0.1 * n, pulse(0.5 * (n >= 10))
         messages += [rcou(time, *[1500] * 4, down, down), ctun(time, 0.0)]
         messages += [baro(time, 0, 0.001 * n), baro(time, 1, -0.02 * n)]
-    recording = of_axis(read_log(dataflash(tmp_path / "a.bin", messages), bluerov2), "heave")
-    assert recording.values == pytest.approx(0.02 * np.arange(N), abs=1e-6)
+    log = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).log
+    assert measured(log, "depth") == pytest.approx(0.02 * np.arange(N), abs=1e-6)
 
 
 def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
@@ -301,18 +286,17 @@ def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
         for core, sign in ((0, 1.0), (1, -1.0)):
             numbers = [-sign * 0.01 * n, 0.0, *[0.0] * 5, 0.0, 0.0, 0.0, 0.0]
             messages += [packed("XKF1", round(time * 1e6), core, 0.0, 0.0, 90.0, *numbers)]
-    (sway,) = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).recordings
-    assert (sway.axis, sway.quantity) == (SWAY, "velocity")
-    assert sway.values == pytest.approx(0.01 * np.arange(N), abs=1e-6)
-    assert sway.command == pytest.approx(0.3 * (np.arange(N) >= 10))
+    log = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).log
+    assert measured(log, "sway velocity") == pytest.approx(0.01 * np.arange(N), abs=1e-6)
+    assert measured(log, "surge velocity") == pytest.approx(np.zeros(N), abs=1e-6)
+    assert commanded(log, "3") == pytest.approx(0.3 * (np.arange(N) >= 10))
 
 
 @pytest.mark.parametrize("cut", [1, 40, 500])
 def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layout, tmp_path: Path) -> None:
     path = dataflash(tmp_path / "a.bin", turn())
     path.write_bytes(path.read_bytes()[:-cut])
-    recording = of_axis(read_log(path, bluerov2), "yaw")
-    assert N - 6 <= len(recording.time) <= N
+    assert N - 6 <= len(measured(read_log(path, bluerov2).log, "heading")) <= N
 
 
 def test_a_damaged_dataflash_log_is_read_around_the_damage(
@@ -324,7 +308,8 @@ def test_a_damaged_dataflash_log_is_read_around_the_damage(
     content[at : at + 10] = b"\x07" * 10
     path.write_bytes(content)
     log = read_log(path, bluerov2)
-    assert np.flatnonzero(np.isnan(of_axis(log, "yaw").values)).tolist() == [30]
+    heading = used(log.log, "heading")
+    assert heading.time - heading.time[0] == pytest.approx(np.delete(0.1 * np.arange(N), 30), abs=1e-3)
     assert Finding("damaged log", file="a.bin") in log.findings
     assert capfd.readouterr() == ("", "")
 
@@ -359,9 +344,11 @@ def test_what_is_no_log_is_one_clear_line(
     assert capfd.readouterr() == ("", "")
 
 
-def test_outputs_of_servos_alone_are_refused(tmp_path: Path, bluerov2: Layout) -> None:
-    with pytest.raises(DataFileError, match="nothing measured"):
-        read_log(tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)]), bluerov2)
+def test_outputs_of_servos_alone_are_refused(tmp_path: Path) -> None:
+    rov = folder_of(tmp_path, BLUEROV2, {})
+    tlog(rov / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)])
+    with pytest.raises(DataFileError, match=r"a\.tlog: nothing measured of any axis"):
+        load_tests(rov)
 
 
 def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,292 @@
+"""How far the model of each axis may be trusted: held-out predictions, answers, disturbances and verdicts."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite, log
+
+import numpy as np
+
+from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
+from rov_fmu.identify.likelihood.solve import Minimum, minimise, total
+from rov_fmu.identify.result import (
+    DISAGREEMENT,
+    MOST_UNKNOWN,
+    Answer,
+    Disturbance,
+    Prediction,
+    Slip,
+    Verdict,
+    Word,
+)
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.riccati import Riccati
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
+
+COMMANDS = (0.3, -0.3, 0.5, -0.5)
+"""The commands of the answers."""
+AHEAD, SETTLING = 10.0, 5.0
+"""Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
+_LEAST_GAIN = 0.03
+"""Thrust is never predicted to better than 3 %: batteries and water differ from day to day."""
+_LEAST_CURRENT = 0.02
+"""The current of an unseen log is never known to better than this, m/s."""
+_LOST = 1.8
+"""The largest standard deviation of a heading, rad: that of a direction about which nothing is known."""
+_OF_THRUST = 0.7
+"""The relative change of V_ss by that of the thrust: between 0.5, if drag is quadratic, and 1, if it is linear."""
+_EXACT_SPEED = 0.01
+"""A steady velocity is never claimed to better than 1 %."""
+_REFIT_STEPS = 6
+"""The steps of a fit without one log, which begins at the fit to all."""
+_STOPPED = 0.1
+GOOD, USABLE = 0.8, 0.6
+"""The least coverage of the bands for each verdict."""
+_LITTLE = 0.05
+"""A slow force is compared with at least this share of full thrust, also in a log without thrust."""
+_MOVING = 3.0
+"""A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
+
+
+# ---- Held-out predictions --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of the data that is left out: a log, or a half of the only log."""
+
+    log: int
+    chosen: slice
+    words: str
+
+
+def predictions(objective: Objective, best: Minimum, posterior: Posterior) -> Iterator[Prediction]:
+    """Yield the prediction of each quantity of each log by a fit to all other data."""
+    count = len(objective.logs)
+    for n, one in enumerate(objective.logs):
+        if count > 1:
+            others = [other for other in objective.logs if other is not one]
+            rest = Objective(objective.table, others, objective.rows, thinned=True)
+            again = minimise(rest, posterior.z, most=_REFIT_STEPS, with_noise=False)
+            words = "the other log" if count == 2 else f"the other {count - 1} logs"
+            _, information = total(objective, again.z, [data for m, data in enumerate(best.data) if m != n])
+            covariance = Posterior.of(objective.table, again.z, information).averaged.covariance
+            covariance = _with_currents(objective, best, covariance, n)
+            yield from _predicted(objective, _Part(n, slice(None), words), _cautious(objective, again.z), covariance)
+            continue
+        half = len(best.data[n].innovations) // 2
+        for part in (_Part(n, slice(half, None), "the first half"), _Part(n, slice(half), "the second half")):
+            z, covariance = _without(objective, best, part)
+            yield from _predicted(objective, part, _cautious(objective, z), covariance)
+
+
+def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
+    """Return the covariance with the variance of the current of an unseen log: about as large as in the other logs."""
+    parameters, found = objective.table.parameters, covariance.copy()
+    currents = [n for n, p in enumerate(parameters) if p.kind == "current"]
+    others = [best.z[n] ** 2 + covariance[n, n] for n in currents if parameters[n].log != number]
+    for n in currents:
+        if parameters[n].log == number:
+            found[n], found[:, n] = 0.0, 0.0
+            found[n, n] = min(parameters[n].deviation ** 2, _LEAST_CURRENT**2 + float(np.mean(others)))
+    return found
+
+
+def _without(objective: Objective, best: Minimum, part: _Part) -> tuple[Array, Array]:
+    """Return the parameters and their covariance by the information of all data but a part of a log."""
+    whole, everything = total(objective, best.z, best.data)
+    gradient, information = best.data[part.log].information(part.chosen)
+    gradient, rest = whole - gradient, everything - information
+    values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
+    inverse = (vectors / np.maximum(values, 2.0 * np.min(1.0 / objective.deviation**2))) @ vectors.T
+    return np.clip(best.z - inverse @ gradient, objective.low, objective.high), 2.0 * inverse
+
+
+def _cautious(objective: Objective, z: Array) -> Array:
+    """Return the parameters with at least the least change of thrust."""
+    moved = z.copy()
+    place = objective.table.place("slow gain")
+    if place is not None:
+        moved[place] = max(moved[place], log(_LEAST_GAIN))
+    return moved
+
+
+def _predicted(objective: Objective, part: _Part, z: Array, covariance: Array) -> Iterator[Prediction]:
+    """Yield the predictions of one part over its whole length, and of its positions over a shorter time."""
+    one, record = objective.logs[part.log], objective.records[part.log]
+    inside = np.zeros(len(record.time), bool)
+    inside[part.chosen] = True
+    begin = max(float(record.time[inside][0] - record.time[0]), 0.0) + SETTLING
+    for span in (inf, AHEAD):
+        try:
+            run = objective.run(z, part.log, begin=begin, span=span)
+            slopes = _slopes(objective, part.log, z, covariance, run, begin, span)
+        except DivergedError:
+            continue
+        later = inside & (record.time >= record.time[0] + begin)
+        variance = run.variances + np.einsum("ni,ij,nj->n", slopes, covariance, slopes)
+        for number, m in enumerate(one.measured):
+            at = later & (record.sensor == number)
+            if at.sum() < 10 or (span < inf and m.sensor.is_velocity):
+                continue
+            off, deviation = run.innovations[at], np.sqrt(variance[at])
+            if m.channel.quantity.wraps:
+                deviation = np.minimum(deviation, _LOST)
+            measured = record.value[at]
+            yield Prediction(
+                axis=m.sensor.axis,
+                file=one.log.file,
+                quantity=m.channel.quantity.name,
+                unit=m.channel.quantity.unit,
+                is_position=not m.sensor.is_velocity,
+                span=span,
+                by=part.words,
+                time=record.time[at],
+                measured=measured,
+                predicted=measured - off,
+                deviation=deviation,
+                unchanged=_unchanged(record.time[at], measured, span),
+                noise=objective.table.get(z.tolist(), "white noise", m.channel.quantity.name),
+                error=float(np.sqrt(np.mean(off**2))),
+                coverage=float(np.mean(np.abs(off) <= 1.96 * deviation)),
+            )
+
+
+def _slopes(
+    objective: Objective, number: int, z: Array, covariance: Array, run: Run, begin: float, span: float
+) -> Array:
+    """Return the derivatives of the predictions of a log with respect to the parameters of the motion, n x p."""
+    found = np.zeros((len(objective.records[number].time), len(z)))
+    for k, parameter in enumerate(objective.table.parameters):
+        if not parameter.of_motion or not objective.concerns(parameter, number):
+            continue
+        step = 0.3 * np.sqrt(max(covariance[k, k], 0.0)) + 1e-9
+        up, down = z.copy(), z.copy()
+        up[k] += step
+        down[k] -= step
+        above, below = (
+            objective.run(moved, number, begin=begin, span=span, repeated=run, frozen=True) for moved in (up, down)
+        )
+        found[:, k] = (above.innovations - below.innovations) / (2.0 * step)
+    return found
+
+
+def _unchanged(time: Array, values: Array, span: float) -> float:
+    """Return the RMS change of a quantity since the start of its prediction."""
+    if span == inf:
+        return float(np.sqrt(np.mean((values - values[0]) ** 2)))
+    first = np.maximum(np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span)), 0)
+    return float(np.sqrt(np.mean((values - values[first]) ** 2)))
+
+
+# ---- Answers ---------------------------------------------------------------------------------------------------------
+
+
+def answers(posterior: Posterior, axis: Axis) -> tuple[Answer, ...]:
+    """Return how fast, how long and how far, for the usual commands of an axis."""
+    table = posterior.table
+
+    def values(z: Array) -> Array:
+        rov, shapes = Rov(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist())
+        return np.array([_response(shapes.motion(rov, axis, c)) for c in COMMANDS])
+
+    def logarithms(z: Array) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.log(np.abs(values(z))).ravel()
+
+    slopes = posterior.slopes(logarithms, posterior.of_vehicle)
+    slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+    variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(COMMANDS), 3)
+    # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
+    variances[:, :2] += (_OF_THRUST * table.get(posterior.z.tolist(), "slow gain")) ** 2
+    errors = np.sqrt(variances)
+    found = []
+    for command, error, (V, rise, stop) in zip(COMMANDS, errors, values(posterior.z).tolist(), strict=True):
+        half = max(QUANTILE * error[0], _EXACT_SPEED) / QUANTILE
+        steady = around(abs(V), abs(V) * half, positive=True)
+        signed = steady if V >= 0.0 else (-steady[1], -steady[0])
+        found.append(
+            Answer(
+                axis,
+                command,
+                (V, signed),
+                (rise, around(rise, rise * error[1], positive=True)),
+                (stop, around(stop, stop * error[2], positive=True)),
+            )
+        )
+    return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
+
+
+def _response(motion: Riccati) -> tuple[float, float, float]:
+    """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force."""
+    V, Tau = motion.steady_velocity(), motion.time_constant()
+    A, B = motion.drag(V)
+    speed = abs(V)
+    if A > 0.0 and isfinite(speed) and speed > 0.0:
+        stop = log((A * speed + B) / (A * _STOPPED * speed + B)) / A
+    else:
+        stop = (1.0 - _STOPPED) * speed / B if B > 0.0 else inf
+    return V, Tau, stop
+
+
+# ---- Verdicts --------------------------------------------------------------------------------------------------------
+
+
+def verdict(
+    found: Sequence[Prediction],
+    given: Sequence[Answer],
+    slow: Sequence[Disturbance],
+    difference: float,
+    slips: Sequence[Slip] = (),
+) -> Verdict:
+    """Return whether the model of an axis may be trusted.
+
+    It is judged by its predictions, its intervals, what is unknown, two starts, and mistakes in the files of the axis.
+    """
+    word, reasons = "good", []
+
+    def lower(to: Word, reason: str) -> None:
+        nonlocal word
+        order: list[Word] = ["good", "usable", "do not use"]
+        word = max(word, to, key=order.index)  # type: ignore[arg-type]
+        reasons.append(reason)
+
+    judged = [p for p in found if p.is_position == (p.span < inf)]
+    if judged:
+        coverage = float(np.mean([p.coverage for p in judged]))
+        if coverage < GOOD:
+            words = f"The 95 % bands contain {coverage:.0%} of the unseen samples"
+            lower("usable" if coverage >= USABLE else "do not use", f"{words}.")
+        moving = [p for p in judged if p.unchanged > _MOVING * p.noise]
+        worse = [p for p in moving if p.error > p.unchanged]
+        if worse and len(worse) * 2 > len(moving):
+            lower("do not use", f"A prediction of no change is better for the {worse[0].quantity} in {worse[0].file}.")
+        elif worse:
+            lower("usable", f"A prediction of no change is better for the {worse[0].quantity} in {worse[0].file}.")
+    unknown = [d for d in slow if d.kept]
+    if sum(d.share for d in unknown) > MOST_UNKNOWN:
+        largest = max(unknown, key=lambda d: d.share)
+        is_turn = largest.axis is not None and largest.axis.is_rotation
+        sentences = {
+            "gain": "The thrust changes for an unknown reason by {:.0%}",
+            "force": f"An unknown slow {'torque' if is_turn else 'force'} is as large as {{:.0%}} of the thrusters'",
+            "velocity": "An unknown slow velocity over ground is as large as {:.0%} of the vehicle's",
+        }
+        lower("do not use", f"{sentences[largest.kind].format(largest.share)} in {largest.file}.")
+    widths = [(a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in given]
+    if not widths:
+        lower("do not use", "No steady velocity is determined.")
+    elif min(widths) > 1.0:
+        lower("do not use", "The steady velocities are known to no better than half their size.")
+    elif min(widths) > 0.3:
+        lower("usable", "The steady velocities are known to no better than 15 %.")
+    for slip in slips:
+        lower("do not use", f"Another unit or sign would explain the {slip.quantity} in {slip.file}.")
+    if difference > DISAGREEMENT:
+        lower("do not use", "Two starts of the fit led to different vehicles.")
+    if word == "good":
+        words = "Unseen motion stays inside the 95 % bands" if judged else "The tables determine the steady velocities"
+        reasons.append(f"{words}.")
+    return Verdict(word, tuple(reasons))  # type: ignore[arg-type]

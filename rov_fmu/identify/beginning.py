@@ -1,0 +1,385 @@
+"""What is known before the fit: the tests of a folder, the part of the vehicle that they concern, and its prior."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from rov_fmu.identify.given import Given, Narrowed, Tested, narrowed, with_axis_alone
+from rov_fmu.identify.likelihood.objective import TableRow
+from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
+from rov_fmu.identify.likelihood.posterior import QUANTILE
+from rov_fmu.identify.likelihood.records import Recorded, driven_axes, recorded, typical
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import did_you_mean, first_of, lines_on
+from rov_fmu.io.toml_file import key_line
+from rov_fmu.model.layout import AXES, PITCH, REVERSE, ROLL, Axis, Curve, Layout, coefficient_name
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.description import ROV_FILE
+from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.folder import KINDS, Folder, file_hash, read_folder
+from rov_fmu.tank.log import Log
+from rov_fmu.tank.readers.tank_tables import Row
+from rov_fmu.vehicle.vehicle import VehicleFileError
+
+_QUADRATIC = 0.7
+"""The share of the quadratic drag at a large velocity, where nothing else is known."""
+_SAG = 0.03
+"""Thrust is taken to depend on the voltage if it changes by more than this, relatively."""
+_SQUARE = 0.8
+"""The usual share of the thrust at full command that grows with the square of the command."""
+_ADDED = 1.5
+"""The effective inertia relative to that of the dry vehicle, where no added mass is known."""
+_LEAST_FORCE = 1e-6
+"""The smallest force of a thrust curve, N. A fit with less could overflow."""
+_NEVER_EXACT = ("white_noise", "coloured_noise")
+"""The priors whose deviation must not be 0."""
+_MOST_REASONS = 3
+"""The most reasons in a line that refuses a log."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tests:
+    """All tests of a folder, and the vehicle that they concern."""
+
+    folder: Folder
+    given: Given
+    tested: Tested
+    inputs: Mapping[str, str]
+    """The SHA-256 hash of every file that was read, by its name."""
+    findings: tuple[Finding, ...]
+    """What was left out of the vehicle and of the files."""
+
+    def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
+        """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
+        layout = self.given.rov.layout
+        names = {curve.name for curve in layout.curves} if kind == "thrust" else {*layout.kinds}
+        for (other, subject), some in self.folder.rows.items():
+            if other == kind and subject in names:
+                yield subject, some
+
+    def counts(self, kind: str, subject: str, command: float) -> bool:
+        """Return True if a command is inside the window of rov.toml."""
+        window = f"thrust_{subject}" if kind == "thrust" else subject
+        low, high = self.given.description.tables.windows.get(window, (-1.0, 1.0))
+        return low <= command <= high
+
+
+def load_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> Tests:
+    """Read a folder. Raises DataFileError or VehicleFileError with a line for every mistake.
+
+    `check_inputs` is called with every file that the identification reads, before any test is read.
+    """
+    found = read_folder(folder, check_inputs)
+    description = found.rov_file.description
+    logs = [_Contents(log, *driven_axes(log, _layout_of(log, found))) for log in found.logs]
+    tested = _tested(found, logs)
+    useless = [one.refusal(folder) for one in logs] if not tested.axes else []
+    if not tested.thrust:
+        found.mistakes += useless
+    vehicle = Narrowed(None)
+    # If no axis was found, it may be in a file that could not be read.
+    if description and (tested.axes or not found.mistakes):
+        vehicle = narrowed(description, tested, folder, useless)
+    found.rov_file_mistakes += _wrong_priors(found)
+    found.mistakes += _without_force(found)
+    in_tests = [*found.mistakes, *vehicle.test_mistakes]
+    mistakes = [*found.rov_file_mistakes, *found.mistakes, *vehicle.rov_file_mistakes, *vehicle.test_mistakes]
+    if mistakes:
+        raise (DataFileError if in_tests else VehicleFileError)(*mistakes)
+    assert vehicle.given
+    path = vehicle.given.description.tables.base
+    base = {vehicle.given.description.base_name: file_hash(path)} if path else {}
+    inputs = {ROV_FILE: found.inputs[ROV_FILE]} | base | found.inputs
+    of_logs = [finding for one in logs for finding in one.told]
+    of_vehicle = _not_pushed(vehicle.findings, of_logs) if not path else vehicle.findings
+    findings = (*of_vehicle, *found.findings, *of_logs, *_driven_together(found))
+    return Tests(found, vehicle.given, tested, inputs, findings)
+
+
+def _wrong_priors(found: Folder) -> list[str]:
+    """Return a line for each key of [priors] that no prior has, and for each noise that is said to be exact."""
+    lines = []
+    for key, deviation in found.rov_file.tables.priors.items():
+        if key not in PRIORS:
+            lines.append(key_line(f"priors.{key}", f"unknown{did_you_mean(key, PRIORS)}"))
+        elif key in _NEVER_EXACT and deviation == 0.0:
+            reason = "must be above 0: the noise of a sensor is seen in its samples, and never known exactly"
+            lines.append(key_line(f"priors.{key} = 0", reason))
+    return lines_on(found.path / ROV_FILE, lines)
+
+
+def _without_force(found: Folder) -> Iterator[str]:
+    """Yield a line for each thrust curve whose largest measured force is 0."""
+    for (kind, curve), rows in found.rows.items():
+        largest = max((row.value * np.sign(row.command) for row in rows), default=0.0)
+        if kind == "thrust" and largest < _LEAST_FORCE:
+            yield f"{found.path}: thrust_{curve}*.csv: must give a force above 0, not {largest:.3g} N at most"
+
+
+@dataclass(frozen=True, eq=False)
+class _Contents:
+    """What a log tests."""
+
+    log: Log
+    axes: Sequence[Axis]
+    findings: Sequence[Finding]
+    """About its channels and axes."""
+
+    @property
+    def told(self) -> Sequence[Finding]:
+        """The findings, of which there is at least one if the log tests nothing."""
+        return self.findings or ([] if self.axes else [Finding("nothing measured", file=self.log.file)])
+
+    def refusal(self, folder: Path) -> str:
+        """Return the line that refuses a folder without a better log."""
+        file = self.log.file
+        left_out = [finding for finding in self.log.findings if finding.kind == "channel left out"]
+        reasons = [line.removeprefix(f"{file}: ") for line in sentences([*left_out, *self.told], SENTENCES)]
+        return f"{folder / file}: {'; '.join(first_of(reasons, _MOST_REASONS))}: nothing is identifiable"
+
+
+def _not_pushed(of_vehicle: Sequence[Finding], of_logs: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield the findings about the vehicle, with a warning for each axis that it lacks because its thrusters cancel.
+
+    That is for a vehicle without a base, which may have axes that the logs do not concern.
+    """
+    cancelling = {finding.axis for finding in of_logs if finding.kind == "cancelling thrusters"}
+    for finding in of_vehicle:
+        is_one = finding.kind == "axis left out" and finding.axis in cancelling
+        yield Finding("axis not pushed", finding.axis) if is_one else finding
+
+
+def _driven_together(found: Folder) -> Iterator[Finding]:
+    """Yield a finding for each axis that a log measures, but that the thrusters drive only together with others."""
+    if found.layout and found.logged:
+        for log in found.logs:
+            for axis in (form.axis for form in found.layout.axes if not found.logged.has(form.axis)):
+                is_measured = any(channel.quantity.axis is axis and not channel.unused for channel in log.channels)
+                if is_measured and not log.axis and axis not in (ROLL, PITCH):
+                    yield Finding("together", axis.name, file=log.file, names={"axis": axis.name})
+
+
+def _tested(found: Folder, logs: Sequence[_Contents]) -> Tested:
+    """Return what the files test. A log that could not be read may test the axis in its name."""
+    description = found.rov_file.description
+    windows = description.tables.windows if description else {}
+
+    def subjects(kind: str) -> list[str]:
+        return [subject for other, subject in found.files if other == kind]
+
+    def has_backward_rows(kind: str, subject: str) -> bool:
+        low, _ = windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
+        return any(low <= row.command < 0.0 for row in found.rows.get((kind, subject), ()))
+
+    unread = filter(None, subjects("log")) if found.mistakes else ()
+    return Tested(
+        {name: (found.files["thrust", name][0], has_backward_rows("thrust", name)) for name in subjects("thrust")},
+        {name: has_backward_rows("steady", name) for name in subjects("steady")},
+        subjects("time_constant"),
+        list(dict.fromkeys([*unread, *(axis.name for one in logs for axis in one.axes)])),
+    )
+
+
+def _layout_of(log: Log, of: Folder | Layout) -> Layout:
+    """Return the part of the vehicle that a log concerns: one axis alone for a test of this axis.
+
+    Of a folder, it is that of the largest layout that the vehicle can have.
+    """
+    layout = of if isinstance(of, Layout) else of.layout if log.axis else of.logged
+    assert layout
+    return with_axis_alone(layout, log.axis) if log.axis and log.axis.name in layout.kinds else layout
+
+
+# ---- The prior -------------------------------------------------------------------------------------------------------
+
+
+def begin(tests: Tests) -> tuple[Beginning, list[Recorded], list[TableRow]]:
+    """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
+    given = tests.given
+    deviations = given.description.tables.priors
+    rov = _extended(given.rov, given.base, tests, deviations)
+    logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, rov.layout)))]
+    fitted = [form.axis for form in rov.layout.axes if _is_fitted(form.axis, tests)]
+    driving = {t.curve for axis in fitted for t in rov.layout.drivers(axis)}
+    given_thrust = {name for name, quantity in given.description.known.items() if not quantity.interval}
+    measured = [name for name, _ in tests.rows("thrust")]
+    driving = {c.name for c in rov.layout.curves if c.name in driving or c.name in measured}
+    curves = [
+        curve
+        for curve in rov.layout.curves
+        if curve.name in driving
+        and (curve.name in measured or not {curve.coefficient("a_t"), curve.coefficient("b_t")} <= given_thrust)
+    ]
+    values = dict(rov.coefficients)
+    for name, rows in tests.rows("thrust"):
+        rough = _rough_thrust(rov, next(c for c in rov.layout.curves if c.name == name), rows)
+        values |= {key: value for key, value in rough.items() if key not in given.known}
+    rov = Rov(rov.layout, values)
+    full = {form.axis.name: rov.strongest(form.axis) for form in rov.layout.axes}
+    guessed = []
+    for axis in fitted:
+        if any(axis.coefficient(key) not in given.base for key in ("a_d", "b_d")):
+            guessed.append(axis.name)
+            values |= _rough_drag(rov, axis, tests, logs)
+    has_lag = any(name.startswith("T_") for name in given.base)
+    exact = _exact(given, rov.layout, measured)
+    errors = _thrust_errors(given, curves)
+    known = Beginning(rov.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors)
+    return known, logs, [*_table_rows(tests, rov)]
+
+
+def _exact(given: Given, layout: Layout, measured: Sequence[str]) -> frozenset[str]:
+    """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
+    leave as they are. The curves of a base are uncertain unless their forces were measured, and so is a lag."""
+    uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}
+    own = given.description.known
+    return frozenset(n for n in given.known if n not in uncertain or (n in own and not own[n].interval))
+
+
+def _thrust_errors(given: Given, curves: Sequence[Curve]) -> dict[str, float]:
+    """Return the relative standard error of the forces of a curve whose a_t rov.toml gives with an interval."""
+    found = {}
+    for curve in curves:
+        quantity = given.description.known.get(curve.coefficient("a_t"))
+        if quantity and quantity.interval:
+            low, high = quantity.interval
+            found[curve.name] = (high - low) / (2.0 * QUANTILE * abs(quantity.value))
+    return found
+
+
+def _is_fitted(axis: Axis, tests: Tests) -> bool:
+    given, tested = tests.given.known, tests.tested.axes
+    return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
+
+
+def _extended(rov: Rov, base: Mapping[str, float], tests: Tests, deviations: Mapping[str, float]) -> Rov:
+    """Return the vehicle with every coefficient that a parameter may change, where each effect is absent."""
+    values = {name: base.get(name, value) for name, value in rov.coefficients.items()}
+    rov = Rov(
+        replace(rov.layout, mix={}, pulse=None, has_dead_time=False), rov.coefficients
+    )  # a log tells thrusters' commands
+    layout = rov.layout
+    more: dict[str, float] = {}
+    logged = {*tests.tested.logs}
+    for form in layout.axes:
+        axis = form.axis
+        if axis.name in logged:
+            more |= {axis.coefficient(f"{key}{REVERSE}"): values[axis.coefficient(key)] for key in ("a_d", "b_d")}
+            more[axis.coefficient("F_0")] = base.get(axis.coefficient("F_0"), 0.0)
+    rov = _with_voltage(rov, base, tests)
+    layout = rov.layout
+    values = {**rov.coefficients, **values}
+    exact = deviations.get("thrust") == 0.0
+    for curve in layout.curves:
+        if not curve.tables and not exact:
+            for key in ("a_t", "b_t"):
+                more[coefficient_name(f"{key}{REVERSE}", curve.name)] = values[curve.coefficient(key)]
+            if logged:
+                more[curve.coefficient("c_0")] = 0.0
+        if logged:
+            more[curve.coefficient("T")] = LEAST_LAG
+    more = {name: base.get(name, value) for name, value in more.items()}
+    return rov.extended(more | values)
+
+
+def _with_voltage(rov: Rov, base: Mapping[str, float], tests: Tests) -> Rov:
+    """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it."""
+    requests = tests.given.requests
+    values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
+    if not values or rov.layout.voltage is not None:
+        return rov
+    mean = float(np.mean([np.mean(some) for some in values]))
+    if not requests.voltage and max(float(np.ptp(some)) for some in values) < _SAG * mean:
+        return rov
+    more = {}
+    is_exact = tests.given.description.tables.priors.get("voltage") == 0.0
+    for curve in rov.layout.curves:
+        if len(curve.tables) < 2:
+            measured_at = requests.measured_at.get(curve.name, mean)
+            more[coefficient_name("V_0", curve.name)] = base.get(coefficient_name("V_0", curve.name), measured_at)
+            more[coefficient_name("n_V", curve.name)] = USUAL_EXPONENT if is_exact else 0.0
+    powered = Rov(replace(rov.layout, voltage=round(mean, 3)), rov.coefficients)
+    return powered.extended(more)
+
+
+def _rough_thrust(rov: Rov, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:
+    """Return the coefficients of a curve that fit its forces roughly, as the centre of their prior.
+
+    Both directions share the ratio of a_t to b_t, which are not negative. What else the forces tell is the shape that
+    the likelihood fits.
+    """
+    astern = coefficient_name(f"a_t{REVERSE}", curve.name) in rov.layout.coefficients
+    c_0 = rov.coefficients.get(curve.coefficient("c_0"), 0.0)
+    command, F = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
+    c, F, is_back = np.maximum(np.abs(command) - c_0, 0.0), np.abs(F), astern & (command < 0.0)
+    largest = max(float(F.max()), 1e-9)
+
+    def force(x: Array) -> Array:
+        whole, share, ratio = np.exp(x[0]), x[1], np.exp(x[2])
+        return np.asarray(whole * np.where(is_back, ratio, 1.0) * (share * c * c + (1.0 - share) * c))
+
+    def residuals(x: Array) -> Array:
+        return np.array([*(force(x) - F) / largest / 0.003, (x[1] - _SQUARE) / 0.3, x[2] / 0.5])
+
+    start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), _SQUARE, 0.0]
+    fit = least_squares(residuals, start, bounds=([-np.inf, 0.0, -np.inf], [np.inf, 1.0, np.inf])).x
+    found: dict[str, float] = {}
+    for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):
+        if not end or astern:
+            for key, share in (("a_t", fit[1]), ("b_t", 1.0 - fit[1])):
+                found[coefficient_name(f"{key}{end}", curve.name)] = float(np.exp(fit[0]) * ratio * share)
+    return found
+
+
+def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[Recorded]) -> dict[str, float]:
+    """Return drag and β from a large velocity and the thrust in the tests, as the centre of their prior."""
+    points = [(abs(row.value), row.command) for name, rows in tests.rows("steady") if name == axis.name for row in rows]
+    V = max((value for value, _ in points), default=0.0) or typical(logs, axis) or 1.0
+    forces = [abs(rov.force(axis, command)) for _, command in points] or [*_forces(rov, axis, logs)]
+    F = float(np.quantile(forces, 0.9)) if forces else 0.0
+    F = F or 0.3 * rov.strongest(axis) or 1.0
+    a, b = _QUADRATIC * F / V**2, (1.0 - _QUADRATIC) * F / V
+    pairs = {"a_d": a, "b_d": b, f"a_d{REVERSE}": a, f"b_d{REVERSE}": b}
+    if axis.coefficient("m_a") not in rov.coefficients:
+        pairs["beta"] = 1.0 / _ADDED
+    return {
+        name: value
+        for key, value in pairs.items()
+        if (name := axis.coefficient(key)) in rov.layout.coefficients and name not in tests.given.known
+    }
+
+
+def _forces(rov: Rov, axis: Axis, logs: Sequence[Recorded]) -> Iterator[float]:
+    """Yield the sizes of the thrust along an axis for some rows of the logs."""
+    for one in logs:
+        if axis.name not in one.layout.kinds:
+            continue
+        names = [*one.layout.inputs]
+        part = Rov(one.layout, {name: rov[name] for name in one.layout.coefficients})
+        for row in one.record.inputs[:: max(1, len(one.record.inputs) // 100)]:
+            thrust = part.commanded(one.layout.usual_inputs | dict(zip(names, row.tolist(), strict=True)))
+            force = sum(part.effect(t, axis) * thrust[t.name] for t in one.layout.drivers(axis))
+            if force:
+                yield abs(force)
+
+
+def _table_rows(tests: Tests, rov: Rov) -> Iterator[TableRow]:
+    """Yield all rows of tables that count."""
+    curves = {curve.name: curve for curve in rov.layout.curves}
+    for kind in KINDS:
+        if kind == "log":
+            continue
+        quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
+        for subject, rows in tests.rows(kind):
+            largest = max(abs(row.value) for row in rows)
+            for row in rows:
+                if not tests.counts(kind, subject, row.command):
+                    continue
+                of = curves[subject] if kind == "thrust" else AXES[subject]
+                scale = largest if kind == "thrust" else abs(row.value)
+                noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
+                yield TableRow(noise, of, quantity, row.command, row.value, scale)

@@ -1,0 +1,144 @@
+"""What a slow force or a slow change of thrust follows: the voltage, the depth, the distance, or nothing that is known.
+
+A slow process f has the covariance q² exp(-|Δt| / τ). A cause c(t) explains it if f = k c + rest, with a much smaller
+rest. Both models are compared by the likelihood of f over all logs, where k is whatever fits best and costs one
+parameter (the Bayesian information criterion, an approximation of 2 ln of the Bayes factor).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from rov_fmu.engine.filter import Run
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.model.layout import SURGE, SWAY, Axis
+from rov_fmu.tank.arrays import Array
+
+ENOUGH, AHEAD = 10.0, 6.0
+"""A cause is named if 2 ln of its Bayes factor exceeds that of no cause by so much, and that of the next one."""
+_CHANNELS = {"voltage": "the voltage", "roll angle": "the roll", "pitch angle": "the pitch", "depth": "the depth"}
+"""The channels that may be causes, and their names."""
+_STEP = 1.0
+"""The time between two values that are compared, s."""
+_LEAST = 3.0
+"""A log tells something about causes if it is longer than so many time constants of the slow process."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """The slow process in one log, and what it may follow, at equal times."""
+
+    time: Array
+    slow: Array
+    causes: Mapping[str, Array]
+
+
+def cause_of(
+    objective: Objective, z: Array, runs: Sequence[Run], places: Sequence[int], time_constant: float, axis: Axis | None
+) -> str:
+    """Return what a slow process follows in words, such as `the voltage`, or an empty text.
+
+    `runs` has the states of the filter for each log, and `places` where the process is among them; -1 where it is not.
+    Without an axis the process is a change of all thrust.
+    """
+    pieces = [
+        _piece(objective, z, n, run, place, axis)
+        for n, (run, place) in enumerate(zip(runs, places, strict=True))
+        if place >= 0
+    ]
+    pieces = [piece for piece in pieces if np.ptp(piece.time) > _LEAST * time_constant]
+    if not pieces:
+        return ""
+    common = set.intersection(*(set(piece.causes) for piece in pieces))
+    effective = sum(float(np.ptp(piece.time)) for piece in pieces) / time_constant
+    found = {name: _evidence(pieces, name, time_constant, effective) for name in sorted(common)}
+    if not found:
+        return ""
+    best = max(found, key=lambda name: found[name])
+    others = [value for name, value in found.items() if name != best]
+    is_clear = found[best] > ENOUGH and found[best] > max(others, default=0.0) + AHEAD
+    return best if is_clear else ""
+
+
+def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, axis: Axis | None) -> _Piece:
+    one, record = objective.logs[number], objective.records[number]
+    time = np.arange(record.time[0], record.time[-1], _STEP)
+
+    def at(times: Array, values: Array) -> Array:
+        return np.asarray(np.interp(time, times, values), np.float64)
+
+    causes = {"the time": time - time[0]}
+    for quantity, words in _CHANNELS.items():
+        channel = one.log.used(quantity)
+        if channel is not None and channel.count > 2 and np.ptp(channel.values[channel.there]) > 0.0:
+            causes[words] = at(channel.time[channel.there], channel.values[channel.there])
+    thrust = thrust_along(objective, z, number, time, axis)
+    if axis is None:
+        causes["the command"] = np.abs(thrust)
+    else:
+        causes["the command"] = thrust
+        distance = _distance(objective, number, run, time, axis)
+        if distance is not None:
+            causes["the distance"] = distance
+        if "the voltage" in causes:
+            causes["the voltage"] = (causes["the voltage"] - causes["the voltage"].mean()) * thrust
+    return _Piece(time, at(record.time, run.states[:, place]), causes)
+
+
+def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis: Axis | None) -> Array:
+    """Return the thrust along an axis that the model commands, N or N m; without an axis, the largest command."""
+    one, record = objective.logs[number], objective.records[number]
+    rows = np.maximum(np.searchsorted(record.told, time, side="right") - 1, 0)
+    inputs = record.inputs[rows]
+    names = [*one.layout.inputs]
+    if axis is None:
+        thrusters = [names.index(f"u_{thruster.name}") for thruster in one.layout.thrusters]
+        return np.asarray(np.max(np.abs(inputs[:, thrusters]), axis=1))
+    rov = Objective.rov_of(objective.table.coefficients(z.tolist()), one)
+    found = []
+    for row in inputs.tolist():
+        thrust = rov.commanded(one.layout.usual_inputs | dict(zip(names, row, strict=True)))
+        found.append(sum(rov.effect(t, axis) * thrust[t.name] for t in one.layout.drivers(axis)))
+    return np.array(found)
+
+
+def _distance(objective: Objective, number: int, run: Run, time: Array, axis: Axis) -> Array | None:
+    """Return the distance from the start along surge or sway, which a tether resists; None along other axes."""
+    states, record = objective.filters[number].vehicle_states, objective.records[number]
+    if axis not in (SURGE, SWAY) or not {"x", "y"} <= {*states}:
+        return None
+
+    def at(name: str) -> Array:
+        return np.asarray(np.interp(time, record.time, run.states[:, states.index(name)]), np.float64)
+
+    x, y = at("x"), at("y")
+    psi = at("psi") if "psi" in states else np.zeros(len(time))
+    north, east = x - x[0], y - y[0]
+    ahead, starboard = north * np.cos(psi) + east * np.sin(psi), east * np.cos(psi) - north * np.sin(psi)
+    return np.asarray(ahead if axis is SURGE else starboard)
+
+
+def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effective: float) -> float:
+    """Return 2 ln of the Bayes factor of a cause against none. `effective` is the number of independent values.
+
+    Neighbouring values of a filter's estimate say nearly the same, so that only one in each time constant counts.
+    """
+    slow: list[Array] = []
+    cause: list[Array] = []
+    for piece in pieces:
+        root = np.linalg.cholesky(_correlation(piece.time, time_constant))
+        for values, into in ((piece.slow, slow), (piece.causes[name] - piece.causes[name].mean(), cause)):
+            into.append(np.linalg.solve(root, values))
+    f, c = np.concatenate(slow), np.concatenate(cause)
+    power = float(c @ c)
+    if power <= 0.0:
+        return 0.0
+    rest = f - c * float(c @ f) / power
+    return effective * log(float(f @ f) / max(float(rest @ rest), 1e-300)) - log(effective)
+
+
+def _correlation(time: Array, time_constant: float) -> Array:
+    apart = np.abs(time[:, None] - time)
+    return np.asarray(np.exp(-apart / time_constant) + 1e-6 * np.eye(len(time)), np.float64)

@@ -1,0 +1,100 @@
+"""What is slow and not explained by the model: forces, changes of all thrust, and velocities over ground."""
+
+from collections.abc import Iterator, Sequence
+from math import inf, log
+
+import numpy as np
+
+from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.identify.causes import cause_of, thrust_along
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import Minimum
+from rov_fmu.identify.result import KEPT, Disturbance
+from rov_fmu.model.layout import HEAVE
+from rov_fmu.tank.arrays import Array
+
+_LITTLE = 0.05
+"""A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
+_KINDS = {"slow force": "force", "slow gain": "gain", "slow velocity": "velocity"}
+
+
+def disturbances(objective: Objective, best: Minimum, posterior: Posterior) -> Iterator[Disturbance]:
+    """Yield each slow process of the model as it is in the log where it is largest, with the evidence for it."""
+    runs = [objective.run(best.z, n, with_states=True) for n in range(len(objective.logs))]
+    for place, p in enumerate(objective.table.parameters):
+        if p.kind in _KINDS:
+            evidence = _evidence(objective, best, posterior, place)
+            found = [_disturbance(objective, n, best.z, p, runs, evidence) for n in range(len(runs))]
+            present = [one for one in found if one]
+            if present:
+                yield max(present, key=lambda one: one.share)
+
+
+def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: int) -> float:
+    """Return 2 ln of the ratio of the likelihoods with a slow process and without, less the price of one parameter.
+
+    The price is how much the data narrow its prior (the Laplace approximation of the Bayes factor).
+    """
+    p, z = objective.table.parameters[place], best.z
+    without = z.copy()
+    without[place] = p.low
+    try:
+        evidence = objective.value(without, objective.runs(without, best.runs)) - best.value
+    except DivergedError:
+        return inf
+    evidence -= ((p.low - p.mean) / p.deviation) ** 2 - ((z[place] - p.mean) / p.deviation) ** 2
+    return float(evidence) - 2.0 * log(max(p.deviation / posterior.errors[place], 1.0))
+
+
+def _disturbance(
+    objective: Objective, number: int, z: Array, parameter: Parameter, runs: Sequence[Run], evidence: float
+) -> Disturbance | None:
+    """Return a slow process in one log; None if the log does not have it."""
+    one, run = objective.logs[number], runs[number]
+    places = [_place(objective, n, parameter) for n in range(len(runs))]
+    if places[number] < 0:
+        return None
+    axis = next((form.axis for form in one.layout.axes if form.axis.name == parameter.of), None)
+    columns = [places[number]]
+    if parameter.kind == "slow velocity" and axis is not HEAVE:
+        columns.append(columns[0] + 1)
+    states, deviations = run.states[:, columns], run.deviations[:, columns]
+    size = float(np.sqrt(np.mean(np.sum(states**2, axis=1))))
+    time, cause, unit, usual = objective.records[number].time, "", "1", 1.0
+    if parameter.kind == "slow force":
+        assert axis
+        unit = axis.load
+        usual = max(
+            _rms(thrust_along(objective, z, number, time[::10], axis)), _LITTLE * objective.table.full[axis.name]
+        )
+    elif parameter.kind == "slow velocity":
+        unit = "m/s"
+        speeds = [
+            n
+            for n, form in enumerate(one.layout.axes)
+            if not form.axis.is_rotation and (form.axis is HEAVE) == (axis is HEAVE)
+        ]
+        usual = max(_rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
+    if evidence > KEPT and parameter.kind != "slow velocity":
+        cause = cause_of(objective, z, runs, places, SLOW[parameter.kind], axis)
+    clear = np.flatnonzero(np.any(np.abs(states) > 2.0 * deviations, axis=1))
+    since = float(time[clear[0]] - time[0]) if len(clear) else None
+    kind = _KINDS[parameter.kind]
+    return Disturbance(kind, axis, one.log.file, size, unit, size / usual, since, evidence, cause)  # type: ignore[arg-type]
+
+
+def _place(objective: Objective, number: int, parameter: Parameter) -> int:
+    """Return where a slow process is among the states of the filter of a log, or -1. A velocity has its first one."""
+    one, filter_of = objective.logs[number], objective.filters[number]
+    names = [form.axis.name for form in one.layout.axes]
+    if parameter.kind == "slow gain":
+        return filter_of.gain
+    if parameter.kind == "slow velocity":
+        return filter_of.drift + (2 if parameter.of == HEAVE.name else 0)
+    return filter_of.force + names.index(parameter.of) if parameter.of in names else -1
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,266 @@
+"""Reduce the vehicle that rov.toml describes to the part that can be identified from the tests."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rov_fmu.io.messages import listed
+from rov_fmu.io.toml_file import key_line
+from rov_fmu.model.layout import (
+    ARM,
+    AXES,
+    AXIS,
+    COUPLED_AXES,
+    CURVE,
+    REVERSE,
+    YAW,
+    Axis,
+    CoefficientKind,
+    Curve,
+    Layout,
+    coefficient_name,
+)
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.description import Description, Requests
+from rov_fmu.tank.findings import Finding
+from rov_fmu.vehicle.description import Head
+from rov_fmu.vehicle.geometry import check_layout, check_part_names, check_thruster_places
+from rov_fmu.vehicle.quantity import Quantity
+
+UNKNOWN = 1.0
+"""The value of a coefficient that is yet to be identified."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is known about the vehicle before the identification."""
+
+    description: Description
+    """The vehicle as rov.toml describes it."""
+    head: Head
+    rov: Rov
+    """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
+    their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
+    needs. The fits add reverse thrust, dead band, lag and load if they find them."""
+    known: Mapping[str, Quantity]
+    """The coefficients that are given, not identified."""
+    thruster_sources: Mapping[str, Mapping[str, str]]
+    """The sources of each thruster's direction and position."""
+    base: Mapping[str, float]
+    """The coefficients of the base and those that are known: the centre of the prior."""
+    requests: Requests
+    """The requests that concern the remaining curves."""
+
+
+@dataclass(frozen=True)
+class Tested:
+    """What the files of a folder test."""
+
+    thrust: Mapping[str, tuple[str, bool]]
+    """By curve: the first file, and whether negative commands count."""
+    steady: Mapping[str, bool]
+    """By axis: whether negative commands count."""
+    time_constants: Collection[str]
+    """The axes with time constants."""
+    logs: Collection[str]
+    """The axes with logs."""
+
+    @property
+    def axes(self) -> set[str]:
+        """The names of all axes that are tested."""
+        return {*self.steady, *self.time_constants, *self.logs}
+
+
+@dataclass(frozen=True)
+class Narrowed:
+    """The vehicle that can be identified from the tests, or the mistakes that prevent it."""
+
+    given: Given | None
+    rov_file_mistakes: tuple[str, ...] = ()
+    """Lines about rov.toml."""
+    test_mistakes: tuple[str, ...] = ()
+    """Lines about missing tests, and about coefficients that are both given and tested."""
+    findings: tuple[Finding, ...] = ()
+    """What is left out of the vehicle."""
+
+
+def narrowed(description: Description, tested: Tested, folder: Path, useless: Sequence[str] = ()) -> Narrowed:
+    """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing.
+
+    `useless` has a line for each log that tests nothing.
+    """
+    known = {**_kept_from_base(description, tested), **description.known}
+    wide = _without_unknown_options(description.layout, known)
+    axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
+    layout = _with_axes_alone(wide, axes)
+    if not layout.axes:
+        line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
+        return Narrowed(None, test_mistakes=tuple(useless) or (line,))
+    hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
+    hardware = hardware or [*check_part_names(_with_every_effect(layout, description.requests))]
+    hardware += _missing_hardware(description, layout, known)
+    tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
+    if hardware or tests or description.tables.vehicle is None:
+        in_rov_file = tuple(f"{description.path}: {mistake}" for mistake in hardware)
+        return Narrowed(None, in_rov_file, tuple(f"{folder}: {mistake}" for mistake in tests))
+    given = _given(description, description.tables.vehicle, layout, known)
+    return Narrowed(given, findings=tuple(_left_out(description, tested, layout)))
+
+
+def _given(description: Description, head: Head, layout: Layout, known: Mapping[str, Quantity]) -> Given:
+    names = layout.coefficients
+    return Given(
+        description=description,
+        head=head,
+        rov=Rov(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
+        known={name: known[name] for name in names if name in known},
+        thruster_sources={one.name: description.thruster_sources[one.name] for one in layout.driven},
+        base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
+        requests=description.requests.of({curve.name for curve in layout.curves}),
+    )
+
+
+def _kept_from_base(description: Description, tested: Tested) -> dict[str, Quantity]:
+    """Return the coefficients of the base that no test replaces."""
+    requests = description.requests
+    replaced = {coefficient_name("T", name) for name in requests.lag}
+    for curve in description.layout.curves:
+        if curve.name in tested.thrust:
+            _, backward = tested.thrust[curve.name]
+            whole_curve = backward or f"a_t{REVERSE}" not in curve.keys
+            keys = [key for key in CURVE if key != "T"] if whole_curve else ["a_t", "b_t"]
+            replaced |= {coefficient_name(key, curve.name) for key in keys}
+    for form in description.layout.axes:
+        name = form.axis.name
+        keys = []
+        if name in tested.logs or name in tested.steady:
+            keys += ["a_d", "b_d"]
+        if name in tested.logs or tested.steady.get(name, False):
+            keys += ["a_d_reverse", "b_d_reverse"]
+        if name in tested.logs or name in tested.time_constants:
+            keys += ["beta"]
+        if name in tested.logs:
+            keys += ["F_0"]
+        replaced |= {form.axis.coefficient(key) for key in keys}
+    return {name: quantity for name, quantity in description.base_quantities.items() if name not in replaced}
+
+
+# ---- The reduced layout ----------------------------------------------------------------------------------------------
+
+
+def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
+    """Drop the coefficients that a vehicle need not have, unless they are known."""
+
+    def remaining(keys: tuple[str, ...], kinds: Mapping[str, CoefficientKind], owner: str) -> tuple[str, ...]:
+        return tuple(key for key in keys if kinds[key].needed or coefficient_name(key, owner) in known)
+
+    axes = tuple(replace(form, keys=remaining(form.keys, AXIS, form.axis.velocity)) for form in layout.axes)
+    curves = tuple(replace(curve, keys=remaining(curve.keys, CURVE, curve.name)) for curve in layout.curves)
+    return replace(layout, axes=axes, curves=curves)
+
+
+def _with_every_effect(layout: Layout, requests: Requests) -> Layout:
+    """Return the layout with all coefficients that the fits may add, so that their names can be checked beforehand."""
+    asked: dict[str, tuple[str, ...]] = {"T": requests.lag, "d": (), "d_reverse": ()}
+
+    def keys(curve: Curve) -> tuple[str, ...]:
+        return tuple(key for key in CURVE if key in curve.keys or curve.name in asked.get(key, (curve.name,)))
+
+    axes = tuple(replace(form, keys=tuple(AXIS)) for form in layout.axes)
+    curves = tuple(replace(curve, keys=keys(curve)) for curve in layout.curves)
+    return replace(layout, axes=axes, curves=curves, has_dead_time=True)
+
+
+def _is_tested_or_known(axis: Axis, tested: Tested, known: Collection[str]) -> bool:
+    return axis.name in tested.axes or {axis.coefficient("a_d"), axis.coefficient("b_d")} <= {*known}
+
+
+def _with_axes(layout: Layout, axes: Collection[Axis]) -> Layout:
+    return replace(layout, axes=tuple(form for form in layout.axes if form.axis in axes))
+
+
+def with_axis_alone(layout: Layout, axis: Axis) -> Layout:
+    """Return the part of a layout that moves along one axis."""
+    return _with_axes_alone(layout, [axis])
+
+
+def _with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
+    """Keep these axes, the thrusters and fins that act on them, and the curves and inputs of these."""
+    layout = _with_axes(layout, axes)
+    thrusters = tuple(t for t in layout.thrusters if any(t in layout.drivers(axis) for axis in axes))
+    fins = tuple(fin for fin in layout.fins if any(fin.effect(axis) for axis in axes))
+    names = {thruster.name for thruster in thrusters} | {fin.name for fin in fins}
+    mix = {
+        name: {thruster: gain for thruster, gain in gains.items() if thruster in names}
+        for name, gains in layout.mix.items()
+    }
+    layout = replace(
+        layout,
+        thrusters=thrusters,
+        fins=fins,
+        mix={name: gains for name, gains in mix.items() if any(gains.values())},
+        coupled=layout.coupled and all(layout.has(axis) for axis in COUPLED_AXES),
+    )
+    # An input that drives none of the axes has gains that cancel each other.
+    driving = {name for axis in axes for name in layout.signs(axis)}
+    driving |= {name for fin in fins for name in layout.gains[fin.name]}
+    kept = {name: gains for name, gains in layout.mix.items() if f"u_{name}" in driving}
+    driven = {name for gains in kept.values() for name, gain in gains.items() if gain} if layout.mix else names
+    thrusters = tuple(thruster for thruster in thrusters if thruster.name in driven)
+    curves = {thruster.curve for thruster in thrusters}
+    curves_left = tuple(curve for curve in layout.curves if curve.name in curves)
+    return replace(layout, mix=kept, thrusters=thrusters, curves=curves_left)
+
+
+def _left_out(description: Description, tested: Tested, layout: Layout) -> Iterator[Finding]:
+    """Yield a finding for each part that is described or tested but not in the layout."""
+    for name in description.axes:
+        if name not in layout.kinds:
+            drag = ", ".join(AXES[name].coefficient(key) for key in ("a_d", "b_d"))
+            yield Finding("axis left out", axis=name, names={"drag": drag})
+    if layout.fins:
+        yield Finding("fins not fitted", names={"fins": listed([fin.name for fin in layout.fins])})
+    if description.layout.coupled and not layout.coupled:
+        yield Finding("not coupled")
+    for name, (file, _) in tested.thrust.items():
+        if name not in {curve.name for curve in layout.curves}:
+            yield Finding("unused curve", curve=name, file=file)
+
+
+# ---- Missing and doubled coefficients --------------------------------------------------------------------------------
+
+
+def _missing_hardware(description: Description, layout: Layout, known: Collection[str]) -> Iterator[str]:
+    """Yield a line for each missing mass or dimension, which no test determines."""
+    needed: dict[str, Axis] = {form.axis.inertia: form.axis for form in reversed(layout.axes)}
+    if layout.has_arm:
+        needed |= dict.fromkeys(ARM, YAW)
+    for name in layout.coefficients:
+        if name in needed and name not in {*known, *description.named}:
+            form = f'{name} = {{ value = ..., unit = "{layout.coefficients[name].unit}", source = "..." }}'
+            table = ("arm" if name in ARM else "body") if description.has_hardware_tables else "known"
+            yield key_line(f"{table}.{name}", f"this key is missing, and the vehicle has {needed[name].name}: {form}")
+
+
+def _missing_or_doubled_tests(
+    description: Description, tested: Tested, layout: Layout, known: Collection[str]
+) -> Iterator[str]:
+    """Yield a line for each coefficient that neither a test nor rov.toml gives, and for each that both give."""
+    for curve in layout.curves:
+        names = curve.coefficient("a_t"), curve.coefficient("b_t")
+        if curve.name not in tested.thrust:
+            if not {*names} & {*known, *description.named}:
+                yield f"no thrust_{curve.name}*.csv, and [known] in rov.toml does not give {names[0]}"
+            continue
+        file, backward = tested.thrust[curve.name]
+        reverse_names = tuple(f"{name}{REVERSE}" for name in names)
+        for pair in (names, reverse_names) if backward else (names,):
+            if given := [name for name in pair if name in description.known]:
+                yield f"rov.toml gives {', '.join(given)}, but there is {file} too"
+    for axis in (form.axis for form in layout.axes):
+        drag = [name for name in (axis.coefficient("a_d"), axis.coefficient("b_d")) if name not in known]
+        if drag and axis.name not in {*tested.steady, *tested.logs}:
+            yield (
+                f"no steady_{axis.name}*.csv or log of {axis.name} that counts, and [known] in rov.toml does not give "
+                f"{', '.join(drag)}"
+            )

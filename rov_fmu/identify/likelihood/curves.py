@@ -1,0 +1,107 @@
+"""The shape of thrust curves, and the motion of one axis with it.
+
+A curve is a scale times a shape. The shape may deviate smoothly from that of the prior curve: a command c acts like the
+command c (1 + eta(c)) of the prior curve, where eta is linear between knots, constant below the first one, and 0 at
+full command, which the scale describes. eta has a Gaussian prior with a correlation length, and the deviations ahead
+and astern are correlated by one half.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout, delayed_name
+from rov_fmu.model.riccati import Riccati
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
+
+KNOTS = (0.1, 0.25, 0.45, 0.7)
+"""The commands at which eta is a parameter."""
+_LENGTH = 0.3
+"""The correlation length of the deviations, in commands."""
+_POWER = 1.5
+"""Thrust grows about with this power of the command: a deviation of the force is as many times that of the command."""
+COUNT = 2 * len(KNOTS)
+
+
+@cache
+def _root() -> Array:
+    """Return the root of the correlation of eta at the knots ahead and then astern, given that it is 0 at 1."""
+    c = np.array([*KNOTS, 1.0])
+    K = np.exp(-0.5 * ((c[:, None] - c) / _LENGTH) ** 2)
+    conditional = K[:-1, :-1] - np.outer(K[:-1, -1], K[-1, :-1])
+    both = np.kron([[1.0, 0.5], [0.5, 1.0]], conditional)
+    return np.asarray(np.linalg.cholesky(both + 1e-9 * np.eye(COUNT)), np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """The deviations of the shapes of some curves."""
+
+    of: Mapping[str, Array]
+    """By curve: COUNT independent coordinates times the relative deviation of the force."""
+    exact_astern: frozenset[str] = frozenset()
+    """The curves that do not deviate astern."""
+
+    def commands(self, curve: str, commands: Array) -> Array:
+        """Return the commands of the prior curve that act like some commands of a curve."""
+        if curve not in self.of:
+            return commands
+        eta = _root() @ self.of[curve] / _POWER
+        size = np.abs(commands)
+        half = len(KNOTS)
+        ends = [*KNOTS, 1.0]
+        ahead, astern = (np.interp(size, ends, [*part, 0.0]) for part in (eta[:half], eta[half:]))
+        if curve in self.exact_astern:
+            astern = 0.0 * astern
+        return np.asarray(np.sign(commands) * np.clip(size * (1.0 + np.where(commands < 0.0, astern, ahead)), 0.0, 1.0))
+
+    def inputs(self, layout: Layout, inputs: Array) -> Array:
+        """Return rows of inputs with the commands of the prior curves. The inputs of the layout are its thrusters'."""
+        if not self.of:
+            return inputs
+        found, names = inputs.copy(), [*layout.inputs]
+        for name, curve in layout.curve_of.items():
+            place = names.index(f"u_{name}")
+            found[:, place] = self.commands(curve.name, inputs[:, place])
+        return found
+
+    def force(self, rov: Rov, curve: Curve, command: float) -> float:
+        """Return the steady thrust of all thrusters that a curve describes together, N."""
+        (acting,) = self.commands(curve.name, np.array([command])).tolist()
+        return curve.together * rov.curve_force(curve, acting)
+
+    def motion(self, rov: Rov, axis: Axis, command: float) -> Riccati:
+        """Return the equation of an axis alone under a held command, once the thrust is steady."""
+        layout = rov.layout
+        inputs = dict(layout.usual_inputs)
+        for name, value in layout.driving(axis, command).items():
+            curve = layout.curve_of.get(name.removeprefix("u_"))
+            acting = self.commands(curve.name, np.array([value])) if curve else [value]
+            inputs[name] = inputs[delayed_name(name)] = float(acting[0])
+        F = rov.commanded(inputs)
+        along = sum(rov.effect(t, axis) * F[t.name] for t in layout.drivers(axis))
+        return rov.acceleration_of(layout.kinds[axis.name], along, loss=rov.loss(axis, inputs))
+
+
+NO_SHAPES = Shapes({})
+
+
+def fitted(curve: Curve, force: Callable[[float], float], c_0: float, low: float, high: float) -> dict[str, float]:
+    """Return the coefficients a_t and b_t, ahead and astern, that are nearest to a curve over the tested commands.
+
+    `force` is the thrust of one command (N); the relative errors have equal weights over low to high.
+    """
+    found: dict[str, float] = {}
+    low = max(low, c_0 + 0.05)
+    commands = np.linspace(low, max(high, low + 0.1), 40)
+    for end, sign in (("", 1.0), (REVERSE, -1.0)):
+        if f"a_t{end}" not in curve.keys:
+            continue
+        F = np.array([sign * force(sign * c) for c in commands.tolist()])
+        beyond = commands - c_0
+        a, b = np.linalg.lstsq(np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F)), rcond=None)[0]
+        found |= {curve.coefficient(f"a_t{end}"): float(a), curve.coefficient(f"b_t{end}"): float(b)}
+    return found

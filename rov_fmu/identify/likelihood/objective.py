@@ -1,0 +1,231 @@
+"""The objective of the identification, which everything else follows from.
+
+The model of a log is a stochastic differential equation around the vehicle's equation of motion (Kristensen, Madsen and
+Jorgensen 2004, doi:10.1016/j.automatica.2003.10.001; Ljung, System Identification, 1999, chapter 7):
+
+    x' = f(x, (1 + g) F(c), theta) + slow force      y_k = h(x(t_k)) + n_k + e_k
+
+An extended Kalman filter (fmu_src/engine/filter.c) predicts each sample from the samples before it, and gives the
+innovation eps_k and its variance S_k. The coefficients theta and the noise phi minimise together
+
+    J(theta, phi) = sum_k [ log S_k + rho(eps_k^2 / S_k) ]  -  2 log prior(theta, phi)
+
+where rho(u^2) = u^2 up to |u| = 4 and grows linearly in |u| beyond (Huber). The rows of the tables of tank tests are
+samples too: their innovation is measured minus model, and S is the square of their noise.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from rov_fmu.engine.filter import Filter, Run
+from rov_fmu.engine.simulation import usable_cores
+from rov_fmu.identify.likelihood.curves import Shapes
+from rov_fmu.identify.likelihood.parameters import Parameter, Table
+from rov_fmu.identify.likelihood.records import Recorded
+from rov_fmu.model.layout import Axis, Curve, Layout
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
+
+_QUICK_STEPS = {"changing": 0.025, "share": 1.0}
+"""Longer steps of the filter for a quick fit to fewer samples."""
+OUTLYING = 4.0
+"""The size of an innovation, in standard deviations, from which it counts less (as in filter.c)."""
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A row of a table of tank tests."""
+
+    noise: str
+    """The name of its noise among the parameters."""
+    subject: Curve | Axis
+    quantity: str
+    """force, V_ss or Tau."""
+    command: float
+    measured: float
+    scale: float
+    """What the noise is relative to: the largest force of the table, or the measured value."""
+
+    def depends_on(self, parameter: Parameter, layout: Layout) -> bool:
+        """Return True if a parameter changes the value by the model."""
+        if not parameter.of_motion or parameter.log is not None:
+            return False
+        if isinstance(self.subject, Curve):
+            return parameter.of == self.subject.name
+        curves = {thruster.curve for thruster in layout.drivers(self.subject)}
+        return parameter.of in {"", self.subject.name, *curves}
+
+    def model(self, rov: Rov, shapes: Shapes) -> float:
+        """Return the value by the model, in the unit of the row."""
+        if isinstance(self.subject, Curve):
+            return shapes.force(rov, self.subject, self.command)
+        motion = shapes.motion(rov, self.subject, self.command)
+        return motion.steady_velocity() if self.quantity == "V_ss" else motion.time_constant()
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """The innovations of one log, or those of all rows of tables, with their derivatives. n samples, p parameters."""
+
+    innovations: Array
+    variances: Array
+    slopes: Array
+    """n x p: the derivatives of the innovations."""
+    log_slopes: Array
+    """n x p: the derivatives of log S."""
+
+    @property
+    def normalised(self) -> Array:
+        return self.innovations / np.sqrt(self.variances)
+
+    def information(self, chosen: Array | slice = slice(None)) -> tuple[Array, Array]:
+        """Return the gradient and the Fisher information of the part of J that some samples contribute."""
+        u = self.normalised[chosen]
+        weight = np.minimum(1.0, OUTLYING / np.maximum(np.abs(u), 1e-300))
+        A = self.slopes[chosen] / np.sqrt(self.variances[chosen])[:, None]
+        B = self.log_slopes[chosen]
+        return 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u), 2.0 * A.T @ A + B.T @ B
+
+
+def cost(innovations: Array, variances: Array) -> float:
+    """Return the sum over the samples of log S + rho(eps^2 / S)."""
+    u = np.abs(innovations) / np.sqrt(variances)
+    rho = np.where(u > OUTLYING, OUTLYING**2 + 2.0 * OUTLYING * (u - OUTLYING), u * u)
+    return float(np.sum(np.log(variances) + rho))
+
+
+class Objective:
+    """J for some logs and rows of tables."""
+
+    def __init__(
+        self, table: Table, logs: Sequence[Recorded], rows: Sequence[TableRow], *, thinned: bool = False
+    ) -> None:
+        """Make the filters. Raises BuildError."""
+        self.table, self.logs, self.rows = table, logs, rows
+        self.records = [one.thinned if thinned else one.record for one in logs]
+        steps = _QUICK_STEPS if thinned else {}
+        self.filters = [Filter(self.rov_of(table.base, one), **steps) for one in logs]
+        p = table.parameters
+        self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
+        self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
+
+    @staticmethod
+    def rov_of(coefficients: "dict[str, float] | object", one: Recorded) -> Rov:
+        """Return the part of the vehicle that a log concerns."""
+        return Rov(one.layout, {name: coefficients[name] for name in one.layout.coefficients})  # type: ignore[index]
+
+    # ---- One log ----
+
+    def run(self, z: Array, number: int, **how: object) -> Run:
+        """Run the filter through a log. The options are those of `Filter.run`. Raises DivergedError."""
+        parameters = self.table.of_log(z.tolist(), self.logs[number])
+        return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
+
+    def concerns(self, parameter: Parameter, number: int) -> bool:
+        """Return False where a parameter certainly does not change what is predicted of a log."""
+        one = self.logs[number]
+        if parameter.log is not None:
+            return parameter.of == one.log.file
+        axes, curves = one.layout.kinds, {curve.name for curve in one.layout.curves}
+        if parameter.kind == "row noise":
+            return False
+        if parameter.kind in ("white noise", "coloured noise", "correlation time"):
+            return parameter.of in {m.channel.quantity.name for m in one.measured}
+        return parameter.of in {"", "horizontal", *axes, *curves}
+
+    # ---- All data ----
+
+    def runs(self, z: Array, earlier: Sequence[Run] | None = None) -> list[Run]:
+        """Run the filter through all logs, with the steps of earlier runs if they are given."""
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            jobs = [
+                pool.submit(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))
+            ]
+            return [job.result() for job in jobs]
+
+    def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
+        """Return the innovations of all or some rows of tables and their variances."""
+        rows = self.rows if rows is None else rows
+        rov = Rov(self.table.layout, self.table.coefficients(z.tolist()))
+        shapes = self.table.shapes(z.tolist())
+        off = np.array([row.measured - row.model(rov, shapes) for row in rows])
+        noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
+        return off, noise**2
+
+    def prior(self, z: Array) -> float:
+        """Return the part of J that the priors contribute."""
+        return float(np.sum(((z - self.mean) / self.deviation) ** 2))
+
+    def value(self, z: Array, runs: Sequence[Run]) -> float:
+        """Return J for the runs of some parameters."""
+        total = self.prior(z)
+        for run in runs:
+            total += cost(run.innovations, run.variances)
+        if self.rows:
+            off, variances = self.row_values(z)
+            total += cost(off, variances)
+        return total if np.isfinite(total) else np.inf
+
+    def data(
+        self, z: Array, runs: Sequence[Run], earlier: Sequence[Data] | None = None, *, with_noise: bool = True
+    ) -> list[Data]:
+        """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
+
+        Those with respect to the motion are derivatives with the gains of the filter frozen: they take a tenth of the
+        time, and the change of the gains adds nothing to them on average. Without those with respect to the noise,
+        these are the ones of earlier data, or 0.
+        """
+        size = len(z)
+        found = [
+            Data(
+                run.innovations,
+                run.variances,
+                np.zeros((len(run.innovations), size)),
+                np.zeros((len(run.innovations), size)),
+            )
+            for run in runs
+        ]
+        work: list[Callable[[], None]] = []
+        for n, run in enumerate(runs):
+            for k, parameter in enumerate(self.table.parameters):
+                if not self.concerns(parameter, n):
+                    continue
+                if with_noise or parameter.of_motion:
+                    work.append(lambda n=n, k=k, run=run: self.differentiate(z, n, k, run, found[n]))  # type: ignore[misc]
+                elif earlier:
+                    found[n].slopes[:, k] = earlier[n].slopes[:, k]
+                    found[n].log_slopes[:, k] = earlier[n].log_slopes[:, k]
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            for job in [pool.submit(one) for one in work]:
+                job.result()
+        if self.rows:
+            found.append(self._rows_data(z))
+        return found
+
+    def differentiate(self, z: Array, n: int, k: int, run: Run, into: Data) -> None:
+        """Compute the derivatives of the innovations of a log with respect to one parameter."""
+        parameter = self.table.parameters[k]
+        moved = z.copy()
+        moved[k] += parameter.step
+        above = self.run(moved, n, repeated=run, frozen=parameter.of_motion)
+        into.slopes[:, k] = (above.innovations - run.innovations) / parameter.step
+        if not parameter.of_motion:
+            into.log_slopes[:, k] = np.log(above.variances / run.variances) / parameter.step
+
+    def _rows_data(self, z: Array) -> Data:
+        off, variances = self.row_values(z)
+        slopes, log_slopes = np.zeros((len(off), len(z))), np.zeros((len(off), len(z)))
+        for k, parameter in enumerate(self.table.parameters):
+            if parameter.kind == "row noise":
+                log_slopes[:, k] = [2.0 * (row.noise == parameter.of) for row in self.rows]
+            elif places := [n for n, row in enumerate(self.rows) if row.depends_on(parameter, self.table.layout)]:
+                some = [self.rows[n] for n in places]
+                up, down = z.copy(), z.copy()
+                up[k] += parameter.step
+                down[k] -= parameter.step
+                change = self.row_values(up, some)[0] - self.row_values(down, some)[0]
+                slopes[places, k] = change / (2.0 * parameter.step)
+        return Data(off, variances, slopes, log_slopes)

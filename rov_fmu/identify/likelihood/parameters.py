@@ -1,0 +1,379 @@
+"""The parameters of the likelihood: one table with what each is, its prior, and how it enters the model.
+
+Every parameter has a coordinate z with a normal prior, z ~ N(mean, deviation). A positive number enters as exp(z). The
+deviations are those that an engineer would accept; PRIORS has them with their reasons, and [priors] of rov.toml may
+change them. No deviation is estimated from one effect.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import exp, inf, log
+
+import numpy as np
+
+from rov_fmu.engine.filter import Parameters, Slow
+from rov_fmu.identify.likelihood.curves import COUNT, Shapes
+from rov_fmu.identify.likelihood.records import Recorded
+from rov_fmu.model.layout import HEAVE, REVERSE, Axis, Curve, Layout, coefficient_name
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A deviation that priors use, with its reason."""
+
+    deviation: float
+    words: str
+    """What deviates."""
+    reason: str
+
+
+PRIORS = {
+    "thrust": Prior(0.10, "all forces of a curve, relatively", "two thrusters of one type, or a maker's table"),
+    "thrust_shape": Prior(0.10, "the shape of a curve, relative to its force", "published curves differ so"),
+    "thrust_reverse": Prior(0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"),
+    "dead_band": Prior(0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
+    "lag": Prior(0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
+    "dead_time": Prior(0.05, "the time from a command to its effect, s", "links of one or two control periods"),
+    "inertia": Prior(0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
+    "quadratic_drag": Prior(1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"),
+    "linear_drag": Prior(1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"),
+    "drag_astern": Prior(0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
+    "load": Prior(0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
+    "current": Prior(0.1, "the current, m/s", "tests are made in calm water"),
+    "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
+    "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
+    "slow_gain": Prior(2.0, "ln of the size of a slow change of thrust", "1 %, within a factor of 7"),
+    "slow_velocity": Prior(2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"),
+    "white_noise": Prior(0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
+    "coloured_noise": Prior(1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"),
+}
+"""All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is
+absent. The noise of a sensor is never exact."""
+
+_SIZES = {"force": (0.001, 1e-7, 0.1), "gain": (0.01, 1e-6, 0.2), "velocity": (0.001, 1e-7, 0.3)}
+"""The usual, the least and the largest size of each slow process: relative to full thrust, a fraction, and m/s."""
+SLOW = {"slow force": 8.0, "slow gain": 60.0, "slow velocity": 8.0}
+"""The time constants of the slow processes, s."""
+_COLOURED = (0.3, 2.0)
+"""The usual coloured noise relative to the white noise, and its usual correlation time, s."""
+_QUIETER = 2.0
+"""The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
+USUAL_EXPONENT = 1.5
+"""The usual exponent of thrust over voltage."""
+_USUAL_LAG = 0.05
+"""The usual time constant of the lag of thrusters, s."""
+_MOTION_STEP = 1e-5
+"""The relative change of z for the derivatives of the motion. Much larger ones make the common scale of all forces,
+which the motion does not tell, look determined."""
+LEAST_LAG = 0.02
+"""The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
+
+OPTIONAL = ("reverse thrust", "dead band", "lag", "dead time", "drag astern", "load", "current", "voltage")
+"""The effects that are reported only with evidence."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of the likelihood."""
+
+    kind: str
+    """What it is, such as `quadratic drag`. Those in OPTIONAL are effects."""
+    of: str
+    """The name of the axis, the curve or the file that has it; empty for the vehicle."""
+    part: str = ""
+    """Which of several, such as `north` or a quantity."""
+    mean: float = 0.0
+    deviation: float = 1.0
+    """The prior of its coordinate z."""
+    is_log: bool = False
+    """True if the number is exp(z)."""
+    low: float = -inf
+    high: float = inf
+    """The bounds of z."""
+    null: float | None = None
+    """The z at which an effect is absent."""
+    of_motion: bool = True
+    """False for noise and slow processes, which change the covariance of the filter and not its mean."""
+    log: int | None = None
+    """The index of the log that alone has it."""
+    unit: str = "1"
+
+    @property
+    def step(self) -> float:
+        """The change of z for its numerical derivative."""
+        if not self.of_motion:
+            return 1e-2 if self.is_log else 1e-3
+        return _MOTION_STEP * (1.0 if self.is_log else self.deviation)
+
+
+@dataclass(frozen=True)
+class Table:
+    """All parameters, with the vehicle that they change."""
+
+    layout: Layout
+    """The layout with every coefficient that a parameter may change."""
+    base: Mapping[str, float]
+    """The coefficients where every effect is absent, and all other coefficients have their prior means."""
+    full: Mapping[str, float]
+    """By axis: the thrust or torque at full command, N or N m."""
+    parameters: tuple[Parameter, ...]
+    shape_deviation: float = PRIORS["thrust_shape"].deviation
+    exact: frozenset[str] = frozenset()
+    """The names of the coefficients that no parameter changes."""
+
+    def place(self, kind: str, of: str = "", part: str = "") -> int | None:
+        """Return the index of a parameter, or None."""
+        return self._places.get((kind, of, part))
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, str, str], int]:
+        return {(p.kind, p.of, p.part): n for n, p in enumerate(self.parameters)}
+
+    def get(self, z: Sequence[float], kind: str, of: str = "", part: str = "", default: float = 0.0) -> float:
+        """Return the number that a coordinate stands for, or a default where there is no such parameter."""
+        place = self.place(kind, of, part)
+        if place is None:
+            return default
+        value = float(z[place])
+        return exp(value) if self.parameters[place].is_log else value
+
+    def coefficients(self, z: Sequence[float]) -> dict[str, float]:
+        """Return all coefficients of the layout for the coordinates of the parameters."""
+        found = dict(self.base)
+        for form in self.layout.axes:
+            self._axis(found, z, form.axis)
+        for curve in self.layout.curves:
+            self._curve(found, z, curve)
+        return found | {name: self.base[name] for name in self.exact}
+
+    def _axis(self, found: dict[str, float], z: Sequence[float], axis: Axis) -> None:
+        for key, kind in (("a_d", "quadratic drag"), ("b_d", "linear drag")):
+            name = axis.coefficient(key)
+            found[name] = self.get(z, kind, axis.name, default=found[name])
+            astern = f"{key}{REVERSE}"
+            if (reverse := axis.coefficient(astern)) in self.layout.coefficients:
+                ratio = self.base[reverse] / self.base[name] if self.base[name] else 1.0
+                found[reverse] = found[name] * ratio * exp(self.get(z, "drag astern", axis.name))
+        beta = axis.coefficient("beta")
+        found[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
+        if (load := axis.coefficient("F_0")) in self.layout.coefficients:
+            found[load] = self.base[load] + self.full.get(axis.name, 0.0) * self.get(z, "load", axis.name)
+
+    def _curve(self, found: dict[str, float], z: Sequence[float], curve: Curve) -> None:
+        scale = self.get(z, "thrust scale", curve.name, default=1.0)
+        reverse = exp(self.get(z, "reverse thrust", curve.name))
+        if "k_t" in curve.keys:
+            found[curve.coefficient("k_t")] *= scale
+        for end, ratio in (("", 1.0), (REVERSE, reverse)):
+            names = [coefficient_name(f"{key}{end}", curve.name) for key in ("a_t", "b_t")]
+            if names[0] in found:
+                a, b = (self.base[name] for name in names)
+                found[names[0]], found[names[1]] = scale * ratio * a, scale * ratio * b
+            if (band := coefficient_name(f"c_0{end}", curve.name)) in found:
+                found[band] = self.get(z, "dead band", curve.name, default=found[band])
+        if "T" in curve.keys:
+            lag = curve.coefficient("T")
+            found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)
+        if "n_V" in curve.keys:
+            found[curve.coefficient("n_V")] = self.get(z, "voltage", default=found[curve.coefficient("n_V")])
+
+    def force_unit(self, z: Sequence[float], axis: Axis) -> float:
+        """Return what the size of a slow force is relative to, N or N m: full thrust, in proportion to the inertia.
+
+        The data do not tell the scale of all forces.
+        """
+        return self.full.get(axis.name, 1.0) * self.get(z, "inertia", axis.name, default=1.0)
+
+    def shapes(self, z: Sequence[float]) -> Shapes:
+        """Return the deviations of the shapes of the curves."""
+        found = {}
+        for curve in self.layout.curves:
+            if (first := self.place("thrust shape", curve.name, "1")) is not None:
+                found[curve.name] = self.shape_deviation * np.array(z[first : first + COUNT])
+        reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
+        return Shapes(found, frozenset(reverse))
+
+    def of_log(self, z: Sequence[float], one: Recorded) -> Parameters:
+        """Return the parameters of the filter for a log."""
+        file, layout = one.log.file, one.layout
+        found = self.coefficients(z)
+        for part, name in (("north", "V_N"), ("east", "V_E")):
+            found[name] = self.get(z, "current", file, part)
+        whole = self.get(z, "slow gain", default=0.0)
+        axes = [form.axis for form in layout.axes]
+        units = {axis.name: self.force_unit(z, axis) for axis in axes}
+        for thruster, curve in layout.curve_of.items():
+            units[f"F_{thruster}"] = self.get(z, "thrust scale", curve.name, default=1.0)
+
+        def drift(axis: Axis | None) -> Slow:
+            size = self.get(z, "slow velocity", axis.name if axis else "horizontal")
+            return Slow(size, SLOW["slow velocity"])
+
+        along = drift(None) if one.has_positions or one.has_velocities else Slow()
+        down = drift(HEAVE) if any(s.axis is HEAVE for s in one.record.sensors) else Slow()
+        white, noise = [], []
+        for m in one.measured:
+            quantity = m.channel.quantity.name
+            sigma = self.get(z, "white noise", quantity)
+            white.append(sigma)
+            coloured = self.get(z, "coloured noise", quantity) * sigma
+            noise.append(Slow(coloured, self.get(z, "correlation time", quantity, default=1.0)))
+        is_inside = HEAVE.name in layout.kinds
+        return Parameters(
+            coefficients=found,
+            forces=tuple(Slow(units[a.name] * self.get(z, "slow force", a.name), SLOW["slow force"]) for a in axes),
+            units=units,
+            gain=Slow(whole, SLOW["slow gain"]),
+            drifts=(along, along, down if is_inside else Slow()),
+            white=tuple(white),
+            noise=tuple(noise),
+            offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
+            width=self.get(z, "logging width", file),
+            inputs=self.shapes(z).inputs(layout, one.record.inputs),
+        )
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """What is known before any test is fitted, from which the priors are made."""
+
+    layout: Layout
+    coefficients: Mapping[str, float]
+    """All coefficients of the layout. Those of axes that nothing gives are guesses from the data."""
+    fitted: Sequence[Axis]
+    """The axes whose motion is tested."""
+    curves: Sequence[Curve]
+    """The curves that drive these axes."""
+    measured_curves: Sequence[str]
+    """The curves whose forces were measured: their scale and shape are those of the rows."""
+    with_lag: bool
+    """True if the base or the file gives a lag."""
+    guessed: Sequence[str]
+    """The names of the axes whose drag is guessed from the data."""
+    full: Mapping[str, float]
+    deviations: Mapping[str, float]
+    """The table [priors] of rov.toml."""
+    exact: frozenset[str] = frozenset()
+    """The names of the coefficients that no fit changes."""
+    thrust_errors: Mapping[str, float] = field(default_factory=dict)
+    """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
+
+
+def table_of(known: Beginning, logs: Sequence[Recorded], row_noises: Sequence[str]) -> Table:
+    """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
+    shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
+    found = tuple(_parameters(known, logs, row_noises))
+    return Table(known.layout, known.coefficients, known.full, found, shape, known.exact)
+
+
+def _parameters(known: Beginning, logs: Sequence[Recorded], row_noises: Sequence[str]) -> Iterator[Parameter]:
+    def prior(key: str) -> float:
+        """Return a deviation. Where the thrust is exact, so is its shape."""
+        if key.startswith("thrust_") or key == "dead_band":
+            exact = prior("thrust") == 0.0
+            return 0.0 if exact else known.deviations.get(key, PRIORS[key].deviation)
+        return known.deviations.get(key, PRIORS[key].deviation)
+
+    found = [*_of_curves(known, prior), *_of_axes(known, prior)]
+    if logs:
+        if prior("lag"):
+            T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
+            mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
+            yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
+        if prior("dead_time"):
+            yield Parameter("dead time", "", deviation=prior("dead_time"), low=0.0, null=0.0, unit="s")
+        if prior("voltage") and any("n_V" in c.keys for c in known.curves):
+            yield Parameter("voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=0.0, high=4.0, null=0.0)
+    yield from (p for p in found if p.deviation > 0.0)
+    for number, one in enumerate(logs):
+        yield from _of_one_log(one, number, prior)
+    yield from _of_noise(known, logs, prior)
+    for name in row_noises:
+        yield Parameter("row noise", name, mean=log(0.03), deviation=1.0, is_log=True, low=log(1e-3), of_motion=False)
+
+
+def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
+    for curve in known.curves:
+        name = curve.name
+        is_measured = name in known.measured_curves
+        scale = 1.0 if is_measured else known.thrust_errors.get(name, prior("thrust"))
+        shape = prior("thrust_shape")
+        yield Parameter("thrust scale", name, deviation=scale, is_log=True)
+        if curve.tables:
+            continue
+        for n in range(COUNT if shape else 0):
+            yield Parameter("thrust shape", name, str(n + 1))
+        if f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact:
+            ratio = 0.5 if is_measured else prior("thrust_reverse")
+            yield Parameter("reverse thrust", name, deviation=ratio, null=0.0)
+        if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
+            mean = known.coefficients[curve.coefficient("c_0")]
+            width = prior("dead_band")
+            yield Parameter("dead band", name, mean=mean, deviation=width, low=0.0, high=0.5, null=0.0)
+
+
+def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
+    for axis in known.fitted:
+        name, c = axis.name, known.coefficients
+        if axis.coefficient("beta") not in known.exact:
+            yield Parameter("inertia", name, deviation=prior("inertia"), is_log=True)
+        for key, kind, width in (
+            ("a_d", "quadratic drag", prior("quadratic_drag")),
+            ("b_d", "linear drag", prior("linear_drag")),
+        ):
+            if axis.coefficient(key) not in known.exact:
+                mean = log(max(c[axis.coefficient(key)], 1e-9))
+                yield Parameter(kind, name, mean=mean, deviation=width, is_log=True)
+        free = {*known.layout.coefficients} - known.exact
+        if axis.coefficient(f"a_d{REVERSE}") in free:
+            yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
+        if axis.coefficient("F_0") in free:
+            null = -c[axis.coefficient("F_0")] / known.full[name]
+            yield Parameter("load", name, deviation=prior("load"), null=null)
+
+
+def _of_one_log(one: Recorded, number: int, prior: Callable[[str], float]) -> Iterator[Parameter]:
+    file, half = one.log.file, 0.5 * one.interval
+    least = max(half, 0.005)
+    yield Parameter("logging offset", file, mean=-half, deviation=least, log=number, unit="s")
+    yield Parameter("logging width", file, mean=0.5, deviation=0.5, low=0.0, high=1.0, of_motion=False, log=number)
+    if (one.has_positions or one.has_velocities) and prior("current"):
+        for part in ("north", "east") if "psi" in one.layout.state or one.layout.has_attitude else ("north",):
+            yield Parameter("current", file, part, deviation=prior("current"), null=0.0, log=number, unit="m/s")
+
+
+def _of_noise(known: Beginning, logs: Sequence[Recorded], prior: Callable[[str], float]) -> Iterator[Parameter]:
+    def size(kind: str, of: str, key: str) -> Iterator[Parameter]:
+        """Yield the size of a slow process, unless it is exactly 0."""
+        usual, least, largest = _SIZES[key]
+        if deviation := prior(f"slow_{key}"):
+            mean, low, high = log(usual), log(least), log(largest)
+            yield Parameter(kind, of, mean=mean, deviation=deviation, is_log=True, low=low, high=high, of_motion=False)
+
+    axes = {form.axis.name for one in logs for form in one.layout.axes}
+    for axis in known.fitted:
+        if axis.name in axes:
+            yield from size("slow force", axis.name, "force")
+    if logs and not known.layout.fins:
+        yield from size("slow gain", "", "gain")
+    if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
+        yield from size("slow velocity", HEAVE.name, "velocity")
+    if any(one.has_positions or one.has_velocities for one in logs):
+        yield from size("slow velocity", "horizontal", "velocity")
+    noises: dict[str, list[float]] = {}
+    for one in logs:
+        for m in one.measured:
+            noises.setdefault(m.channel.quantity.name, []).append(m.noise)
+    for quantity, some in noises.items():
+        white, coloured = prior("white_noise"), prior("coloured_noise")
+        typical_noise = sorted(some)[len(some) // 2]
+        mean = log(typical_noise)
+        yield Parameter(
+            "white noise", quantity, mean=mean, deviation=white, is_log=True, low=mean - _QUIETER, of_motion=False
+        )
+        usual, time = _COLOURED
+        yield Parameter("coloured noise", quantity, mean=log(usual), deviation=coloured, is_log=True, of_motion=False)
+        yield Parameter(
+            "correlation time", quantity, mean=log(time), deviation=coloured, is_log=True, of_motion=False, unit="s"
+        )

@@ -1,0 +1,295 @@
+"""From a log to what the filter reads: samples in the order of time, rows of inputs, and the start.
+
+Nothing is resampled onto a common grid. Samples that come faster than the vehicle can answer are averaged in groups,
+which keeps what they tell and bounds the time of a fit.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import cos, sin
+
+import numpy as np
+
+from rov_fmu.engine.filter import DRIFTS, MOST_SENSORS, Record, Sensor
+from rov_fmu.io.messages import MOST, first_of
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
+from rov_fmu.tank.quality import gaps, unwrapped
+
+FASTEST = 20.0
+"""Samples per second and sensor that are kept; faster ones are averaged in groups."""
+THINNED = 5.0
+"""The same for a first, quick fit, which takes single samples and no averages."""
+_CALM = 0.3
+"""The standard deviation of an unknown velocity at the start, m/s or rad/s."""
+_LEVEL = 0.1
+"""The standard deviation of an unknown angle at the start, rad."""
+_LEAST_CHANGE = 0.001
+"""The least relative change of the voltage that begins a new row of inputs."""
+_LEAST_PUSH = 0.02
+"""The smallest change of thrust that tests an axis, as a share of full thrust. Smaller changes are due to a heading or
+depth controller, or to rounded pulses."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One channel of a log that the filter reads."""
+
+    channel: Channel
+    sensor: Sensor
+    noise: float
+    """A first guess of the standard deviation of its white noise, SI units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A log that is fitted, with the part of the vehicle that it concerns."""
+
+    log: Log
+    layout: Layout
+    measured: tuple[Measured, ...]
+    record: Record
+    thinned: Record
+    """The same with fewer samples."""
+    interval: float
+    """The usual time between two rows of commands, s."""
+
+    @property
+    def has_positions(self) -> bool:
+        """True if a horizontal position is measured."""
+        return any(not s.is_velocity and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors)
+
+    @property
+    def has_velocities(self) -> bool:
+        """True if a horizontal velocity over ground is measured."""
+        return any(
+            s.is_velocity and s.over_ground and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors
+        )
+
+
+def recorded(log: Log, layout: Layout) -> Recorded | None:
+    """Return what the filter reads of a log; None if it tests none of these axes."""
+    if not driven_axes(log, layout)[0]:
+        return None
+    assert log.commands
+    begin = float(log.commands.rows[0])
+    measured = tuple(_measured(log, layout))[:MOST_SENSORS]
+    since, told, inputs = _rows(log, layout)
+    full = _samples(measured, begin, FASTEST, averaged=True)
+    thin = _samples(measured, begin, THINNED, averaged=False)
+    start, errors = _start(measured, layout)
+    sensors = tuple(m.sensor for m in measured)
+    record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout))
+    time, value, sensor = thin
+    thinned = replace(record, time=time, value=value, sensor=sensor)
+    return Recorded(log, layout, measured, record, thinned, log.commands.interval)
+
+
+def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
+    """Return the axes of the layout that a log tests, and findings about channels and axes of which it tells nothing.
+
+    A log tests an axis if it measures a motion along it that changes, and if the thrust along it changes. The channels
+    of the other axes still tell how the vehicle moved.
+    """
+    measured: dict[Axis, str] = {}
+    findings = []
+    for axis, channel in _channels(log, layout):
+        found = Finding("gaps", axis.name, file=channel.file or log.file, names={"quantity": channel.quantity.name})
+        if kind := _why_left_out(channel):
+            numbers = {"count": channel.count, "least": LEAST_SAMPLES} if kind == "too few samples" else {}
+            findings.append(replace(found, kind=kind, numbers=numbers))
+            continue
+        measured.setdefault(axis, found.file)
+        if places := gaps(channel.time, channel.values):
+            assert log.commands
+            begin = float(log.commands.rows[0])
+            told = [f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in places]
+            names = {**found.names, "gaps": ", ".join(first_of(told, MOST))}
+            findings.append(replace(found, names=names, numbers={"count": len(places)}))
+    unpushed = {axis: kind for axis in measured if (kind := _why_not_tested(log, layout, axis))}
+    findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in unpushed.items()]
+    return [axis for axis in measured if axis not in unpushed], findings
+
+
+def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:
+    """Yield the measurements that are used, during the commands, with the axis of the layout that each concerns."""
+    if log.commands is None or not log.commands.time.size:
+        return
+    begin, end = float(log.commands.rows[0]), log.commands.end
+    for channel in log.channels:
+        axis = channel.quantity.axis
+        if channel.unused or axis is None or axis.name not in layout.kinds or (log.axis and axis is not log.axis):
+            continue
+        inside = channel.there & (channel.time >= begin) & (channel.time <= end)
+        yield axis, replace(channel, time=channel.time[inside], values=unwrapped(channel)[inside])
+
+
+def _why_left_out(channel: Channel) -> str:
+    """Return the kind of the finding that says why a channel tells nothing; empty for one that the filter reads."""
+    if channel.count < LEAST_SAMPLES:
+        return "too few samples"
+    return "" if np.ptp(channel.values) > 0.0 else "constant motion"
+
+
+def _why_not_tested(log: Log, layout: Layout, axis: Axis) -> str:
+    """Return the kind of the finding that says why the thrust does not test an axis; empty if it does.
+
+    The thrust must change whatever the coefficients of the thrust curves are. It has a linear and a quadratic term in
+    each direction. For the thrusters of one curve, the sum of one of these terms must change. In a log of one command,
+    a constant thrust is enough, because the vehicle starts from rest.
+    """
+    commands, drivers = log.commands, layout.drivers(axis)
+    assert commands
+    if log.follows_axis:
+        return "" if commands.value.any() else "constant push"
+    if not drivers:
+        return "no thruster"
+    of = dict(zip(commands.thrusters, commands.at(commands.time).T, strict=True))
+    strongest = max(abs(t.effect(axis)) for t in drivers)
+    for curve in {t.curve for t in drivers}:
+        own = [(t.effect(axis) / strongest, of[t.name]) for t in drivers if t.curve == curve and t.name in of]
+        for side in (1.0, -1.0):
+            for power in (1, 2):
+                thrust = sum((effect * np.clip(side * c, 0.0, 1.0) ** power for effect, c in own), np.zeros(1))
+                if np.ptp(thrust) > _LEAST_PUSH:
+                    return ""
+    moved = any(np.ptp(of[t.name]) > _LEAST_PUSH for t in drivers if t.name in of)
+    return "cancelling thrusters" if moved else "constant push"
+
+
+def _measured(log: Log, layout: Layout) -> Iterator[Measured]:
+    """Yield the channels that the filter reads."""
+    for axis, channel in _channels(log, layout):
+        if _why_left_out(channel):
+            continue
+        differences = np.diff(channel.values, 3) / np.sqrt(20.0)  # of white noise, these have its standard deviation
+        noise = float(1.4826 * np.median(np.abs(differences))) or float(np.std(differences))
+        sensor = Sensor(axis, channel.quantity.is_velocity, over_ground=log.axis is None)  # in a tank, water is ground
+        yield Measured(channel, sensor, max(noise, 1e-9))
+
+
+def _samples(
+    measured: Sequence[Measured], begin: float, rate: float, *, averaged: bool
+) -> tuple[Array, Array, np.ndarray]:
+    """Return the times, the values and the sensors of all samples in the order of time."""
+    times, values, sensors = [], [], []
+    for n, one in enumerate(measured):
+        time, value = one.channel.time, one.channel.values
+        group = np.floor((time - begin) * rate + 1e-6).astype(np.int64)
+        first = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
+        if averaged and len(first) < 0.8 * len(time):
+            count = np.diff(first, append=len(time))
+            time, value = np.add.reduceat(time, first) / count, np.add.reduceat(value, first) / count
+        elif not averaged:
+            time, value = time[first], value[first]
+        times.append(time)
+        values.append(value)
+        sensors.append(np.full(len(time), n, np.intc))
+    time = np.concatenate(times)
+    order = np.argsort(time, kind="stable")
+    return time[order], np.concatenate(values)[order], np.concatenate(sensors)[order]
+
+
+def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
+    """Return the times and the inputs of the rows in which an input changes: m, m, and m x inputs."""
+    commands = log.commands
+    assert commands
+    told, first = np.unique(commands.time, return_index=True)
+    since = np.minimum(commands.since[first], told)
+    voltage = log.used("voltage") if layout.voltage is not None else None
+    if voltage:
+        time, value = voltage.time[voltage.there], voltage.values[voltage.there]
+        kept = [0]
+        for n, v in enumerate(value):
+            if abs(v - value[kept[-1]]) > _LEAST_CHANGE * abs(value[kept[-1]]):
+                kept.append(n)
+        changes = np.setdiff1d(time[kept], told)
+        told, since = np.concatenate([told, changes]), np.concatenate([since, changes])
+        order = np.argsort(told)
+        told, since = told[order], since[order]
+    inputs = np.zeros((len(told), len(layout.inputs)))
+    names = [*layout.inputs]
+    values = commands.at(told)
+    if log.follows_axis:
+        assert log.axis
+        for row, command in enumerate(values[:, 0]):
+            for name, value_of in layout.driving(log.axis, command).items():
+                inputs[row, names.index(name)] = value_of
+    else:
+        for column, thruster in zip(values.T, commands.thrusters, strict=True):
+            if f"u_{thruster}" in names:
+                inputs[:, names.index(f"u_{thruster}")] = column
+    if voltage:
+        inputs[:, names.index("voltage")] = np.interp(told, time, value)
+    return since, told, inputs
+
+
+def _tilt(log: Log, layout: Layout) -> Array:
+    """Return times, roll and pitch of a dive of a vehicle that has neither axis, 3 x k; k = 0 if unknown."""
+    roll, pitch = log.used("roll angle"), log.used("pitch angle")
+    if log.follows_axis or layout.has_attitude or roll is None or pitch is None:
+        return np.zeros((3, 0))
+    time, first = np.unique(pitch.time[pitch.there], return_index=True)
+    if len(time) < LEAST_SAMPLES or roll.there.sum() < LEAST_SAMPLES:
+        return np.zeros((3, 0))
+    values = np.interp(time, roll.time[roll.there], unwrapped(roll)[roll.there])
+    return np.array([time, values, unwrapped(pitch)[pitch.there][first]])
+
+
+def _start(measured: Sequence[Measured], layout: Layout) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the states at the first sample, and the standard deviations of those that the filter follows."""
+    start = dict(layout.at_rest)
+    first = {(m.sensor.axis.name, m.sensor.is_velocity): m for m in measured}
+    errors = {name: _CALM for name in layout.state if name not in DRIFTS}
+
+    def of(axis: Axis, *, is_velocity: bool) -> tuple[float, float] | None:
+        m = first.get((axis.name, is_velocity))
+        return (float(m.channel.values[0]), 3.0 * m.noise) if m else None
+
+    for form in layout.axes:
+        axis = form.axis
+        if value := of(axis, is_velocity=True):
+            start[axis.velocity], errors[axis.velocity] = value[0], value[1] + 0.1 * _CALM
+        position = DRIFTS[axis.place]
+        if not axis.is_rotation and position in layout.state:
+            if value := of(axis, is_velocity=False):
+                start[position], errors[position] = value
+            elif axis is HEAVE:
+                errors[position] = _CALM
+    angles = [of(axis, is_velocity=False) for axis in (ROLL, PITCH, YAW)]
+    if layout.has_attitude:
+        phi, theta, psi = (angle[0] if angle else 0.0 for angle in angles)
+        start |= _quaternion(phi, theta, psi)
+        errors |= dict.fromkeys(_quaternion(0.0, 0.0, 0.0), _LEVEL)
+    elif "psi" in layout.state:
+        start["psi"], errors["psi"] = angles[2] or (0.0, _LEVEL)
+    return start, errors
+
+
+def _quaternion(phi: float, theta: float, psi: float) -> dict[str, float]:
+    """Return the quaternion of Euler angles (zyx), rad."""
+    (a, b, c), (d, e, f) = ([g(0.5 * angle) for angle in (phi, theta, psi)] for g in (cos, sin))
+    return {
+        "eta": a * b * c + d * e * f,
+        "epsilon_1": d * b * c - a * e * f,
+        "epsilon_2": a * e * c + d * b * f,
+        "epsilon_3": a * b * f - d * e * c,
+    }
+
+
+def typical(some: Sequence[Recorded], axis: Axis) -> float:
+    """Return a large velocity along an axis in the logs, m/s or rad/s: the 90 % quantile of its size; 0 if unknown."""
+    found = []
+    for one in some:
+        for m in one.measured:
+            if m.sensor.axis is axis:
+                time, values = m.channel.time, m.channel.values
+                if not m.sensor.is_velocity:
+                    lag = max(1, int(np.searchsorted(time, time[0] + 1.0)))
+                    if lag >= len(time):
+                        continue
+                    values = (values[lag:] - values[:-lag]) / (time[lag:] - time[:-lag])
+                found.append(float(np.quantile(np.abs(values), 0.9)))
+    return max(found, default=0.0)

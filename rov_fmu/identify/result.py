@@ -1,0 +1,297 @@
+"""What an identification found: one object, of which the terminal, the report and the vehicle file are views.
+
+Nothing here is computed: `identify` puts the result together, and the findings (findings.py) are functions of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, nan
+from typing import Literal
+
+from rov_fmu.model.layout import Axis
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.folder import Folder
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Interval = tuple[float, float]
+Word = Literal["good", "usable", "do not use"]
+
+KEPT = 6.0
+"""The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
+
+MOST_UNKNOWN = 0.05
+"""A model must not be used if unknown slow forces, changes of the thrust and velocities over ground together exceed
+this share of the thrust and of the velocity: what is unknown acts differently elsewhere."""
+DISAGREEMENT = 40.0
+"""The difference of J between two starts from which they led to different vehicles; J is twice a log likelihood."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """An identified number with its 95 % interval."""
+
+    name: str
+    """The name of the coefficient in the FMU."""
+    value: float
+    interval: Interval | None
+    """None where the data do not identify it, so that it is assumed."""
+    unit: str
+    began: str
+    """The prior in words, such as `18.18 within a factor of 2.7, from the base`."""
+    narrowed: float
+    """The standard error relative to that of the prior: 1 where the data told nothing."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What an owner asks about one command of an axis. Each number has its 95 % interval."""
+
+    axis: Axis
+    command: float
+    """A fraction of full command, with its sign."""
+    steady: tuple[float, Interval]
+    """The steady velocity V_ss, m/s or rad/s."""
+    rise: tuple[float, Interval]
+    """The time Tau from rest to 63 % of it, with the lag of the thrusters left out, s."""
+    stop: tuple[float, Interval]
+    """The way from it to a tenth of it without thrust, m or rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """The prediction of one measured quantity of a log by a fit without this log. SI units; n samples."""
+
+    axis: Axis
+    file: str
+    quantity: str
+    """Such as `heading` or `surge velocity`."""
+    unit: str
+    is_position: bool
+    span: float
+    """How far ahead is predicted, s: inf for a whole log; otherwise the prediction starts anew after this time."""
+    by: str
+    """The data of the fit in words, such as `the other 2 logs` or `the first half`."""
+    time: Array
+    measured: Array
+    predicted: Array
+    deviation: Array
+    """The standard deviation of measured minus predicted that the model claims, with the noise of the sensor."""
+    unchanged: float
+    """The RMS error of a prediction of no change."""
+    noise: float
+    """The standard deviation of the noise of the sensor."""
+    error: float
+    """The RMS error."""
+    coverage: float
+    """The share of the samples inside the 95 % band."""
+
+    @property
+    def is_judged(self) -> bool:
+        """True where the band says something: of a velocity over a recording, and of a position over 10 s."""
+        return self.is_position == (self.span < inf)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An optional part of the model: what it is, of what, its size, and the evidence for it."""
+
+    kind: str
+    """A key of EFFECTS in parameters.py, such as `current`."""
+    of: str
+    """The axis, the curve or the file that has it; empty for the vehicle."""
+    name: str
+    """The parameter in words, such as `current to the north`."""
+    value: float
+    interval: Interval
+    unit: str
+    evidence: float
+    """2 ln of the Bayes factor of the model with it against the model without it."""
+
+    @property
+    def kept(self) -> bool:
+        """True if it is reported and goes into the vehicle."""
+        return self.evidence > KEPT
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Something slow that the model does not explain: a force, a change of all thrust, or a velocity over ground."""
+
+    kind: Literal["force", "gain", "velocity"]
+    axis: Axis | None
+    """None for a change of all thrust."""
+    file: str
+    """The log in which it is largest."""
+    size: float
+    """Its RMS in that log: N or N m, a fraction of the thrust, or m/s."""
+    unit: str
+    share: float
+    """The size relative to the RMS of the thrust, or of the velocity, in that log."""
+    since: float | None
+    """When it first exceeds twice its own uncertainty, s after the start of the log."""
+    evidence: float
+    cause: str = ""
+    """The channel that explains it in words, such as `the voltage`; empty if none does."""
+
+    @property
+    def kept(self) -> bool:
+        """True if the evidence for it is strong, so that it is reported."""
+        return self.evidence > KEPT
+
+
+@dataclass(frozen=True)
+class Logging:
+    """How a log tells the time of its commands."""
+
+    file: str
+    interval: float
+    """The usual time between two rows of commands, s."""
+    offset: float
+    """How much later than its row a command acts, s; negative where rows are late."""
+    offset_interval: Interval
+    width: float
+    """The time within which a change of the command is known, s."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """The noise of a sensor in all logs, SI units."""
+
+    axis: Axis
+    quantity: str
+    unit: str
+    white: float
+    """The standard deviation of the white noise."""
+    coloured: float
+    """The standard deviation of the coloured noise."""
+    correlation: float
+    """The correlation time of the coloured noise, s."""
+    samples: int
+
+
+@dataclass(frozen=True)
+class Point:
+    """A row of a table of tank tests, and what the model says about it."""
+
+    subject: str
+    """The curve or the axis."""
+    quantity: Literal["force", "V_ss", "Tau"]
+    unit: str
+    file: str
+    command: float
+    measured: float
+    model: float
+    held_out: float
+    """The value by the information of all data but the rows of the same command. NaN where it is not determined."""
+    counts: bool
+    """False outside the window of rov.toml."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the model of an axis may be trusted, and why."""
+
+    word: Word
+    reasons: tuple[str, ...]
+    """Sentences: what keeps it from being better, or for `good` what it rests on."""
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """The test that would narrow an axis's most uncertain answer most."""
+
+    axis: Axis
+    words: str
+    """What to do, such as `hold 0.6 for 8 s, then -0.6 for 8 s`."""
+    target: str
+    """The number that it narrows, in words, such as `V_ss at 50 %`."""
+    now: float
+    """The relative half-width of that number's interval."""
+    then: float
+    """The same after the test."""
+
+    @property
+    def is_useful(self) -> bool:
+        """True if the interval would become at least a tenth narrower."""
+        return self.then < 0.9 * self.now
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A mistake of unit or sign, with which a file would fit much better."""
+
+    file: str
+    quantity: str
+    """Such as `depth`, `force` or `commands`."""
+    words: str
+    """The mistake as a question, such as `is it in mm`."""
+    evidence: float
+    """2 ln of the Bayes factor of the mistake against the file as it stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxisResult:
+    """All that concerns one axis."""
+
+    axis: Axis
+    verdict: Verdict
+    answers: tuple[Answer, ...]
+    known: tuple[Known, ...]
+    """The coefficients of the axis; those of curves stand in `Identification.curves`."""
+    predictions: tuple[Prediction, ...]
+    """Held-out predictions; empty where the axis has only tables or a single short log."""
+    points: tuple[Point, ...]
+    next_test: NextTest | None
+
+    @property
+    def main(self) -> Prediction | None:
+        """The prediction that says most: of a position over 10 s if there is one, otherwise of a velocity."""
+        return min(
+            self.predictions,
+            key=lambda p: (not p.is_judged, not p.is_position, -p.error / max(p.noise, 1e-12)),
+            default=None,
+        )
+
+    @property
+    def coverage(self) -> float:
+        """The share of all samples inside their 95 % bands, over the predictions that are judged; NaN without any."""
+        judged = [p for p in self.predictions if p.is_judged]
+        return sum(p.coverage * len(p.time) for p in judged) / sum(len(p.time) for p in judged) if judged else nan
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """A vehicle, the tests that it comes from, and everything that is worth saying about both."""
+
+    folder: Folder
+    """The tests, with rov.toml."""
+    inputs: Mapping[str, str]
+    """The SHA-256 of every file that was read, by its name."""
+    vehicle: Vehicle
+    against: Vehicle | None
+    """The vehicle to compare with."""
+    axes: tuple[AxisResult, ...]
+    curves: Mapping[str, tuple[Known, ...]]
+    """The coefficients of each thrust curve."""
+    forces: tuple[Point, ...]
+    """The measured forces of thrust tables."""
+    effects: tuple[Effect, ...]
+    disturbances: tuple[Disturbance, ...]
+    logging: tuple[Logging, ...]
+    sensors: tuple[Sensor, ...]
+    correlation: tuple[tuple[str, ...], Array]
+    """The names and the correlations of all identified coefficients."""
+    objective: float
+    """J at its minimum."""
+    agreement: float
+    """How much larger J is at the end of the second start."""
+    slips: tuple[Slip, ...] = ()
+    """The mistakes that would explain a file better."""
+    findings: tuple[Finding, ...] = ()
+    """What to tell, in the order of its weight. The sentences and severities are in findings.py."""
+
+    @property
+    def seconds(self) -> float:
+        """The length of all logs, s."""
+        return sum(log.commands.end - float(log.commands.rows[0]) for log in self.folder.logs if log.commands)

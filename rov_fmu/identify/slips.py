@@ -1,0 +1,192 @@
+"""Mistakes of unit and sign in logs, as discrete hypotheses under the objective of the identification.
+
+A hypothesis says that the values of some channels in the files are k times the true ones, such as 100 for centimetres
+in a column of metres, or -1 for a depth that is positive upwards. Its evidence against the files as they stand is
+
+    2 ln of the Bayes factor = J(files as they stand) - [ J(values / k) + 2 n ln |k| ]
+
+for n such values: the density of the values in a file is 1/|k| times that of the true ones. Two vehicles explain a
+common scale of all data of an axis equally well, and only the priors of drag, inertia and thrust tell them apart.
+
+Only few hypotheses are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
+only a channel that would agree with this motion for another k, but not for 1, is suspected. The scale of commands is
+checked where they are read.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import log, pi
+
+import numpy as np
+
+from rov_fmu.engine.filter import DivergedError
+from rov_fmu.identify.beginning import Tests, begin
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import Beginning, table_of
+from rov_fmu.identify.likelihood.records import Measured
+from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.result import Slip
+from rov_fmu.model.layout import REVERSE
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.log import Channel, Log
+
+_CLEAR, _NEXT = 10.0, 6.0
+"""The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
+_LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
+_ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
+_ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
+"""What the scales of lengths, of angles and of their rates mean, the most usual ones first; `{}` is the unit."""
+_NEAR = 0.5 * log(10.0)
+"""The largest logarithm of the ratio of measured to simulated motion: the drag of the priors is right within a factor
+of 2.7, and thus the velocity within one of 1.6."""
+_ALIKE, _WORSE = 0.5, 4.0
+"""The least correlation of measured and simulated motion. A scale is unlikely if it leaves so many times more
+unexplained than another one does: a heading that is scaled and then wrapped may still look a little like the motion."""
+_DENSITY, _MOVING, _TURNING, _SLOWEST = 1000.0, 1.5, 6.0, 0.1
+"""The density of water, and the usual drag of vehicles of the volume V = m/rho: 1.5 rho V^(2/3) v^2 / 2, and about an
+axis 6 I r^2 / 2, both within a factor of 8. The drag becomes linear below 0.1 m/s or rad/s."""
+_LAG = 1.0
+"""Positions are compared by how far they change in this time, s."""
+_UNHEEDED = 1e6
+"""The factor of a sensor's noise with which it corrects nothing."""
+_STEPS = 12
+"""The most steps of the fit of one hypothesis."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """A channel of a log beside the simulation of it by the vehicle of the priors."""
+
+    file: str
+    channel: Channel
+    """As the file has it."""
+    count: int
+    """The number of its samples in a quick fit."""
+    ratios: Mapping[float, float]
+    """By scale: the ratio of the values, divided by it, to the simulated motion, where the two are alike."""
+
+    @property
+    def scales(self) -> list[float]:
+        """The scales that lead to a ratio near 1, the most usual mistake first; none if the scale 1 does."""
+        likely = [scale for scale, ratio in self.ratios.items() if abs(log(ratio)) < _NEAR]
+        return [] if 1.0 in likely else likely
+
+
+Hypothesis = frozenset[tuple[_Compared, float]]
+"""Channels with their scales."""
+
+
+def slips(tests: Tests, known: Beginning, objective: Objective, best: Array) -> tuple[Slip, ...]:
+    """Return the mistakes that explain the logs much better. `best` is where J is least for the files as they stand.
+
+    Where several explanations are about as good, each is told for its files.
+    """
+    compared = [one for n in range(len(objective.logs)) for one in _compared(objective, n, known.guessed)]
+    hypotheses = {*_hypotheses({one: one.scales for one in compared if one.scales})}
+    if not hypotheses:
+        return ()
+    as_it_is, J = _least(tests, frozenset(), best), {one: _least(tests, one) for one in hypotheses}
+    first = min(J, key=lambda one: J[one])
+    J |= {fewer: _least(tests, fewer) for fewer in (first - {member} for member in first) if fewer}
+    most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
+    for hypothesis in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
+        for one, scale in hypothesis:
+            words = told.setdefault((one.file, one.channel.quantity.name), {})
+            words.setdefault(_words(one.channel, scale), as_it_is - J[hypothesis])
+    return tuple(
+        Slip(file, quantity, ", or ".join(words), max(words.values()))
+        for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
+    )
+
+
+def _words(channel: Channel, scale: float) -> str:
+    """Return a mistake as a question."""
+    unit, axis = channel.quantity.unit, channel.quantity.axis
+    if scale < 0.0:
+        assert axis
+        return f"is its sign right ({axis.positive} is positive), and is that of the commands"
+    meaning = (_ANGLES if unit.startswith("rad") else _LENGTHS)[scale].format(unit)
+    return f"is it {meaning}" if meaning else f"are its numbers {1.0 / scale:g} times too small for its unit"
+
+
+def _hypotheses(likely: Mapping[_Compared, Sequence[float]]) -> Iterator[Hypothesis]:
+    """Yield all suspected channels with one scale, for each scale, and all of them with their most usual scales."""
+    for scale in {scale for scales in likely.values() for scale in scales}:
+        yield frozenset((one, scale) for one, scales in likely.items() if scale in scales)
+    if likely:
+        yield frozenset((one, scales[0]) for one, scales in likely.items())
+
+
+def _least(tests: Tests, hypothesis: Hypothesis, start: Array | None = None) -> float:
+    """Return the least J of thinned logs, as a density of the values in the files; inf if no simulation is finite."""
+    scales = {one.channel: scale for one, scale in hypothesis}
+    logs = [_corrected(one, scales) for one in tests.folder.logs]
+    known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
+    quick = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows, thinned=True)
+    try:
+        value = minimise(quick, quick.mean if start is None else start, most=_STEPS, last=False).value
+    except DivergedError:
+        return np.inf
+    return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in hypothesis)
+
+
+def _corrected(one: Log, scales: Mapping[Channel, float]) -> Log:
+    """Return a log with the true values of some of its channels."""
+    return replace(one, channels=tuple(replace(c, values=c.values / scales.get(c, 1.0)) for c in one.channels))
+
+
+# ---- Comparison with the vehicle of the priors -----------------------------------------------------------------------
+
+
+def _compared(objective: Objective, number: int, guessed: Sequence[str]) -> Iterator[_Compared]:
+    """Yield all channels of a log that the filter reads, beside their simulation."""
+    one, record = objective.logs[number], objective.records[number]
+    try:
+        simulated = _simulated(objective, number, guessed)
+    except DivergedError:
+        return
+    for n, m in enumerate(one.measured):
+        at, used = record.sensor == n, (m.channel.quantity, m.channel.source)
+        channel = next(c for c in one.log.channels if not c.unused and (c.quantity, c.source) == used)
+        time, raw = channel.time[channel.there], channel.values[channel.there]
+        found = {}
+        for scale in (1.0, -1.0, *(_ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS)):
+            values = np.unwrap(raw / scale) if channel.quantity.wraps else raw / scale
+            found[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
+        most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in found.values())
+        ratios = {k: ratio for k, (ratio, unexplained) in found.items() if ratio > 0.0 and unexplained < min(most)}
+        yield _Compared(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
+
+
+def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Array:
+    """Return the samples of a log by the vehicle of the priors. Measured angles correct only the other channels.
+
+    `guessed` names the axes whose prior of the drag follows from the data: they have the drag of a body of their mass.
+    """
+    one, record = objective.logs[number], objective.records[number]
+    parameters = objective.table.of_log(objective.mean.tolist(), one)
+    usual = dict(parameters.coefficients)
+    for axis in (form.axis for form in one.layout.axes if form.axis.name in guessed):
+        volume = usual[axis.inertia] / _DENSITY
+        drag = 0.5 * _DENSITY * (_TURNING * volume if axis.is_rotation else _MOVING * volume ** (2.0 / 3.0))
+        for end in ("", REVERSE):
+            usual |= {axis.coefficient(f"a_d{end}"): drag, axis.coefficient(f"b_d{end}"): _SLOWEST * drag}
+    parameters = replace(parameters, coefficients=usual)
+    is_angle = np.array([m.channel.quantity.unit == "rad" for m in one.measured])
+    heeding = replace(parameters, white=tuple(np.where(is_angle, 1.0, _UNHEEDED) * parameters.white))
+    run = objective.filters[number].run
+    alone, corrected = run(record, parameters, begin=0.0), run(record, heeding)
+    return record.value - np.where(is_angle[record.sensor], alone.innovations, corrected.innovations)
+
+
+def _likeness(m: Measured, time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
+    """Return the ratio of measured to simulated motion, and the share of the variance that it leaves unexplained."""
+    if not m.sensor.is_velocity:
+        simulated = np.unwrap(simulated) if m.channel.quantity.wraps else simulated
+        lag = max(1, int(np.searchsorted(time, time[0] + _LAG)))
+        measured, simulated = measured[lag:] - measured[:-lag], simulated[lag:] - simulated[:-lag]
+    if len(measured) < 2 or not np.ptp(measured) or not np.ptp(simulated):
+        return 0.0, 1.0
+    covariance = np.cov(measured, simulated)
+    ratio, share = covariance[0, 1] / covariance[1, 1], covariance[0, 1] ** 2 / np.prod(np.diag(covariance))
+    return float(ratio), float(1.0 - share)

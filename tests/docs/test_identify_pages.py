@@ -1,0 +1,182 @@
+"""The examples of the pages about identification work, and what they say of the method is what the code does."""
+
+import re
+from dataclasses import replace
+from importlib import import_module
+from inspect import getsource
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomlkit
+
+from rov_fmu.identify import assess, causes, slips
+from rov_fmu.identify.identify import _STARTS, identify
+from rov_fmu.identify.likelihood import objective, records
+from rov_fmu.identify.likelihood.parameters import OPTIONAL
+from rov_fmu.identify.result import KEPT, MOST_UNKNOWN, Answer, Disturbance, Prediction, Verdict
+from rov_fmu.model.layout import HEAVE
+from tests.commands import ROOT
+from tests.folders import FORCE, RATE, SPEED, TAU, read
+
+DOCS = ROOT / "docs"
+USE, FORMATS, METHOD = (DOCS / f"identify{end}.md" for end in ("", "-formats", "-method"))
+QUESTIONS = tomlkit.parse(Path(__file__).with_name("ten_questions.toml").read_text("utf-8")).unwrap()["question"]
+
+
+def text(page: Path) -> str:
+    """A page, with its lines joined."""
+    return " ".join(page.read_text("utf-8").split())
+
+
+def test_the_complete_rov_toml_makes_a_vehicle(tmp_path: Path) -> None:
+    page = (DOCS / "vehicle-file.md").read_text("utf-8")
+    (example,) = re.findall(r'```toml\n(\[vehicle\]\nname = "Tadpole".*?)```', page, re.DOTALL)
+    levels = (0.2, 0.4, 0.6, 0.8)
+    of_level = {
+        "thrust_rear": (FORCE, [31.0 * c * c + c for c in levels]),
+        "thrust_top": (FORCE, [9.0 * c * c + c for c in levels]),
+        "steady_surge": (SPEED, [1.1 * c for c in levels]),
+        "steady_heave": (SPEED, [0.4 * c for c in levels]),
+        "steady_yaw": (RATE, [1.3 * c for c in levels]),
+        "time_constant_surge": (TAU, [0.6 / c for c in levels]),
+    }
+    tables = {
+        f"{name}.csv": "\n".join([header, *(f"{c},{value:.6f}" for c, value in zip(levels, values, strict=True)), ""])
+        for name, (header, values) in of_level.items()
+    }
+    found = identify(read(tmp_path, example, tables))
+    assert [result.axis.name for result in found.axes] == ["surge", "heave", "yaw"]
+    assert found.vehicle.rov["m_rov"] == 8.2
+    assert found.vehicle.layout.drivers(found.axes[2].axis)
+
+
+def test_the_inertia_of_the_example_is_right() -> None:
+    words = (
+        r"a vehicle of ([\d.]+) kg gets β = ([\d.]+), it moves like ([\d.]+) kg, of which ([\d.]+) kg are added mass"
+    )
+    (numbers,) = re.findall(words, text(USE))
+    mass, beta, total, added = map(float, numbers)
+    assert total == pytest.approx(mass / beta, abs=0.06)
+    assert added == pytest.approx(mass * (1.0 / beta - 1.0), abs=0.06)
+
+
+def test_the_pages_are_short() -> None:
+    words = [word for page in (USE, FORMATS, METHOD) for word in text(page).split() if re.search(r"\w", word)]
+    assert len(words) <= 3500
+
+
+def test_the_formula_is_that_of_the_code() -> None:
+    formula = r"^ {4}(J\(theta, phi\) = .*)$"
+    (on_page,) = re.findall(formula, METHOD.read_text("utf-8"), re.MULTILINE)
+    assert on_page in (objective.__doc__ or "")
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=[str(n + 1) for n in range(len(QUESTIONS))])
+def test_page_and_code_answer_the_question(question: dict[str, str | float]) -> None:
+    assert str(question["page"]) in text(METHOD)
+    module, _, name = str(question["code"]).partition(":")
+    if name:
+        assert getattr(import_module(module), name) == question["value"]
+    else:
+        assert str(question["text"]) in (ROOT / module).read_text("utf-8")
+
+
+def test_there_are_ten_questions() -> None:
+    assert len(QUESTIONS) == 10
+    assert all(question["question"].endswith("?") and question["answer"] for question in QUESTIONS)
+
+
+def test_the_states_of_the_filter_are_those_of_the_code() -> None:
+    code = (ROOT / "fmu_src" / "engine" / "filter.c").read_text("utf-8")
+    (places,) = re.findall(r"enum \{\n +N_AXES.*?\n +N_X,", code, re.DOTALL)
+    named = re.findall(r"\| `([A-Z]+)` \|", METHOD.read_text("utf-8"))
+    assert named == re.findall(r"^ +((?!N_)[A-Z]+)(?: =|,)", places, re.MULTILINE)
+
+
+def test_the_starts_of_the_method_are_those_of_the_code() -> None:
+    page, (first, second) = text(METHOD), _STARTS
+    assert first == {"slow": 1.0, "white": 2.0}
+    assert second == {"slow": 1.0, "white": 4.0, "quadratic": 0.7}
+    assert "Both begin with the slow processes one deviation above the means of their priors" in page
+    assert "The first has the white noise two deviations above, and the second four, with 0.7 deviations more" in page
+
+
+def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
+    page, least = text(METHOD), assess._LEAST_CURRENT
+    assert f"faster than {records.FASTEST:g} per second are averaged" in page
+    assert f"up to |u| = {objective.OUTLYING:g} and" in page
+    assert f"The filter reads the first {assess.SETTLING:g} s" in page
+    assert f"positions and headings over {assess.AHEAD:g} s" in page
+    assert f"never claimed to better than {100.0 * assess._EXACT_SPEED:g} %" in page
+    assert f"a change of thrust of at least {100.0 * assess._LEAST_GAIN:g} %" in page
+    assert (
+        f"the current of an unseen log, which is about as large as in the others, but not below {least:g} m/s" in page
+    )
+    assert f"It is a fact below {100.0 * MOST_UNKNOWN:g} % of the thrust" in page
+    assert (
+        f"Bayes factor exceeds {causes.ENOUGH:g}, and that of the next cause by {causes.AHEAD:g} (`causes.py`)" in page
+    )
+    assert f"raises the evidence by more than {slips._CLEAR:g} (`slips.py`)" in page
+    assert f"They read {records.THINNED:g} samples per second" in page
+    assert len(OPTIONAL) == len(
+        page.partition("## Effects ")[2].partition(" are effects")[0].replace(" and ", ", ").split(", ")
+    )
+
+
+# ---- Verdicts --------------------------------------------------------------------------------------------------------
+
+
+def prediction(coverage: float = 0.95, error: float = 0.1) -> Prediction:
+    """Return the prediction of a velocity that changes by 1 m/s, with noise of 0.01 m/s."""
+    time = np.arange(100.0)
+    data = (time, np.sin(time), np.sin(time), np.ones(100))
+    return Prediction(
+        HEAVE, "log.csv", "heave velocity", "m/s", False, inf, "the other log", *data, 1.0, 0.01, error, coverage
+    )
+
+
+def answer(half_width: float = 0.01) -> Answer:
+    """Return a V_ss of 1 m/s with half the width of its interval."""
+    interval = (1.0 - half_width, 1.0 + half_width)
+    return Answer(HEAVE, 0.5, (1.0, interval), (1.0, interval), (1.0, interval))
+
+
+def judged(*predictions: Prediction, half_width: float = 0.01, difference: float = 0.0) -> Verdict:
+    return assess.verdict(predictions, [answer(half_width)], (), difference)
+
+
+def test_the_rules_of_the_page_are_those_of_the_verdict() -> None:
+    """Just inside and just outside each limit that the table has."""
+    usable, bad = re.findall(r"share of unseen .*? \| below (\d+) % \| below (\d+) %", text(METHOD))[0]
+    for limit, inside, outside in ((usable, "good", "usable"), (bad, "usable", "do not use")):
+        share = float(limit) / 100.0
+        assert judged(prediction(share + 0.01)).word == inside
+        assert judged(prediction(share - 0.01)).word == outside
+    wide, wider = re.findall(r"half-width of the best V_ss \| above (\d+) % \| above (\d+) %", text(METHOD))[0]
+    for limit, inside, outside in ((wide, "good", "usable"), (wider, "usable", "do not use")):
+        share = float(limit) / 100.0
+        assert judged(prediction(), half_width=share - 0.01).word == inside
+        assert judged(prediction(), half_width=share + 0.01).word == outside
+    ((difference),) = re.findall(r"two starts end .*? by more than (\d+)", text(METHOD))
+    assert judged(prediction(), difference=float(difference) - 1.0).word == "good"
+    assert judged(prediction(), difference=float(difference) + 1.0).word == "do not use"
+    worse, better = prediction(error=1.1), prediction()
+    assert judged(worse, better, better).word == "usable"
+    assert judged(worse, worse, better).word == "do not use"
+    (share,) = re.findall(r"what is unknown: [^|]* \| \| above (\d+) %", text(METHOD))
+    for beyond, word in ((-1.0, "good"), (1.0, "do not use")):
+        half = Disturbance("force", HEAVE, "log.csv", 1.0, "N", 0.005 * (float(share) + beyond), None, 2.0 * KEPT)
+        found = assess.verdict([prediction()], [answer()], [half, replace(half, kind="gain", axis=None)], 0.0)
+        assert found.word == word
+
+
+def test_every_reason_of_a_verdict_is_told_with_what_to_do() -> None:
+    table = USE.read_text("utf-8").partition("## When the verdict is not good")[2]
+    told = [row.split(" …")[0] for row in re.findall(r"^\| ([A-Z].*?) \|", table, re.MULTILINE)]
+    source, _, _ = getsource(assess.verdict).partition('if word == "good"')
+    _, *reasons = re.findall(r'"([A-Z][^"]*)', source)  # without the docstring
+    assert len(reasons) > len(told) > 0
+    assert not [reason for reason in reasons if not reason.startswith(tuple(told))]
+    assert not [row for row in told if not any(reason.startswith(row) for reason in reasons)]

@@ -1,0 +1,129 @@
+"""The shape of thrust curves: how a command is warped, its prior, and the quadratic curve that a vehicle file has."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, fitted
+from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.vehicles import VIDEORAY
+
+REAR, TOP = VIDEORAY.layout.curves
+COMMANDS = np.array([-1.0, -0.6, -0.05, 0.0, 0.02, 0.1, 0.3, 0.45, 0.9, 1.0])
+
+
+def drawn(seed: int) -> Shapes:
+    """Return a shape of the rear curve by its prior, of 10 %."""
+    return Shapes({"rear": 0.1 * np.random.default_rng(seed).standard_normal(COUNT)})
+
+
+def test_a_curve_without_a_shape_keeps_its_commands() -> None:
+    assert NO_SHAPES.commands("rear", COMMANDS).tolist() == COMMANDS.tolist()
+    assert drawn(0).commands("top", COMMANDS).tolist() == COMMANDS.tolist()
+    for command in (0.3, -0.7):
+        assert NO_SHAPES.force(VIDEORAY, REAR, command) == pytest.approx(2.0 * VIDEORAY.curve_force(REAR, command))
+        for axis in (SURGE, HEAVE, YAW):
+            motion = NO_SHAPES.motion(VIDEORAY, axis, command)
+            response = VIDEORAY.response(axis, command)
+            assert (motion.steady_velocity(), motion.time_constant()) == pytest.approx(response)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_warped_command_has_its_sign_and_is_whole_at_the_ends(seed: int) -> None:
+    """No command is no thrust, and the full command is described by the scale alone."""
+    warped = drawn(seed).commands("rear", COMMANDS)
+    assert np.sign(warped).tolist() == np.sign(COMMANDS).tolist()
+    assert warped[[0, 3, -1]].tolist() == [-1.0, 0.0, 1.0]
+    assert np.abs(warped).max() <= 1.0
+    assert np.abs(warped / np.where(COMMANDS, COMMANDS, 1.0) - 1.0).max() > 0.01
+
+
+def test_the_deviation_is_linear_between_knots_and_constant_below_them() -> None:
+    shape = drawn(1)
+
+    def eta(*commands: float) -> list[float]:
+        warped = shape.commands("rear", np.array(commands)).tolist()
+        return [acting / c - 1.0 for acting, c in zip(warped, commands, strict=True)]
+
+    low, high = eta(*KNOTS[1:3])
+    (middle,) = eta(0.5 * (KNOTS[1] + KNOTS[2]))
+    assert middle == pytest.approx(0.5 * (low + high))
+    assert eta(0.01, 0.05) == pytest.approx(eta(KNOTS[0]) * 2)
+    assert eta(-0.3) != pytest.approx(eta(0.3))
+
+
+def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:
+    """The force deviates by 10 % at weak commands, less towards full command, smoothly, and half alike astern."""
+    random = np.random.default_rng(2)
+    at = np.array([*KNOTS, -KNOTS[0]])
+    forces = []
+    for _ in range(4000):
+        shape = Shapes({"rear": 0.1 * random.standard_normal(COUNT)})
+        forces.append(1.5 * (shape.commands("rear", at) / at - 1.0))  # thrust grows about with this power
+    spread, correlation = np.std(forces, axis=0), np.corrcoef(np.transpose(forces))
+    to_full = np.exp(-0.5 * ((1.0 - np.array(KNOTS)) / 0.3) ** 2)
+    assert spread[:4] == pytest.approx(0.1 * np.sqrt(1.0 - to_full**2), rel=0.05)
+    assert correlation[0, 1] == pytest.approx(np.exp(-0.5 * (0.15 / 0.3) ** 2), abs=0.03)
+    assert correlation[0, 4] == pytest.approx(0.5, abs=0.05)
+
+
+def test_force_and_motion_are_those_of_the_warped_command() -> None:
+    shape = drawn(3)
+    for command in (0.3, -0.3):
+        (acting,) = shape.commands("rear", np.array([command])).tolist()
+        assert shape.force(VIDEORAY, REAR, command) == pytest.approx(2.0 * VIDEORAY.curve_force(REAR, acting))
+        assert shape.motion(VIDEORAY, SURGE, command).steady_velocity() == pytest.approx(
+            VIDEORAY.response(SURGE, acting)[0]
+        )
+        assert shape.motion(VIDEORAY, HEAVE, command).steady_velocity() == VIDEORAY.response(HEAVE, command)[0]
+
+
+def test_inputs_have_the_commands_of_their_thrusters() -> None:
+    names = [*VIDEORAY.layout.inputs]
+    rows = np.random.default_rng(4).uniform(-1.0, 1.0, (5, len(names)))
+    shape = drawn(4)
+    found = shape.inputs(VIDEORAY.layout, rows)
+    for place, name in enumerate(names):
+        expected = shape.commands("rear", rows[:, place]) if name in ("u_l", "u_r") else rows[:, place]
+        assert found[:, place].tolist() == expected.tolist()
+    assert NO_SHAPES.inputs(VIDEORAY.layout, rows) is rows
+
+
+# ---- The curve in the file -------------------------------------------------------------------------------------------
+
+
+def test_a_quadratic_curve_is_fitted_exactly() -> None:
+    found = fitted(TOP, lambda c: (6.5 * abs(c) + 0.2) * c, 0.0, 0.2, 0.8)
+    assert found == pytest.approx({"a_t_top": 6.5, "b_t_top": 0.2})
+
+
+def test_directions_and_the_dead_band_are_taken_into_account() -> None:
+    k = load_vehicle(SHIPPED["bluerov2"]).rov
+    (curve,) = k.layout.curves
+    assert {"a_t_reverse", "c_0"} <= {*curve.keys}
+    found = fitted(curve, lambda c: k.curve_force(curve, c), k["c_0_t200"], 0.0, 0.9)
+    names = [f"{key}_t200{end}" for end in ("", "_reverse") for key in ("a_t", "b_t")]
+    assert found == pytest.approx({name: k[name] for name in names}, rel=1e-6)
+
+
+def test_a_shape_is_fitted_where_it_was_tested() -> None:
+    """No other quadratic curve has smaller relative errors over the tested commands, (6)."""
+    shape, commands = drawn(5), np.linspace(0.2, 0.7, 40)
+    found = fitted(REAR, lambda c: shape.force(VIDEORAY, REAR, c), 0.0, 0.2, 0.7)
+
+    def error(coefficients: dict[str, float]) -> float:
+        near = VIDEORAY.replaced(coefficients)
+        off = [NO_SHAPES.force(near, REAR, c) / shape.force(VIDEORAY, REAR, c) - 1.0 for c in commands.tolist()]
+        return float(np.sqrt(np.mean(np.square(off))))
+
+    assert error(found) < 0.05 < error({})
+    for name, value in found.items():
+        assert error({**found, name: 1.01 * value}) > error(found) < error({**found, name: 0.99 * value})
+
+
+def test_one_tested_command_still_gives_a_curve() -> None:
+    found = fitted(replace(TOP, keys=(*TOP.keys, "c_0")), lambda c: 6.0 * c, 0.05, 0.3, 0.3)
+    assert all(np.isfinite([*found.values()]))

@@ -1,0 +1,230 @@
+"""The objective J: its derivatives, the parts that logs and tables have in it, and what counts less or not at all."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rov_fmu.engine.filter import Run
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.objective import Data, Objective, cost
+from rov_fmu.identify.likelihood.parameters import Parameter, table_of
+from rov_fmu.identify.likelihood.solve import minimise, total
+from rov_fmu.model.layout import HEAVE, YAW
+from rov_fmu.tank.arrays import Array
+from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled, responses
+from tests.recordings import clean, write_log
+from tests.vehicles import VIDEORAY
+
+PLAN = ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0), (0.2, 2.0))
+
+
+@pytest.fixture(scope="module")
+def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
+    """Return J for a short log of heave, two of yaw, and all tables of heave, of a vehicle with two curves."""
+    tables = {**responses(VIDEORAY, HEAVE), "thrust_top.csv": pulled(6.5, 0.05), "thrust_rear.csv": pulled(43.0, 2.7)}
+    path = folder_of(tmp_path_factory.mktemp("tests"), f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", tables)
+    random = np.random.default_rng(0)
+    for n, axis in enumerate((HEAVE, YAW, YAW)):
+        write_log(path, str(n), clean(VIDEORAY, axis, PLAN, 5.0).noisy(random))
+    known, logs, rows = begin(load_tests(path))
+    return Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+
+
+@pytest.fixture(scope="module")
+def place(objective: Objective) -> Array:
+    """Return parameters near the minimum, inside of their bounds. Outliers have kinks, and there is none."""
+    louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
+    found = minimise(objective, objective.mean + louder * objective.deviation)
+    root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
+    z = found.z + 0.5 * root @ np.random.default_rng(1).standard_normal(len(root))
+    z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
+    assert all(np.abs(run.innovations / np.sqrt(run.variances)).max() < 3.9 for run in objective.runs(z))
+    return np.asarray(z, float)
+
+
+def both_ways(objective: Objective, z: Array, n: int, runs: Sequence[Run]) -> Iterator[tuple[float, Array, list[Run]]]:
+    """Yield a step, the parameters and the runs for one parameter moved by it up, and then down."""
+    for step in (
+        h := (30.0 if objective.table.parameters[n].of_motion else 3.0) * objective.table.parameters[n].step,
+        -h,
+    ):
+        moved = z.copy()
+        moved[n] += step
+        yield step, moved, objective.runs(moved, runs)
+
+
+def names(parameters: Sequence[Parameter]) -> list[str]:
+    return [" ".join(filter(None, (p.kind, p.of, p.part))) for p in parameters]
+
+
+def test_derivatives_of_noise_are_those_of_other_differences(objective: Objective, place: Array) -> None:
+    """With another step, to both sides. Near rest, where drag has a kink, some samples have other derivatives."""
+    runs = objective.runs(place)
+    data = objective.data(place, runs)
+    for n, p in enumerate(objective.table.parameters):
+        if p.of_motion:
+            continue
+        (h, _, up), (_, _, down) = both_ways(objective, place, n, runs)
+        for one, above, below in zip(data, up, down, strict=False):
+            slopes = (above.innovations - below.innovations) / (2.0 * h)
+            log_slopes = np.log(above.variances / below.variances) / (2.0 * h)
+            for found, expected in ((one.slopes, slopes), (one.log_slopes, log_slopes)):
+                largest, errors = np.abs(expected).max(), np.abs(found[:, n] - expected)
+                assert np.quantile(errors, 0.85) <= (0.1 if p.kind == "logging width" else 0.03) * largest + 1e-9, p
+                assert errors.max() <= 0.2 * largest + 1e-9, p
+
+
+def test_derivatives_of_motion_are_those_with_frozen_gains(objective: Objective, place: Array) -> None:
+    runs = objective.runs(place)
+    data = objective.data(place, runs)
+    for n, p in enumerate(objective.table.parameters):
+        if not p.of_motion:
+            continue
+        (h, above, _), (_, below, _) = both_ways(objective, place, n, runs)
+        for number, one in enumerate(data[: len(runs)]):
+            up, down = (
+                objective.run(z, number, repeated=runs[number], frozen=True).innovations for z in (above, below)
+            )
+            expected = (up - down) / (2.0 * h)
+            assert np.abs(one.slopes[:, n] - expected).max() <= 5e-3 * np.abs(expected).max() + 1e-9, p
+            assert not one.log_slopes[:, n].any()
+
+
+def test_the_gradient_is_that_of_j(objective: Objective, place: Array) -> None:
+    """For the motion, J is that with frozen gains. Steps of 1 % in the size of noise give it to a few per cent.
+
+    A width has kinks, where the ends of windows meet samples.
+    """
+    runs = objective.runs(place)
+    gradient, information = total(objective, place, objective.data(place, runs))
+
+    def value(z: Array, moved: list[Run], *, of_motion: bool) -> float:
+        if of_motion:
+            numbers = range(len(runs))
+            frozen = [objective.run(z, n, repeated=runs[n], frozen=True).innovations for n in numbers]
+            moved = [replace(runs[n], innovations=frozen[n]) for n in numbers]
+        return objective.value(z, moved)
+
+    for n, name in enumerate(names(objective.table.parameters)):
+        of_motion = objective.table.parameters[n].of_motion
+        (h, z_up, up), (_, z_down, down) = both_ways(objective, place, n, runs)
+        expected = (value(z_up, up, of_motion=of_motion) - value(z_down, down, of_motion=of_motion)) / (2.0 * h)
+        near = 0.005 if of_motion else 0.2 if "width" in name else 0.06
+        assert abs(gradient[n] - expected) < near * abs(expected) + 0.01 * np.sqrt(information[n, n]), name
+        assert abs(expected) > 1e-6, name
+
+
+def test_a_common_scale_of_all_forces_changes_nothing(objective: Objective, place: Array) -> None:
+    """Thrust, drag, load and inertia times a factor: only the prior tells. This holds with frozen gains as well."""
+    runs, table, factor = objective.runs(place), objective.table, 1e-3
+    scaled = place.copy()
+    for n, p in enumerate(table.parameters):
+        if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
+            scaled[n] += factor
+        elif p.kind == "load":
+            scaled[n] *= np.exp(factor)
+    for n, run in enumerate(runs):
+        moved = objective.run(scaled, n, repeated=run, frozen=True)
+        assert np.abs((moved.innovations - run.innovations) / np.sqrt(run.variances)).max() < 1e-6
+
+
+def test_a_parameter_changes_only_the_logs_that_it_concerns(objective: Objective, place: Array) -> None:
+    runs = objective.runs(place)
+    for n, p in enumerate(objective.table.parameters):
+        (_, _, moved), _ = both_ways(objective, place, n, runs)
+        for number, (one, other) in enumerate(zip(moved, runs, strict=True)):
+            if not objective.concerns(p, number):
+                assert one.innovations.tolist() == other.innovations.tolist(), p
+                assert one.variances.tolist() == other.variances.tolist(), p
+    concerned = {p.kind: [objective.concerns(p, number) for number in range(3)] for p in objective.table.parameters}
+    assert concerned["load"] == [False, True, True], "of yaw, which comes last"
+    assert concerned["slow gain"] == [True, True, True]
+    assert concerned["row noise"] == [False, False, False]
+
+
+# ---- The parts of J --------------------------------------------------------------------------------------------------
+
+
+def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
+    """The prior, each sample of each log, and each row of a table, by the formula."""
+    runs, parameters = objective.runs(place), objective.table.parameters
+    expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(place.tolist(), parameters, strict=True))
+    for off, S in [*((run.innovations, run.variances) for run in runs), objective.row_values(place)]:
+        u = np.abs(off) / np.sqrt(S)
+        expected += float(np.sum(np.log(S) + np.where(u > 4.0, 8.0 * u - 16.0, u * u)))
+    assert objective.value(place, runs) == pytest.approx(expected, rel=1e-12)
+
+
+def test_rows_are_compared_with_the_model(objective: Objective) -> None:
+    """At the coefficients of the truth, without any effect, the rows of V_ss and Tau are exact."""
+    table, z = objective.table, objective.mean.copy()
+    k = VIDEORAY.replaced({"a_t_top": 6.5, "b_t_top": 0.05})
+    true = {"quadratic drag": k["a_d_w"], "linear drag": k["b_d_w"]}
+    alpha, inertia = k["alpha_w"], 1.0 / k["beta_w"]
+    for kind, value in true.items():  # the vehicle to be identified has α = 1
+        n = table.place(kind, "heave")
+        assert n is not None
+        z[n] = np.log(value / alpha)
+    n = table.place("inertia", "heave")
+    assert n is not None
+    z[n] = np.log(table.base["beta_w"] * inertia / alpha)
+    off, variances = objective.row_values(z)
+    measured = np.array([row.measured for row in objective.rows])
+    quantities = np.array([row.quantity for row in objective.rows])
+    assert {*quantities} == {"force", "V_ss", "Tau"}
+    heave = quantities != "force"
+    near_curve = np.abs([6.5 / 6.494 - 1.0, 0.05 / 0.0513 - 1.0]).max()
+    assert np.abs(off[heave] / measured[heave]).max() < near_curve
+    for row, variance in zip(objective.rows, variances.tolist(), strict=True):
+        same = [abs(other.measured) for other in objective.rows if other.subject is row.subject]
+        scale = max(same) if row.quantity == "force" else abs(row.measured)
+        n = table.place("row noise", row.noise)
+        assert n is not None
+        assert np.sqrt(variance) == pytest.approx(np.exp(objective.mean[n]) * scale)
+
+
+# ---- Heavy tails -----------------------------------------------------------------------------------------------------
+
+
+def one_sample(u: float) -> Data:
+    return Data(np.array([u]), np.ones(1), np.ones((1, 1)), np.zeros((1, 1)))
+
+
+def test_innovations_count_linearly_beyond_four_standard_deviations() -> None:
+    sizes = np.array([0.0, 1.0, 3.999, 4.001, 10.0, 100.0])
+    costs = [cost(np.array([u]), np.ones(1)) for u in sizes]
+    assert costs[:2] == [0.0, 1.0]
+    assert costs[3] - costs[2] == pytest.approx(0.016, rel=1e-3)
+    assert costs[5] - costs[4] == pytest.approx(8.0 * 90.0)
+    for u in (-50.0, -2.0, 0.5, 3.0, 7.0, 50.0):
+        above, below = (cost(np.array([u + h]), np.ones(1)) for h in (1e-6, -1e-6))
+        gradient, information = one_sample(u).information()
+        assert gradient[0] == pytest.approx((above - below) / 2e-6, rel=1e-5)
+        assert information[0, 0] == 2.0, "that of a normal sample, whatever its innovation is"
+
+
+def test_an_outlier_in_a_log_costs_by_its_distance(objective: Objective, place: Array) -> None:
+    record = objective.records[0]
+
+    def moved(by: float) -> float:
+        value = record.value.copy()
+        value[40] += by
+        objective.records[0] = replace(record, value=value)
+        try:
+            return objective.value(place, objective.runs(place))
+        finally:
+            objective.records[0] = record
+
+    first, second, third = (moved(by) for by in (100.0, 200.0, 300.0))
+    assert third - second == pytest.approx(second - first, rel=0.02)
+
+
+def test_some_samples_have_their_share_of_the_information(objective: Objective, place: Array) -> None:
+    (data, *_) = objective.data(place, objective.runs(place))
+    g, H = data.information()
+    half = len(data.innovations) // 2
+    parts = [data.information(part) for part in (slice(half), slice(half, None))]
+    assert parts[0][0] + parts[1][0] == pytest.approx(g)
+    assert parts[0][1] + parts[1][1] == pytest.approx(H)

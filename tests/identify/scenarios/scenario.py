@@ -1,0 +1,140 @@
+"""What a scenario is: a folder of tests by a seed, the true numbers, and what the identification is held to."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from tests.folders import HEAD, folder_of
+from verification.references.pool import Array
+
+COMMANDS = (0.3, 0.5, -0.3, -0.5)
+"""The commands of an axis at which V_ss is judged. An identification must answer the positive ones."""
+
+Truths = Mapping[tuple[str, str], float]
+"""The true numbers by axis and name: ("surge", "a_d_u"), ("surge", "V_ss 30 %"); the axis of a curve's is empty."""
+
+
+def steady_name(command: float) -> str:
+    """Return the name of V_ss at a command, a fraction of the full command: `V_ss 30 %`."""
+    return f"V_ss {100.0 * command:g} %"
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What the identification is held to in a scenario."""
+
+    effects: tuple[str, ...] = ()
+    """The kinds of effects that are really there, of anything (`delay`) or of one thing only (`load of heave`)."""
+    causes: tuple[str, ...] = ()
+    """The words of which a named cause of a disturbance must have one. Without any, only `unknown` is right."""
+    complete: bool = True
+    """True if the model can explain the data: intervals cover, nothing is biased, no alarm is raised."""
+    unusable: tuple[str, ...] = ()
+    """The axes of which at least one must be called `do not use`."""
+    like_owners: bool = False
+    """True for vehicles and conditions as owners have them: thrust is not exact, coverages and bands are judged by
+    wider limits from both sides, and false effects by axis."""
+    seconds: float = inf
+    """The most processor time of an identification, s."""
+    wider_than_gate: float = 2.5
+    """The widest intervals, relative to those of the gate. The gate took the offset of the logger, the lag, a constant
+    load and the drag astern as 0 where it found none; now they are uncertain."""
+
+
+NOTHING_SPECIAL = Expected()
+
+
+NOTHING_SPECIAL = Expected()
+
+
+class Scenario(Protocol):
+    """Logs of a vehicle by a seed, of which the identification knows what rov.toml tells."""
+
+    @property
+    def expected(self) -> Expected:
+        """What the identification is held to."""
+
+    def write(self, seed: int, folder: Path) -> None:
+        """Write rov.toml and the tests to a folder; what no fit may see, to its folder UNSEEN."""
+
+    def truths(self, seed: int) -> Truths:
+        """Return the true numbers that are judged."""
+
+
+# ---- A battery -------------------------------------------------------------------------------------------------------
+
+VOLTAGE = 16.0
+"""The voltage of a full battery, V."""
+_EXPONENT = 1.5
+"""Thrust is proportional to this power of the voltage."""
+
+
+def voltage(time: float, seconds: float = 60.0) -> float:
+    """Return the voltage (V) of a battery that loses 10 % in so many seconds."""
+    return VOLTAGE * (1.0 - 0.1 * time / seconds)
+
+
+def sagging(time: float, seconds: float = 60.0) -> float:
+    """Return the factor of the thrust under that voltage."""
+    return float((voltage(time, seconds) / VOLTAGE) ** _EXPONENT)
+
+
+# ---- Folders ---------------------------------------------------------------------------------------------------------
+
+UNSEEN = "unseen"
+"""The folder within a folder of tests with the logs that are held out by hand."""
+
+
+Table = Mapping[str, Array]
+"""The columns of a table by their headers."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """A coefficient that rov.toml gives."""
+
+    value: float
+    unit: str
+
+
+EXACT_THRUST = {"thrust": 0.0, "thrust_shape": 0.0}
+"""The priors of thrust curves without error, with which the absolute drag can be judged."""
+KNOWN_THRUST = {"thrust": 1e-4, "thrust_shape": 1e-4}
+"""The same for curves of which the dead band and the ratio of the thrust astern are free."""
+
+
+def write_folder(
+    folder: Path,
+    tables: Mapping[str, Table],
+    *,
+    base: str = "",
+    hardware: str = "",
+    known: Mapping[str, Given],
+    fit: Sequence[str] = (),
+    priors: Mapping[str, float] = {},
+) -> None:
+    """Write a folder of tests: its tables by file, and all that rov.toml tells.
+
+    The hardware is that of a base, or is given by tables of rov.toml. `fit` names the keys of [fit] that are true.
+    """
+    text = (f'base = "{base}"\n' if base else "") + HEAD + hardware
+    lines = {
+        "known": [
+            f'{name} = {{ value = {given.value!r}, unit = "{given.unit}", source = "measured" }}'
+            for name, given in known.items()
+        ],
+        "fit": [f"{key} = true" for key in fit],
+        "priors": [f"{key} = {deviation}" for key, deviation in priors.items()],
+    }
+    text += "".join("\n".join([f"\n[{table}]", *entries, ""]) for table, entries in lines.items() if entries)
+    folder_of(folder, text, {name: csv_text(table) for name, table in tables.items()})
+
+
+def csv_text(table: Table) -> str:
+    """Return the text of a CSV file. A cell is empty where there is no number."""
+    rows = zip(*table.values(), strict=True)
+    return "\n".join([",".join(table), *(",".join("" if np.isnan(x) else f"{x:.8g}" for x in row) for row in rows), ""])

@@ -1,0 +1,354 @@
+"""The findings of an identification: one sentence for each kind, its severity, and when there is none."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.findings import (
+    SENTENCES,
+    SEVERITY,
+    by_heading,
+    facts,
+    findings_of,
+    heading,
+    relative_error,
+    sentences,
+    warnings,
+)
+from rov_fmu.identify.result import Disturbance, Effect, Identification, Known, Logging, Point, Slip
+from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank import findings as reading
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Channel, Source
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.report.results import FILES, TIME, answers, axis_result, example, log, prediction, told, without_findings
+
+
+def quiet(**changes: Any) -> Identification:
+    """A result with one good axis and nothing to tell but its coverage, with some changes."""
+    result = without_findings()
+    none: dict[str, Any] = {"curves": {}, "forces": (), "effects": (), "disturbances": (), "logging": ()}
+    folder = replace(result.folder, findings=[])
+    return replace(result, **{"axes": result.axes[:1], "folder": folder, **none, **changes})
+
+
+def surge(**changes: Any) -> Identification:
+    """The quiet result with changes of its axis."""
+    result = quiet()
+    return replace(result, axes=(replace(result.axes[0], **changes),))
+
+
+def said(result: Identification, kind: str) -> list[str]:
+    """The sentences of a kind."""
+    return [*sentences(f for f in findings_of(result) if f.kind == kind)]
+
+
+def disturbance(kind: Any = "force", **changes: Any) -> Identification:
+    axis = None if kind == "gain" else SURGE
+    size, unit = {"force": (2.1, "N"), "gain": (0.12, "1"), "velocity": (0.11, "m/s")}[kind]
+    found = Disturbance(kind, axis, "log_3.csv", size, unit, 0.16, 41.2, 20.0)
+    return quiet(disturbances=(replace(found, **changes),))
+
+
+def with_channels(*names: str) -> Identification:
+    channels = tuple(Channel(QUANTITIES[name], Source(name), TIME, TIME) for name in names)
+    base = load_vehicle(SHIPPED["bluerov2"])
+    rov = Rov(replace(base.layout, coupled=False), base.rov.coefficients)
+    one = replace(log("dive.csv"), channels=channels)
+    return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=replace(base, rov=rov))
+
+
+def unidentified(*names: str) -> tuple[Known, ...]:
+    return tuple(Known(name, 1.0, None, "1", "1 within a factor of 3", 1.0) for name in names)
+
+
+def forces(*ratios: float) -> tuple[Point, ...]:
+    return tuple(
+        Point("top", "force", "N", "thrust_top.csv", 0.1 * n, 10.0 * n * ratio, 10.0 * n, 10.0 * n, counts=True)
+        for n, ratio in enumerate(ratios, 1)
+    )
+
+
+BETA = Known("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
+DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
+OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
+LATER = Effect("dead time", "", "dead time of the commands", 0.2, (0.1, 0.3), "s", 12.0)
+OF_CURVE = Effect("reverse thrust", "top", "thrust in reverse over that ahead", 0.8, (0.7, 0.9), "1", 12.0)
+LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
+FULL = replace(quiet().folder, logs=[log("a.csv", full=0.5)])
+
+CASES: Sequence[tuple[str, str, Identification, str]] = [
+    # ---- Warnings
+    (
+        "do not use",
+        "Warnings",
+        quiet(axes=without_findings().axes[2:]),
+        "yaw: do not use the model of this motion. The bands contain only 40 % of the unseen data. Two starts disagree",
+    ),
+    (
+        "worse than no change",
+        "Warnings",
+        surge(predictions=(DISTANCE,)),
+        "surge: the prediction of the distance in log_2.csv is off by 0.90 m (RMS), and a prediction of no change by "
+        "0.70 m",
+    ),
+    (
+        "slip",
+        "Warnings",
+        quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 40.0),)),
+        "log_1.csv: check the depth: is it in mm? The logs would agree much better",
+    ),
+    (
+        "second start",
+        "Warnings",
+        quiet(agreement=41.0),
+        "two fits from different starts ended at different vehicles, so the data do not decide between them. More or "
+        "longer logs would",
+    ),
+    (
+        "narrow bands",
+        "Warnings",
+        surge(predictions=(DISTANCE,)),
+        "surge: the 95% bands contain only 70% of the unseen data, so errors are larger than the model claims",
+    ),
+    (
+        "implausible inertia",
+        "Warnings",
+        surge(known=(BETA,)),
+        "surge: the vehicle moves as if its inertia were 0.67 times m_rov. Check m_rov, the positions and directions "
+        "of the thrusters, and the units of force and motion",
+    ),
+    (
+        "thrust tables",
+        "Warnings",
+        quiet(forces=forces(2.0, 2.1, 2.2)),
+        "top thrust: the forces in thrust_top.csv are 2.1 times those that fit the logs. Check their unit, how many "
+        "thrusters pulled together, and the battery",
+    ),
+    (
+        "unknown force",
+        "Warnings",
+        disturbance(),
+        "surge: an unknown slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 41 s on. Check the "
+        "tether, contact with the bottom or a wall, a current, and the payload",
+    ),
+    (
+        "unknown force",
+        "Warnings",
+        disturbance(axis=YAW, size=0.21, unit="N.m", since=0.3),
+        "yaw: an unknown slow torque of 0.21 N.m (RMS), 16% of the torque, acts in log_3.csv. Check the tether, "
+        "contact with the bottom or a wall, a current, and the payload",
+    ),
+    (
+        "change of thrust",
+        "Warnings",
+        disturbance("gain", since=None),
+        "the thrust changes slowly by 12% (RMS) in log_3.csv. Check the battery, and the thrusters for weed and damage",
+    ),
+    (
+        "velocity over ground",
+        "Warnings",
+        disturbance("velocity"),
+        "surge: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv from 41 s on. Check for waves "
+        "and a changing current",
+    ),
+    (
+        "explained disturbance",
+        "Warnings",
+        disturbance(cause="the pitch"),
+        "surge: a slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 41 s on. It follows the pitch: "
+        "`attitude = true` in [fit] takes it into account",
+    ),
+    (
+        "explained disturbance",
+        "Warnings",
+        disturbance("gain", cause="the temperature"),
+        "the thrust changes slowly by 12% (RMS) in log_3.csv from 41 s on. It follows the temperature",
+    ),
+    (
+        "coupling left out",
+        "Warnings",
+        with_channels("heading", "surge velocity"),
+        "dive.csv: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and Munk "
+        "forces of such a motion: `coupling = true` in [body] of rov.toml adds them",
+    ),
+    # ---- Doubts
+    (
+        "nothing predicted",
+        "Doubts",
+        surge(predictions=()),
+        "surge: no motion was predicted that the fit had not seen, so the errors of predictions are not known. Another "
+        "log would show them",
+    ),
+    (
+        "not identified",
+        "Doubts",
+        surge(known=unidentified("a_d_u", "b_d_u")),
+        "surge: the tests do not determine a_d_u and b_d_u. V_ss at 50% is 0.500 m/s (0.490 to 0.510)",
+    ),
+    (
+        "not identified",
+        "Doubts",
+        quiet(curves={"top": unidentified("b_t_top")}),
+        "top thrust: the tests do not determine b_t_top",
+    ),
+    (
+        "points differ",
+        "Doubts",
+        surge(points=(Point("surge", "V_ss", "m/s", "steady.csv", 0.3, 0.2, 0.25, 0.25, counts=True),)),
+        "surge: V_ss of the tables differs by 25% (RMS) from the model",
+    ),
+    (
+        "saturation",
+        "Doubts",
+        quiet(folder=FULL),
+        "a.csv: the thrusters had full commands for 50% of the time. If they cannot follow, they push less than the "
+        "model says",
+    ),
+    (
+        "clock",
+        "Doubts",
+        quiet(logging=(replace(LATE, offset=0.6, offset_interval=(0.5, 0.7)),)),
+        "log_1.csv: the commands act 0.6 s after their rows, although the rows are 0.1 s apart. Is the clock of the "
+        "commands another one?",
+    ),
+    (
+        "drift",
+        "Doubts",
+        surge(predictions=(prediction(YAW, "heading", error=0.9),)),
+        "surge: over all of log_2.csv, the predicted heading drifts away by 52 deg (RMS), and a prediction of no "
+        "change by 40 deg",
+    ),
+    # ---- Facts
+    ("coverage", "Facts", quiet(), "surge: the 95% bands contain 95% of the unseen data"),
+    (
+        "effect",
+        "Facts",
+        quiet(effects=(OF_FILE,)),
+        "log_1.csv: the current to the north is -0.100 m/s (-0.110 to -0.090). It belongs to the water, so the vehicle "
+        "file does not have it",
+    ),
+    (
+        "effect",
+        "Facts",
+        quiet(effects=(OF_CURVE,)),
+        "top thrust: the thrust in reverse over that ahead is 0.80 (0.70 to 0.90)",
+    ),
+    (
+        "effect",
+        "Facts",
+        quiet(effects=(LATER,)),
+        "the dead time of the commands is 0.20 s (0.10 to 0.30). The vehicle file does not have it; T_d in [commands] "
+        "would add it",
+    ),
+    (
+        "small disturbance",
+        "Facts",
+        disturbance(share=0.03),
+        "surge: an unknown slow force of 2.1 N (RMS), 3% of the thrust, acts in log_3.csv from 41 s on. It is small, "
+        "and the intervals allow for it",
+    ),
+    (
+        "logging",
+        "Facts",
+        quiet(logging=(LATE,)),
+        "log_1.csv: the commands act 0.08 s before their rows. This belongs to the logger, not to the vehicle",
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "severity", "result", "sentence"), CASES, ids=[kind for kind, *_ in CASES])
+def test_each_kind_has_its_sentence_and_severity(
+    kind: str, severity: str, result: Identification, sentence: str
+) -> None:
+    assert said(result, kind) == [sentence]
+    assert sentence in by_heading(findings_of(result))[SEVERITY[kind]]
+    assert SEVERITY[kind] == severity
+
+
+def test_every_own_kind_has_a_sentence_here() -> None:
+    own = {*SENTENCES} - {*reading.SENTENCES}
+    of_tuning = {kind for kind in own if kind.startswith("implausible tuned")}
+    assert {kind for kind, *_ in CASES} == own - of_tuning
+    assert {*SEVERITY} == {*SENTENCES}
+
+
+@pytest.mark.parametrize(
+    ("kind", "result"),
+    [
+        ("worse than no change", quiet()),
+        ("second start", quiet(agreement=39.0)),
+        ("narrow bands", quiet(axes=without_findings().axes[2:])),  # the reasons of the verdict tell it
+        ("thrust tables", quiet(forces=forces(1.1, 1.1, 0.9))),
+        ("unknown force", disturbance(evidence=5.0)),
+        ("effect", quiet(effects=(replace(OF_FILE, evidence=5.0),))),
+        ("logging", quiet(logging=(replace(LATE, offset_interval=(-0.1, 0.01)),))),
+        ("clock", quiet(logging=(LATE,))),
+        ("narrow bands", surge(predictions=(prediction(SURGE, "distance"),))),  # over a whole log it is not judged
+        ("coverage", surge(predictions=(prediction(SURGE, "distance"),))),
+        ("saturation", quiet(folder=replace(FULL, logs=[log("a.csv", full=0.1)]))),
+        ("coupling left out", with_channels("heading", "depth")),
+        ("implausible inertia", surge(known=(replace(BETA, value=1.2, interval=(1.0, 1.4)),))),
+    ],
+)
+def test_nothing_is_told_without_a_reason(kind: str, result: Identification) -> None:
+    assert not said(result, kind)
+
+
+def test_a_quiet_result_tells_its_coverage_alone() -> None:
+    assert {finding.kind for finding in findings_of(quiet())} == {"coverage"}
+
+
+def test_a_prediction_that_is_worse_than_no_change_is_never_silent() -> None:
+    """Neither for an axis that is not to be used, nor over a whole log, where bands are not judged."""
+    worse = [prediction(HEAVE, "depth", error=0.8, span=span) for span in (10.0, np.inf)]
+    result = quiet(axes=(axis_result(HEAVE, without_findings().axes[2].verdict, worse),))
+    assert len(said(result, "worse than no change")) == len(said(result, "drift")) == 1
+
+
+def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
+    kinds = [finding.kind for finding in example().findings]
+    headings = [*map(heading, example().findings)]
+    assert kinds[:2] == ["do not use", "worse than no change"]
+    assert headings == sorted(headings, key=["Warnings", "Doubts", "Facts"].index)
+    lost = Finding("missing column", file=FILES[0], names={"column": "t"})
+    result = without_findings()
+    late = told(replace(result, folder=replace(result.folder, findings=[lost])))
+    assert [finding.kind for finding in late.findings].index("missing column") == 2
+
+
+def test_findings_of_reading_are_told_too() -> None:
+    assert "log_1.csv: 3 rows out of order sorted" in facts(example().findings)
+    assert heading(Finding("unreadable file")) == "Warnings"
+    assert heading(Finding("time of arrival")) == "Doubts"
+
+
+def test_the_vehicle_has_warnings_with_doubts_and_facts() -> None:
+    groups = by_heading(example().findings)
+    assert warnings(example().findings) == groups["Warnings"] + groups["Doubts"]
+    assert facts(example().findings) == groups["Facts"]
+
+
+def test_logs_with_the_same_offset_share_a_sentence() -> None:
+    both = quiet(logging=(LATE, replace(LATE, file="log_2.csv", offset=-0.05)))
+    (sentence,) = said(both, "logging")
+    assert sentence.startswith("log_1.csv and log_2.csv: the commands act 0.05 ... 0.08 s before their rows")
+
+
+def test_relative_errors_are_of_points_that_count_and_are_determined() -> None:
+    points = [replace(p, counts=n != 1) for n, p in enumerate(forces(1.25, 7.0, 1.25))]
+    assert relative_error(points, "model") == pytest.approx(0.2)
+    points[0] = replace(points[0], held_out=np.nan)
+    assert relative_error(points, "held_out") == pytest.approx(0.2)
+    assert np.isnan(relative_error([], "model"))
+
+
+def test_a_coefficient_of_an_axis_without_answers_has_no_substitute() -> None:
+    result = surge(known=unidentified("a_d_u"), answers=answers(1.0, 0.1)[:1])
+    assert said(result, "not identified") == ["surge: the tests do not determine a_d_u"]

@@ -1,0 +1,555 @@
+"""A folder of tests becomes a vehicle: end to end, with logs of one axis, tables, or both, and what is refused."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from rov_fmu.cli import main
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.findings import facts, warnings
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
+from rov_fmu.identify.result import AxisResult, Identification
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.vehicle.uncertainty import Uncertainty
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
+from tests.commands import without_progress
+from tests.folders import ARM, BLUEROV2, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read, responses
+from tests.recordings import PLANS, Measured, clean, write_log
+from tests.vehicles import VIDEORAY
+
+TRUTH = VIDEORAY.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta_u": 0.8})
+"""The true vehicle. Its forces are those of a scale in a tank, so that every α is 1."""
+KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
+FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("rear", "top")}
+COMMANDS = (0.3, -0.3, 0.5, -0.5)
+FLAT = f"{FORCE}\n0.3,0.6\n-0.3,-0.6\n"
+STILL = "time [s],command [%],depth [m]\n" + "".join(f"{n / 10},{30 * (n > 9)},1.5\n" for n in range(50))
+
+
+def with_logs(folder: Path, axis: Axis, count: int, rov: str = KNOWN, tables: Mapping[str, str] = FORCES) -> Path:
+    """Write a folder with the first logs of an axis at 5 Hz, with noise."""
+    path, random = folder_of(folder, rov, tables), np.random.default_rng(0)
+    for n, plan in enumerate(PLANS[axis.name][:count]):
+        write_log(path, str(n), clean(TRUTH, axis, plan, 5.0).noisy(random))
+    return path
+
+
+def of_axis(found: Identification, axis: Axis) -> AxisResult:
+    return next(result for result in found.axes if result.axis is axis)
+
+
+def kinds(found: Identification) -> set[tuple[str, str]]:
+    """Return the kinds of all findings, with what they are about."""
+    return {(finding.kind, finding.axis or finding.curve or finding.file) for finding in found.findings}
+
+
+def check_answers(result: AxisResult, near: float, commands: tuple[float, ...] = COMMANDS) -> None:
+    """Check V_ss, Tau and the way to stop against the truth, which each interval contains (if it is 1.6 times as wide).
+
+    One of twenty intervals misses the truth, and a single log has twelve of them.
+    """
+    assert {answer.command for answer in result.answers} >= {*commands}
+    for answer in (answer for answer in result.answers if answer.command in commands):
+        V_ss, Tau = TRUTH.response(result.axis, answer.command)
+        truths = {"V_ss": (answer.steady, V_ss), "Tau": (answer.rise, Tau), "stop": (answer.stop, stop(result, V_ss))}
+        for name, ((value, (low, high)), true) in truths.items():
+            assert value == pytest.approx(true, rel=near), (name, answer.command)
+            assert abs(true - 0.5 * (low + high)) < 1.6 * 0.5 * (high - low), (name, answer.command)
+
+
+def stop(result: AxisResult, V_ss: float) -> float:
+    """Return the way from a velocity to a tenth of it without thrust, by the engine."""
+    axis, at = result.axis, np.linspace(0.0, 60.0, 30_001)
+    place = {"surge": "x", "heave": "z", "yaw": "psi"}[axis.name]
+    v, x = simulate(TRUTH, at, {axis.velocity: abs(V_ss)}, [axis.velocity, place]).values[:, 0]
+    return float(np.interp(-0.1 * abs(V_ss), -v, x))
+
+
+# ---- Tables alone ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def of_tables(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+    """Identify heave from forces, V_ss and Tau without errors."""
+    return identify(read(tmp_path_factory.mktemp("tables"), KNOWN, {**FORCES, **responses(TRUTH, HEAVE)}))
+
+
+def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None:
+    (heave,) = of_tables.axes
+    check_answers(heave, 1e-3)
+    for name in ("a_d_w", "b_d_w", "beta_w", "a_t_top", "b_t_top"):
+        low, high = of_tables.vehicle.intervals[name]
+        assert of_tables.vehicle.rov[name] == pytest.approx(TRUTH[name], rel=2e-3)
+        assert low <= TRUTH[name] <= high
+    assert heave.verdict.word == "good"
+    assert kinds(of_tables) == {
+        ("nothing predicted", "heave"),
+        ("unused curve", "rear"),
+        ("axis left out", "surge"),
+    } | {("axis left out", "yaw")}
+
+
+def test_each_row_has_what_the_model_says_about_it(of_tables: Identification) -> None:
+    points = [*of_axis(of_tables, HEAVE).points, *of_tables.forces]
+    assert {p.quantity for p in points} == {"force", "V_ss", "Tau"}
+    for p in points:
+        assert p.model == pytest.approx(p.measured, rel=1e-3)
+        assert p.held_out == pytest.approx(p.measured, rel=0.01)
+        assert p.counts
+
+
+def test_steady_velocities_alone_leave_the_inertia_to_its_prior(tmp_path: Path) -> None:
+    tables = {**FORCES, "steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]}
+    found = identify(read(tmp_path, KNOWN, tables))
+    (heave,) = found.axes
+    beta = next(known for known in heave.known if known.name == "beta_w")
+    assert beta.interval is None
+    assert beta.narrowed == pytest.approx(1.0, abs=0.01)
+    assert "beta_w" not in found.vehicle.intervals
+    (told,) = (f for f in found.findings if f.kind == "not identified" and f.axis == "heave")
+    assert told.names["coefficients"] == "beta_w"
+    assert heave.answers[0].steady[0] == pytest.approx(TRUTH.response(HEAVE, 0.3)[0], rel=1e-3)
+    low, high = heave.answers[0].rise[1]
+    assert high > 2.0 * low, "a time is hardly known without the inertia"
+
+
+def test_forces_at_one_command_are_enough_where_motion_tells_the_shape(tmp_path: Path) -> None:
+    found = identify(read(tmp_path, KNOWN, {"thrust_top.csv": FLAT, **responses(TRUTH, HEAVE)}))
+    check_answers(found.axes[0], 0.06)
+    for p in found.forces:
+        assert p.model == pytest.approx(p.measured, rel=0.05)
+
+
+def test_rows_outside_the_window_do_not_count(tmp_path: Path) -> None:
+    tables = {**FORCES, **responses(TRUTH, HEAVE)}
+    tables["steady_heave.csv"] += "0.9,2.5\n"
+    found = identify(read(tmp_path, f"{KNOWN}[windows]\nheave = [-1.0, 0.85]\n", tables))
+    (heave,) = found.axes
+    (outside,) = (p for p in heave.points if not p.counts)
+    assert (outside.command, outside.measured, np.isnan(outside.held_out)) == (0.9, 2.5, True)
+    check_answers(heave, 1e-3)
+
+
+# ---- The vehicle file ------------------------------------------------------------------------------------------------
+
+
+def check_file(found: Identification, path: Path) -> Vehicle:
+    """Check that the vehicle is the same after it is written and read; the vehicle as read."""
+    write_vehicle(found.vehicle, path)
+    read_again, made = load_vehicle(path), found.vehicle
+    for name, value in made.rov.coefficients.items():
+        assert read_again.rov[name] == pytest.approx(value, rel=1e-5)
+    assert read_again.intervals.keys() == made.intervals.keys()
+    for name, interval in made.intervals.items():
+        assert read_again.intervals[name] == pytest.approx(interval, rel=1e-5)
+    assert read_again.uncertainty.errors == pytest.approx(made.uncertainty.errors, rel=1e-5)
+    assert read_again.uncertainty.correlation == pytest.approx(made.uncertainty.correlation, abs=2e-6)
+    assert replace(read_again, rov=made.rov, intervals=made.intervals, estimates=made.estimates) == made
+    return read_again
+
+
+def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, tmp_path: Path) -> None:
+    vehicle = check_file(of_tables, tmp_path / "made.toml")
+    made = vehicle.provenance
+    assert made
+    assert {*made.inputs} == {"rov.toml", "thrust_top.csv", "thrust_rear.csv", "steady_heave.csv"} | {
+        "time_constant_heave.csv"
+    }
+    assert of_tables.vehicle.provenance
+    assert of_tables.vehicle.provenance.data == "tank tests"
+    assert (made.warnings, made.facts) == (warnings(of_tables.findings), facts(of_tables.findings))
+    assert vehicle.command_range == (0.2, 0.8)
+
+
+@pytest.mark.long
+def test_the_vehicle_file_is_built(of_tables: Identification, tmp_path: Path) -> None:
+    write_vehicle(of_tables.vehicle, tmp_path / "made.toml")
+    fmu = tmp_path / "made.fmu"
+    assert main(["build", str(tmp_path / "made.toml"), "--platform", "host", "-o", str(fmu)]) == 0
+    assert fmu.stat().st_size > 10_000
+
+
+def test_axes_that_share_a_curve_are_correlated_in_the_file(tmp_path: Path) -> None:
+    """Drag of surge and of yaw inherit the error of the curve's scale, so that V_ss is known much better than drag."""
+    random, rows = np.random.default_rng(1), {**FORCES, **responses(TRUTH, SURGE), **responses(TRUTH, YAW)}
+    lines = [line.split(",") for line in rows["thrust_rear.csv"].splitlines()[1:]]
+    noisy = [f"{c},{float(F) + 0.3 * random.standard_normal()}" for c, F in lines]
+    rows["thrust_rear.csv"] = "\n".join([FORCE, *noisy, ""])
+    found = identify(read(tmp_path / "tests", KNOWN, rows))
+    told = check_file(found, tmp_path / "made.toml").uncertainty
+    at = {name: n for n, name in enumerate(told.names)}
+    assert told.correlation[at["b_d_u"], at["a_d_r"]] > 0.5
+    alone = replace(told, correlation=np.eye(len(told.names)))
+    uniform = random.random((400, len(told.names)))
+    together, apart = (spread(found.vehicle, of, uniform) for of in (told, alone))
+    assert together < 0.7 * apart
+
+
+def spread(vehicle: Vehicle, told: Uncertainty, uniform: np.ndarray) -> float:
+    """Return the relative standard deviation of V_ss in yaw at half command over n sets of coefficients (n x p)."""
+    drawn = [vehicle.rov.replaced(dict(zip(told.names, row, strict=True))) for row in told.drawn(uniform).tolist()]
+    V_ss = [k.response(YAW, 0.5)[0] for k in drawn]
+    return float(np.std(V_ss) / np.mean(V_ss))
+
+
+def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> None:
+    base = load_vehicle(Path(__file__).parents[2] / "models" / "videoray_refit" / "videoray_refit.toml")
+    by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand" }\n'
+    tables = responses(TRUTH, YAW)
+    found = identify(read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', tables)).vehicle
+    assert found.rov["a_d_u"] == base.rov["a_d_u"]
+    assert found.rov["beta_w"] == 0.6
+    assert found.sources["beta_w"] == "by hand"
+    assert found.intervals.get("b_d_u") == base.intervals.get("b_d_u")
+    assert "beta_w" not in found.intervals
+    assert "a_d_r" in found.intervals
+
+
+def test_noisy_forces_leave_the_curve_uncertain(tmp_path: Path) -> None:
+    """The intervals of a_t and b_t cover. Chance alone lets fewer than six of eight do so once in 3,000 times."""
+    lines = [line.split(",") for line in FORCES["thrust_rear.csv"].splitlines()[1:]]
+    covered = 0
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        noisy = "\n".join([FORCE, *(f"{c},{float(F) + random.standard_normal()}" for c, F in lines), ""])
+        tables = {**FORCES, "thrust_rear.csv": noisy, **responses(TRUTH, SURGE)}
+        (path := tmp_path / str(seed)).mkdir()
+        found = identify(read(path, KNOWN, tables)).vehicle
+        for name in ("a_t_rear", "b_t_rear"):
+            low, high = found.intervals[name]
+            covered += low <= TRUTH[name] <= high
+    assert covered >= 6
+
+
+@pytest.mark.long
+def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
+    """Forces scatter by 2 % and motion by 3 %; of 40 vehicles, fewer than the limit miss once in 1,000 cases."""
+    random, exact = np.random.default_rng(2), {**FORCES, **responses(TRUTH, HEAVE)}
+    covered: dict[str, list[bool]] = {}
+    for n in range(40):
+        tables = {}
+        for name, text in exact.items():
+            share, (header, *lines) = 0.02 if name.startswith("thrust") else 0.03, text.splitlines()
+            rows = (line.split(",") for line in lines if line)
+            noisy = (f"{c},{float(y) * (1.0 + share * random.standard_normal())}" for c, y in rows)
+            tables[name] = "\n".join([header, *noisy, ""])
+        found = identify(read(tmp_path / str(n), KNOWN, tables))
+        for name in ("a_d_w", "b_d_w", "beta_w"):
+            low, high = found.vehicle.intervals[name]
+            covered.setdefault(name, []).append(low <= TRUTH[name] <= high)
+        for answer in found.axes[0].answers:
+            V_ss, Tau = TRUTH.response(HEAVE, answer.command)
+            for name, (_, (low, high)), true in (("V_ss", answer.steady, V_ss), ("Tau", answer.rise, Tau)):
+                covered.setdefault(f"{name} {answer.command}", []).append(low <= true <= high)
+    assert len(covered) == 11
+    assert min(map(sum, covered.values())) >= binom.ppf(0.001, 40, 0.95), {k: sum(v) for k, v in covered.items()}
+
+
+# ---- Logs of one axis ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def of_logs(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+    """Identify heave from forces and two logs."""
+    return identify(load_tests(with_logs(tmp_path_factory.mktemp("logs"), HEAVE, 2)))
+
+
+def test_logs_of_a_vehicle_give_the_vehicle(of_logs: Identification, tmp_path: Path) -> None:
+    (heave,) = of_logs.axes
+    check_answers(heave, 0.03)
+    for name in ("a_d_w", "b_d_w", "beta_w"):
+        low, high = of_logs.vehicle.intervals[name]
+        assert low <= TRUTH[name] <= high
+    assert heave.verdict.word == "good"
+    check_file(of_logs, tmp_path / "made.toml")
+
+
+def test_the_vehicle_of_the_file_moves_as_the_answers_say(of_logs: Identification) -> None:
+    """The file has the quadratic curve that is nearest to the fitted one."""
+    for answer in of_axis(of_logs, HEAVE).answers:
+        V_ss, Tau = of_logs.vehicle.rov.response(HEAVE, answer.command)
+        assert V_ss == pytest.approx(answer.steady[0], rel=0.02)
+        assert Tau == pytest.approx(answer.rise[0], rel=0.02)
+
+
+def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
+    """Each log is predicted from the other one: over its length, and anew after each 10 s."""
+    predictions = of_axis(of_logs, HEAVE).predictions
+    assert {(p.file, p.span) for p in predictions} == {
+        (f"log_heave_{n}.csv", span) for n in (0, 1) for span in (10.0, np.inf)
+    }
+    for p in predictions:
+        assert (p.quantity, p.unit, p.by) == ("depth", "m", "the other log")
+        assert p.error < 0.1 * p.unchanged
+        assert p.noise == pytest.approx(0.005, rel=0.2)
+        off = p.measured - p.predicted
+        assert p.error == pytest.approx(np.sqrt(np.mean(off**2)))
+        assert p.coverage == pytest.approx(np.mean(np.abs(off) < 1.96 * p.deviation))
+    assert of_axis(of_logs, HEAVE).coverage > 0.9
+
+
+def test_nothing_is_told_of_clean_logs_but_their_coverage(of_logs: Identification) -> None:
+    about_heave = {kind for kind, of in kinds(of_logs) if of not in ("surge", "yaw", "rear")}
+    assert about_heave == {"coverage"}
+    assert not any(effect.kept for effect in of_logs.effects)
+    for logging in of_logs.logging:
+        low, high = logging.offset_interval
+        assert low <= 0.0 <= high
+        assert logging.interval == pytest.approx(0.2)
+
+
+def test_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
+    (sensor,) = of_logs.sensors
+    assert (sensor.axis, sensor.quantity, sensor.unit, sensor.samples) == (HEAVE, "depth", "m", 2 * 300)
+    assert np.hypot(sensor.white, sensor.coloured) == pytest.approx(0.005, rel=0.15)
+
+
+def test_a_single_log_is_predicted_by_its_halves(tmp_path: Path) -> None:
+    found = identify(load_tests(with_logs(tmp_path, HEAVE, 1)))
+    (heave,) = found.axes
+    assert {p.by for p in heave.predictions} == {"the first half", "the second half"}
+    check_answers(heave, 0.03)
+
+
+def test_a_heading_that_turns_many_times_is_identified(tmp_path: Path) -> None:
+    """It is logged between 0 and 360 degrees."""
+    found = identify(load_tests(with_logs(tmp_path, YAW, 1)))
+    (yaw,) = found.axes
+    check_answers(yaw, 0.01)
+    assert yaw.verdict.word == "good", yaw.verdict.reasons
+    assert found.agreement < 1.0, "both starts end at the same vehicle"
+
+
+def test_a_velocity_is_identified(tmp_path: Path) -> None:
+    """The plans of surge are ahead alone, so that V_ss astern is not as well known."""
+    found = identify(load_tests(with_logs(tmp_path, SURGE, 1)))
+    (surge,) = found.axes
+    check_answers(surge, 0.05, (0.3, 0.5))
+    widths = {a.command: (a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in surge.answers}
+    assert widths[-0.5] > 5.0 * widths[0.5]
+
+
+Change = Callable[[Measured, np.random.Generator], Measured]
+
+
+def with_outliers(log: Measured, random: np.random.Generator) -> Measured:
+    """Return a log of which 3 % of the samples are off by metres."""
+    return replace(log, values=log.values + 1.5 * random.standard_normal(300) * (random.random(300) < 0.03))
+
+
+def with_gaps(log: Measured, random: np.random.Generator) -> Measured:
+    """Return a log that begins in motion, at irregular times, without some of its values."""
+    some = np.sort(random.choice(np.arange(35, 300), 200, replace=False))
+    values = np.where(random.random(200) < 0.1, np.nan, log.values[some])
+    return replace(log, time=log.time[some], command=log.command[some], values=values)
+
+
+def with_an_early_stamp(log: Measured, _: np.random.Generator) -> Measured:
+    """Return a log whose first row has a time long before the others."""
+    return replace(log, time=np.concatenate([[-60.0], log.time[1:]]))
+
+
+@pytest.mark.parametrize(
+    ("change", "near"),
+    [(with_outliers, 0.15), (with_gaps, 0.05), pytest.param(with_an_early_stamp, 0.05, marks=pytest.mark.long)],
+)
+def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_path: Path) -> None:
+    path, random = folder_of(tmp_path / "tests", KNOWN, FORCES), np.random.default_rng(3)
+    write_log(path, "0", change(clean(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
+    (heave,) = identify(load_tests(path)).axes
+    check_answers(heave, near)
+
+
+@pytest.mark.long
+def test_a_command_that_never_rests_gives_the_vehicle(tmp_path: Path) -> None:
+    """A joystick gives another command in every row."""
+    path, at = folder_of(tmp_path / "tests", KNOWN, FORCES), np.arange(400) / 10.0
+    commands = 0.45 * np.sin(0.4 * at) + 0.25 * np.sin(1.3 * at)
+    write_log(
+        path, "0", clean(TRUTH, HEAVE, [(c, 0.1) for c in commands.tolist()], 10.0).noisy(np.random.default_rng(3))
+    )
+    (heave,) = identify(load_tests(path)).axes
+    check_answers(heave, 0.05)
+
+
+@pytest.mark.long
+def test_an_identification_takes_seconds(tmp_path: Path) -> None:
+    """Three logs of 60 s at 20 Hz take the processor at most twice as long as it shall."""
+    path, random = folder_of(tmp_path / "tests", f'base = "videoray"\n{HEAD}', {}), np.random.default_rng(5)
+    for n, plan in enumerate(PLANS["heave"]):
+        write_log(path, str(n), clean(TRUTH, HEAVE, plan, 20.0).noisy(random))
+    began = time.process_time()
+    assert main(["identify", str(path)]) == 0
+    assert time.process_time() - began < 2.0 * 8.0
+
+
+def test_a_table_joins_the_logs_and_contradictions_are_told(tmp_path: Path) -> None:
+    doubled = "".join(f"{c},{2.0 * TRUTH.response(HEAVE, c)[0]:.6f}\n" for c in (0.3, 0.5, 0.7))
+    tables = {**FORCES, "steady_heave.csv": f"{SPEED}\n{doubled}"}
+    found = identify(load_tests(with_logs(tmp_path, HEAVE, 1, tables=tables)))
+    assert ("points differ", "heave") in kinds(found)
+    V_ss = {answer.command: answer.steady[0] for answer in of_axis(found, HEAVE).answers}
+    assert V_ss[0.5] == pytest.approx(TRUTH.response(HEAVE, 0.5)[0], rel=0.05), "rows that are far off have more noise"
+
+
+# ---- What rov.toml says ----------------------------------------------------------------------------------------------
+
+
+def test_exact_thrust_stays_as_it_is(tmp_path: Path) -> None:
+    """With a deviation of 0, the curve of the base is exact: neither its scale nor its shape is a parameter."""
+    rov = f'base = "videoray"\n{HEAD}[priors]\nthrust = 0.0\n'
+    found = identify(load_tests(with_logs(tmp_path, HEAVE, 1, rov, {})))
+    for name in ("a_t_top", "b_t_top"):
+        assert found.vehicle.rov[name] == TRUTH[name]
+    assert not {effect.kind for effect in found.effects} & {"reverse thrust", "dead band"}
+    drag = found.vehicle.intervals["a_d_w"]
+    assert drag[1] - drag[0] < 0.1 * TRUTH["a_d_w"]
+
+
+@pytest.mark.parametrize("key", [key for key in PRIORS if not key.endswith("noise")])
+def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> None:
+    rov = f'base = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'
+    folder = with_logs(tmp_path, HEAVE, 1, rov, {})
+    (path,) = folder.glob("log_*.csv")
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    sagging = [f"{row},{16.0 - 0.03 * n:.2f}" for n, row in enumerate(rows)]
+    path.write_text("\n".join([f"{header},voltage [V]", *sagging]) + "\n", encoding="utf-8")
+    found = identify(load_tests(folder))
+    assert all(np.isfinite(value) for value in found.vehicle.rov.coefficients.values())
+    assert all(np.isfinite(effect.evidence) for effect in found.effects)
+    absent = {"lag": "lag", "dead_time": "dead time", "load": "load", "dead_band": "dead band", "voltage": "voltage"}
+    assert absent.get(key) not in {effect.kind for effect in found.effects}
+    if key == "voltage":
+        assert found.vehicle.rov["n_V_top"] == USUAL_EXPONENT
+    if key.startswith("slow_"):
+        assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
+
+
+@pytest.mark.parametrize("key", ["white_noise", "coloured_noise"])
+def test_the_noise_of_a_sensor_is_never_exact(key: str, tmp_path: Path) -> None:
+    rov = f"{KNOWN}[priors]\n{key} = 0\n"
+    with pytest.raises(VehicleFileError, match=rf"rov\.toml: priors\.{key} = 0: must be above 0"):
+        read(tmp_path, rov, {**FORCES, **responses(TRUTH, HEAVE)})
+
+
+def test_known_coefficients_are_kept(tmp_path: Path) -> None:
+    known = KNOWN + 'beta_w = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
+    tables = {**FORCES, "steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]}
+    vehicle = identify(read(tmp_path, known, tables)).vehicle
+    assert (vehicle.rov["beta_w"], vehicle.sources["beta_w"]) == (0.8, "a guess")
+    assert vehicle.intervals["beta_w"] == (0.7, 0.9)
+
+
+def test_known_thrust_is_kept(tmp_path: Path) -> None:
+    """Even where the motion would rather have other forces."""
+    given = "".join(
+        f'{n}_top = {{ value = {TRUTH[f"{n}_top"]}, unit = "N", source = "pulled" }}\n' for n in ("a_t", "b_t")
+    )
+    vehicle = identify(load_tests(with_logs(tmp_path, HEAVE, 1, KNOWN + given, {}))).vehicle
+    assert [vehicle.rov[name] for name in ("a_t_top", "b_t_top")] == [TRUTH["a_t_top"], TRUTH["b_t_top"]]
+    assert vehicle.sources["a_t_top"] == "pulled"
+
+
+def test_a_vehicle_to_compare_with_is_loaded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tables = {**FORCES, **responses(TRUTH, HEAVE)}
+    folder = folder_of(tmp_path / "tests", f'against = "videoray"\n{KNOWN}', tables)
+    found = identify(load_tests(folder))
+    assert found.against
+    assert found.against.rov == VIDEORAY
+    with pytest.raises(VehicleFileError, match=r"rov\.toml: against = 'videoray2': must be a vehicle file"):
+        load_tests(folder_of(folder, f'against = "videoray2"\n{KNOWN}', tables))
+    assert not capsys.readouterr().out
+
+
+def test_progress_never_goes_back(tmp_path: Path) -> None:
+    told: list[tuple[str, float]] = []
+    tables = {**FORCES, **responses(TRUTH, HEAVE)}
+    identify(read(tmp_path, KNOWN, tables), lambda words, share: told.append((words, share)))
+    words, shares = zip(*told, strict=True)
+    assert words[0] == "reading the logs"
+    assert words[-1] == "what to measure next of heave"
+    assert list(shares) == sorted(shares)
+    assert (shares[0], shares[-1] < 1.0) == (0.0, True)
+
+
+# ---- Tests that cannot be used ---------------------------------------------------------------------------------------
+
+
+def test_a_log_that_teaches_nothing_is_left_out(tmp_path: Path) -> None:
+    path = with_logs(tmp_path, HEAVE, 1)
+    (path / "log_heave_2.csv").write_text(STILL, encoding="utf-8")
+    found = identify(load_tests(path))
+    (told,) = (finding for finding in found.findings if finding.file == "log_heave_2.csv")
+    assert told.kind == "constant motion"
+    made = found.vehicle.provenance
+    assert made
+    assert "log_heave_2.csv" in made.inputs
+    assert any(line.startswith("log_heave_2.csv") for line in made.facts)
+    assert {p.file for p in of_axis(found, HEAVE).predictions} == {"log_heave_0.csv"}
+
+
+def test_an_axis_without_a_usable_test_goes(tmp_path: Path) -> None:
+    still = STILL.replace("depth [m]", "heading [deg]")
+    found = identify(read(tmp_path, KNOWN, {**FORCES, **responses(TRUTH, HEAVE), "log_yaw.csv": still}))
+    assert [result.axis for result in found.axes] == [HEAVE]
+    assert not found.vehicle.layout.has(YAW)
+    assert {("axis left out", "yaw"), ("unused curve", "rear")} <= kinds(found)
+
+
+def test_tables_remain_where_the_logs_cannot_be_used(tmp_path: Path) -> None:
+    tables = {**FORCES, **responses(TRUTH, HEAVE), "log_heave.csv": STILL}
+    check_answers(identify(read(tmp_path, KNOWN, tables)).axes[0], 1e-3)
+
+
+BACKWARD = f"{FORCE}\n0.2,0.0\n0.5,-0.5\n0.8,-2.0\n"
+UP = f"{SPEED}\n0.3,-0.2\n0.5,-0.3\n0.8,-0.5\n"
+ALL = "".join(
+    f'{name} = {{ value = {TRUTH[name]}, unit = "{TRUTH.layout.coefficients[name].unit}", source = "s" }}\n'
+    for name in ("a_t_top", "b_t_top", "a_d_w", "b_d_w", "beta_w")
+)
+REFUSED: Mapping[str, tuple[str, Mapping[str, str], str]] = {
+    "nothing": (KNOWN, {}, "there are no tests"),
+    "forces alone": (KNOWN, FORCES, "no axis is tested"),
+    "nothing that moves": (BLUEROV2, {"log_heave.csv": STILL}, "depth never changes"),
+    "no force": (KNOWN, {"thrust_top.csv": f"{FORCE}\n0.2,0\n0.5,0\n"}, "thrust_top*.csv: must give a force above 0"),
+    "forces and nothing that moves": (KNOWN, {**FORCES, "log_heave.csv": STILL}, "depth never changes"),
+    "all of it given": (
+        KNOWN + ALL,
+        {"steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]},
+        "nothing is identifiable: rov.toml gives all that it tests",
+    ),
+    "no thrust curve": (KNOWN, responses(TRUTH, HEAVE), "no thrust_top*.csv"),
+    "no drag": (
+        KNOWN,
+        {**FORCES, "time_constant_heave.csv": responses(TRUTH, HEAVE)["time_constant_heave.csv"]},
+        "does not give a_d_w, b_d_w",
+    ),
+    "no mass": (HEAD, {**FORCES, **responses(TRUTH, HEAVE)}, "m_rov"),
+    "thrust that pulls": (KNOWN, {"thrust_top.csv": BACKWARD, **responses(TRUTH, HEAVE)}, "thrust_top"),
+    "motion against thrust": (KNOWN, {**FORCES, "steady_heave.csv": UP}, "steady_heave"),
+    "an unknown prior": (f"{KNOWN}[priors]\nthrst = 0.0\n", {**FORCES, **responses(TRUTH, HEAVE)}, "priors.thrst"),
+    "a negative prior": (f"{KNOWN}[priors]\nthrust = -1.0\n", {**FORCES, **responses(TRUTH, HEAVE)}, "priors.thrust"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_folder_that_cannot_be_used_is_one_line(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rov, tables, words = REFUSED[case]
+    folder, out = folder_of(tmp_path / "tests", rov, tables), tmp_path / "rov.toml"
+    code = main(["identify", str(folder), "-o", str(out)])
+    printed, err = capsys.readouterr()
+    said = without_progress(err)
+    assert (code, printed, out.exists()) == (2, "", False), said
+    lines = said.splitlines()
+    assert all(str(folder) in line and line.isprintable() for line in lines), "a line for each mistake"
+    assert words in lines[0].replace(str(folder), "")

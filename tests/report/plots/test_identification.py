@@ -1,0 +1,117 @@
+"""The plots of an identification report."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import FillBetweenPolyCollection
+from matplotlib.figure import Figure
+
+from rov_fmu.identify.result import Prediction
+from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_prediction
+from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.report.results import example, prediction
+
+
+def lines(ax: Axes) -> dict[str, tuple[list[float], list[float]]]:
+    """The data of each line with a label."""
+    return {str(line.get_label()): tuple(np.asarray(part).tolist() for part in line.get_data()) for line in ax.lines}
+
+
+def bands(ax: Axes) -> list[Array]:
+    """The corners of each shaded band."""
+    return [
+        np.asarray(band.get_paths()[0].vertices)
+        for band in ax.collections
+        if isinstance(band, FillBetweenPolyCollection)
+    ]
+
+
+def drawn(p: Prediction) -> Axes:
+    figure = Figure()
+    plot_prediction(figure, p)
+    (ax,) = figure.axes
+    return ax
+
+
+# ---- Predictions -----------------------------------------------------------------------------------------------------
+
+
+def test_a_prediction_has_its_measured_and_predicted_values_and_the_band() -> None:
+    p = prediction(HEAVE, "depth")
+    ax = drawn(p)
+    shown = lines(ax)
+    assert shown["measured"][1] == pytest.approx(p.measured[:: len(p.time) // 400].tolist())
+    assert shown["predicted"][1] == pytest.approx(p.predicted[:: len(p.time) // 400].tolist())
+    (band,) = bands(ax)
+    assert band[:, 1].max() == pytest.approx((p.predicted + 1.96 * p.deviation).max(), rel=1e-3)
+    assert band[:, 1].min() == pytest.approx((p.predicted - 1.96 * p.deviation).min(), rel=1e-3)
+    assert ax.get_title(loc="left") == "Depth (m)"
+
+
+def test_a_heading_is_drawn_in_degrees() -> None:
+    p = prediction(YAW, "heading")
+    ax = drawn(p)
+    assert ax.get_title(loc="left") == "Heading (°)"
+    assert max(lines(ax)["measured"][1]) == pytest.approx(np.degrees(p.measured.max()), rel=1e-3)
+
+
+def test_no_more_samples_are_drawn_than_can_be_seen() -> None:
+    p = prediction(SURGE, "distance")
+    many = (np.repeat(part, 20) for part in (p.time, p.measured, p.predicted, p.deviation))
+    time, measured, predicted, deviation = many
+    ax = drawn(replace(p, time=time, measured=measured, predicted=predicted, deviation=deviation))
+    assert 350 < len(lines(ax)["predicted"][0]) < 450
+
+
+# ---- Over the command ------------------------------------------------------------------------------------------------
+
+
+def test_answers_have_a_curve_and_a_band_for_each_direction_and_the_measured_points() -> None:
+    results = replace(example(), against=load_vehicle(VIDEORAY))
+    surge, *_ = results.axes
+    figure = Figure()
+    plot_answers(figure, results, surge, "V_ss")
+    (ax,) = figure.axes
+    assert len(bands(ax)) == 2
+    commands, values = lines(ax)["model"]
+    assert commands == pytest.approx([-70, -50, -30, -10])
+    assert values == pytest.approx([-0.7, -0.5, -0.3, -0.1])
+    assert lines(ax)["measured"] == ([30.0, 50.0], [0.29, 0.51])
+    other = load_vehicle(VIDEORAY).rov.response(SURGE, 0.7)[0]
+    assert lines(ax)["compared"][1][-1] == pytest.approx(other)
+    assert ax.get_title(loc="left") == "$V_{ss}$ (m/s)"
+
+
+def test_tau_is_in_seconds_and_points_that_do_not_count_are_hollow() -> None:
+    yaw = example().axes[2]
+    figure = Figure()
+    plot_answers(figure, example(), yaw, "Tau")
+    (ax,) = figure.axes
+    assert ax.get_title(loc="left") == "$Tau$ (s)"
+    (point,) = [line for line in ax.lines if line.get_label() == "not counted"]
+    assert point.get_markerfacecolor() == "none"
+    assert "measured" not in lines(ax)
+    assert "compared" not in lines(ax)
+
+
+def test_the_band_of_yaw_is_in_degrees_per_second() -> None:
+    figure = Figure()
+    plot_answers(figure, example(), example().axes[2], "V_ss")
+    (ax,) = figure.axes
+    assert max(band[:, 1].max() for band in bands(ax)) == pytest.approx(63.0 * 1.3)
+
+
+def test_forces_stand_in_the_order_of_the_command() -> None:
+    figure = Figure()
+    plot_forces(figure, example().forces[::-1])
+    (ax,) = figure.axes
+    commands, values = lines(ax)["model"]
+    assert commands == pytest.approx([20, 40, 60])
+    assert values == pytest.approx([2.1, 4.2, 6.3])
+    assert [line.get_color() for line in ax.lines] == [LIGHT["blue"], LIGHT["orange"], LIGHT["orange"]]
