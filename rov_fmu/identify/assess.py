@@ -1,4 +1,4 @@
-"""How far the model of each axis may be trusted: held-out predictions, answers, disturbances and verdicts."""
+"""How far the model of each axis may be trusted: held-out predictions, answers and verdicts."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -44,8 +44,6 @@ _REFIT_STEPS = 6
 _STOPPED = 0.1
 GOOD, USABLE = 0.8, 0.6
 """The least coverage of the bands for each verdict."""
-_LITTLE = 0.05
-"""A slow force is compared with at least this share of full thrust, also in a log without thrust."""
 _MOVING = 3.0
 """A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
 
@@ -253,7 +251,7 @@ def verdict(
         word = max(word, to, key=order.index)  # type: ignore[arg-type]
         reasons.append(reason)
 
-    judged = [p for p in found if p.is_position == (p.span < inf)]
+    judged = [p for p in found if p.is_judged]
     if judged:
         coverage = float(np.mean([p.coverage for p in judged]))
         if coverage < GOOD:

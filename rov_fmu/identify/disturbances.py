@@ -1,6 +1,7 @@
 """What is slow and not explained by the model: forces, changes of all thrust, and velocities over ground."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf, log
 
 import numpy as np
@@ -11,7 +12,7 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum
-from rov_fmu.identify.result import KEPT, Disturbance
+from rov_fmu.identify.result import Disturbance
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.tank.arrays import Array
 
@@ -29,7 +30,8 @@ def disturbances(objective: Objective, best: Minimum, posterior: Posterior) -> I
             found = [_disturbance(objective, n, best.z, p, runs, evidence) for n in range(len(runs))]
             present = [one for one in found if one]
             if present:
-                yield max(present, key=lambda one: one.share)
+                largest = max(present, key=lambda one: one.share)
+                yield replace(largest, cause=_cause(objective, best.z, p, runs, largest)) if largest.kept else largest
 
 
 def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: int) -> float:
@@ -53,16 +55,14 @@ def _disturbance(
 ) -> Disturbance | None:
     """Return a slow process in one log; None if the log does not have it."""
     one, run = objective.logs[number], runs[number]
-    places = [_place(objective, n, parameter) for n in range(len(runs))]
-    if places[number] < 0:
+    first = _place(objective, number, parameter)
+    if first < 0:
         return None
     axis = next((form.axis for form in one.layout.axes if form.axis.name == parameter.of), None)
-    columns = [places[number]]
-    if parameter.kind == "slow velocity" and axis is not HEAVE:
-        columns.append(columns[0] + 1)
+    columns = [first, first + 1] if parameter.kind == "slow velocity" and axis is not HEAVE else [first]
     states, deviations = run.states[:, columns], run.deviations[:, columns]
     size = float(np.sqrt(np.mean(np.sum(states**2, axis=1))))
-    time, cause, unit, usual = objective.records[number].time, "", "1", 1.0
+    time, unit, usual = objective.records[number].time, "1", 1.0
     if parameter.kind == "slow force":
         assert axis
         unit = axis.load
@@ -77,12 +77,18 @@ def _disturbance(
             if not form.axis.is_rotation and (form.axis is HEAVE) == (axis is HEAVE)
         ]
         usual = max(_rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
-    if evidence > KEPT and parameter.kind != "slow velocity":
-        cause = cause_of(objective, z, runs, places, SLOW[parameter.kind], axis)
     clear = np.flatnonzero(np.any(np.abs(states) > 2.0 * deviations, axis=1))
     since = float(time[clear[0]] - time[0]) if len(clear) else None
     kind = _KINDS[parameter.kind]
-    return Disturbance(kind, axis, one.log.file, size, unit, size / usual, since, evidence, cause)  # type: ignore[arg-type]
+    return Disturbance(kind, axis, one.log.file, size, unit, size / usual, since, evidence)  # type: ignore[arg-type]
+
+
+def _cause(objective: Objective, z: Array, parameter: Parameter, runs: Sequence[Run], slow: Disturbance) -> str:
+    """Return what a slow process follows in all logs, in words. Nobody knows what a velocity over ground follows."""
+    if slow.kind == "velocity":
+        return ""
+    places = [_place(objective, n, parameter) for n in range(len(runs))]
+    return cause_of(objective, z, runs, places, SLOW[parameter.kind], slow.axis)
 
 
 def _place(objective: Objective, number: int, parameter: Parameter) -> int:

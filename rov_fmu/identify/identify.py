@@ -43,7 +43,7 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
-from rov_fmu.vehicle.uncertainty import NORMAL
+from rov_fmu.vehicle.uncertainty import NORMAL, correlation
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
 _TOLD = 0.8
@@ -108,11 +108,12 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         if mistake := next(no_thrust(curve, vehicle.rov.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = slips(tests, known, fit.objective, fit.best.z)
+    held_out = _held_out_rows(fit)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
-        axes.append(_axis(tests, fit, vehicle, axis, predicted, slow, wrong))
-    names, correlation = _correlation(vehicle)
+        axes.append(_axis(tests, fit, vehicle, axis, predicted, slow, wrong, held_out))
+    names = tuple(vehicle.estimates)
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings]),
         inputs=tests.inputs,
@@ -120,12 +121,12 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         against=against,
         axes=tuple(axes),
         curves={curve.name: tuple(_known(fit, vehicle, _of_curve(curve))) for curve in known.curves},
-        forces=tuple(_points(tests, fit, vehicle.rov, "thrust")),
+        forces=tuple(_points(tests, held_out, vehicle.rov, "thrust")),
         effects=tuple(_effects(fit)),
         disturbances=tuple(slow),
         logging=tuple(_logging(fit)),
         sensors=tuple(_sensors(fit)),
-        correlation=(names, correlation),
+        correlation=(names, correlation(names, vehicle.estimates)),
         objective=fit.best.value,
         agreement=fit.difference,
         slips=wrong,
@@ -153,7 +154,8 @@ def fit_all(
             break
 
         def show(step: int, n: int = n) -> None:
-            on_progress(f"start {n + 1} of 2", 0.25 * n + 0.25 * min(step / 20.0, 1.0))
+            words = f"start {n + 1} of 2" if n < len(_STARTS) else "a more careful start"
+            on_progress(words, 0.25 * min(n, 1) + 0.25 * min(step / 20.0, 1.0))
 
         start = quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
         try:
@@ -431,13 +433,6 @@ def _of_curve(curve: Curve) -> list[str]:
     return [curve.coefficient(key) for key in curve.keys]
 
 
-def _correlation(vehicle: Vehicle) -> tuple[tuple[str, ...], Array]:
-    from rov_fmu.vehicle.uncertainty import correlation
-
-    names = tuple(vehicle.estimates)
-    return names, correlation(names, vehicle.estimates)
-
-
 # ---- Parts of the result ---------------------------------------------------------------------------------------------
 
 
@@ -449,6 +444,7 @@ def _axis(
     predicted: Sequence[Prediction],
     slow: Sequence[Disturbance],
     wrong: Sequence[Slip],
+    held_out: "_HeldOut",
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
     answers = assess.answers(fit.averaged, axis)
@@ -456,8 +452,8 @@ def _axis(
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
     points = [
-        *_points(tests, fit, vehicle.rov, "steady", axis.name),
-        *_points(tests, fit, vehicle.rov, "time_constant", axis.name),
+        *_points(tests, held_out, vehicle.rov, "steady", axis.name),
+        *_points(tests, held_out, vehicle.rov, "time_constant", axis.name),
     ]
     return AxisResult(
         axis=axis,
@@ -470,11 +466,13 @@ def _axis(
     )
 
 
-def _points(tests: Tests, fit: Fit, rov: Rov, kind: str, only: str | None = None) -> Iterator[Point]:
+_HeldOut = Mapping[tuple[str, str, float], float]
+"""The value of a row by a fit without it, by the quantity, the curve or axis, and the command."""
+
+
+def _points(tests: Tests, held_out: _HeldOut, rov: Rov, kind: str, only: str | None = None) -> Iterator[Point]:
     """Yield the rows of tables with what the vehicle says about them, also held out."""
     quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
-    held_out = _held_out_rows(fit)
-    by_key = {(id_of(row), row.command): value for row, value in zip(fit.objective.rows, held_out, strict=True)}
     for subject, rows in tests.rows(kind):
         if only and subject != only:
             continue
@@ -486,29 +484,21 @@ def _points(tests: Tests, fit: Fit, rov: Rov, kind: str, only: str | None = None
             )
             one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
             unit = "N" if kind == "thrust" else "s" if kind == "time_constant" else rov.layout.kinds[subject].axis.unit
-            out = by_key.get((id_of(one), row.command), np.nan)
+            out = held_out.get((quantity, subject, row.command), np.nan)
             counts = tests.counts(kind, subject, row.command)
             numbers = row.command, row.value, one.model(rov, NO_SHAPES), out
             yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 
 
-def id_of(row: TableRow) -> tuple[str, str]:
-    """Return what tells the tables apart."""
-    return row.quantity, row.subject.name
-
-
-def _held_out_rows(fit: Fit) -> Array:
-    """Return the value of each row of the tables by the information of all rows of other commands of its axis."""
+def _held_out_rows(fit: Fit) -> _HeldOut:
+    """Return the value of each row of the tables by a fit without all rows of the same size of the command."""
     objective, rows = fit.objective, fit.objective.rows
-    found = np.full(len(rows), np.nan)
-    if not rows:
-        return found
+    found: dict[tuple[str, str, float], float] = {}
     groups: dict[tuple[str, str, float], list[int]] = {}
     for n, row in enumerate(rows):
         kind = "force" if row.quantity == "force" else "motion"
         groups.setdefault((kind, row.subject.name, abs(row.command)), []).append(n)
     for members in groups.values():
-        chosen = np.array(members)
         others = [row for n, row in enumerate(rows) if n not in members]
         z = minimise(
             Objective(objective.table, objective.logs, others, thinned=True),
@@ -518,7 +508,8 @@ def _held_out_rows(fit: Fit) -> Array:
         ).z
         rov = Rov(objective.table.layout, objective.table.coefficients(z.tolist()))
         shapes = objective.table.shapes(z.tolist())
-        found[chosen] = [rows[n].model(rov, shapes) for n in members]
+        for row in (rows[n] for n in members):
+            found[row.quantity, row.subject.name, row.command] = row.model(rov, shapes)
     return found
 
 

@@ -100,6 +100,11 @@ class Parameter:
     unit: str = "1"
 
     @property
+    def is_slow_size(self) -> bool:
+        """True for the size of a slow process."""
+        return self.kind in SLOW
+
+    @property
     def step(self) -> float:
         """The change of z for its numerical derivative."""
         if not self.of_motion:

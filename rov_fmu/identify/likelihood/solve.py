@@ -129,7 +129,7 @@ def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, 
         gradient, information = gradient + g, information + H
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)
-        if parameter.kind.startswith("slow")
+        if parameter.is_slow_size
         else 0.0
         for n, (parameter, g) in enumerate(zip(objective.table.parameters, gradient, strict=True))
     ]
@@ -154,7 +154,7 @@ def _size_curvature(data: float, prior: float, prior_slope: float) -> float:
 def _step(objective: Objective, z: Array, gradient: Array, information: Array, free: Chosen, damping: float) -> Array:
     """Return the end of a damped step. What would leave its bounds stays at them, and the others move on without it."""
     weight, moving = 2.0 / objective.deviation**2, free.copy()
-    is_size = np.array([parameter.kind.startswith("slow") for parameter in objective.table.parameters])
+    is_size = np.array([parameter.is_slow_size for parameter in objective.table.parameters])
     moving &= ~((z <= objective.low) & (gradient > 0.0)) & ~((z >= objective.high) & (gradient < 0.0))
     change = np.zeros(len(z))
     for _ in range(len(z)):
