@@ -41,7 +41,7 @@ enum {
 static const double TURN = 6.283185307179586;
 static const double MARGIN = 0.005;   /* s: how near to a step a change of a command matters */
 static const double TINY = 1e-60;
-static const double OUTLYING = 4.0; /* standard deviations: larger innovations count as if they grew linearly (Huber) */
+static const double OUTLYING = 3.0; /* standard deviations: larger innovations count ever less, as those of an outlier */
 
 /* How a sensor's value follows from the states. */
 enum { STATE, OVER_GROUND, ANGLE };
@@ -575,11 +575,11 @@ static void take(const filter *f, belief *b, ptrdiff_t k, int repeats, double *o
     }
     double PH[N_X];
     *variance = project(f, b, sensor, PH);
-    const double size = fabs(*off) / sqrt(*variance), weight = size > OUTLYING ? OUTLYING / size : 1.0;
+    const double size = fabs(*off) / sqrt(*variance), weight = size > OUTLYING ? OUTLYING * OUTLYING / (size * size) : 1.0;
     memset(gain, 0, N_X * sizeof gain[0]);
     for (int a = 0; a < f->count; a++) {
-        const double share = PH[a] / *variance;
-        gain[f->listed[a]] = weight * share / f->set->unit[f->listed[a]];
+        const double share = weight * PH[a] / *variance;
+        gain[f->listed[a]] = share / f->set->unit[f->listed[a]];
         for (int c = 0; c < f->count; c++) {
             b->P[a][c] -= share * PH[c];
         }

@@ -44,6 +44,8 @@ _REFIT_STEPS = 6
 _STOPPED = 0.1
 GOOD, USABLE = 0.8, 0.6
 """The least coverage of the bands for each verdict."""
+_WIDEST = {"good": 0.15, "usable": 0.3}
+"""The largest half-width of the best interval of V_ss for each verdict, relatively."""
 _MOVING = 3.0
 """A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
 
@@ -276,10 +278,10 @@ def verdict(
     widths = [(a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in given]
     if not widths:
         lower("do not use", "No steady velocity is determined.")
-    elif min(widths) > 1.0:
-        lower("do not use", "The steady velocities are known to no better than half their size.")
-    elif min(widths) > 0.3:
-        lower("usable", "The steady velocities are known to no better than 15 %.")
+    elif min(widths) > 2.0 * _WIDEST["usable"]:
+        lower("do not use", f"The steady velocities are known to no better than {_WIDEST['usable']:.0%}.")
+    elif min(widths) > 2.0 * _WIDEST["good"]:
+        lower("usable", f"The steady velocities are known to no better than {_WIDEST['good']:.0%}.")
     for slip in slips:
         lower("do not use", f"Another unit or sign would explain the {slip.quantity} in {slip.file}.")
     if difference > DISAGREEMENT:

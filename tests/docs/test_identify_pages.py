@@ -106,7 +106,7 @@ def test_the_starts_of_the_method_are_those_of_the_code() -> None:
 def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
     page, least = text(METHOD), assess._LEAST_CURRENT
     assert f"faster than {records.FASTEST:g} per second are averaged" in page
-    assert f"up to |u| = {objective.OUTLYING:g} and" in page
+    assert f"up to |u| = c = {objective.OUTLYING:g}, and" in page
     assert f"The filter reads the first {assess.SETTLING:g} s" in page
     assert f"positions and headings over {assess.AHEAD:g} s" in page
     assert f"never claimed to better than {100.0 * assess._EXACT_SPEED:g} %" in page

@@ -1,16 +1,18 @@
 """The shape of thrust curves, and the motion of one axis with it.
 
-A curve is a scale times a shape. The shape may deviate smoothly from that of the prior curve: a command c acts like the
-command c (1 + eta(c)) of the prior curve, where eta is linear between knots, constant below the first one, and 0 at
-full command, which the scale describes. eta has a Gaussian prior with a correlation length, and the deviations ahead
-and astern are correlated by one half.
+A curve is a scale times a shape. The shape may deviate smoothly from that of the prior curve: a command c beyond the
+dead band d acts like the command d + (c - d) (1 + eta(c)) of the prior curve with this dead band. eta is a natural
+cubic spline, constant below its first knot, and 0 at full command, which the scale describes. (Lines between the knots
+would be off by 1 % of the thrust for published curves.) eta has a Gaussian prior with a correlation length, and the
+deviations ahead and astern are correlated by one half.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout, delayed_name
 from rov_fmu.model.riccati import Riccati
@@ -36,12 +38,20 @@ def _root() -> Array:
     return np.asarray(np.linalg.cholesky(both + 1e-9 * np.eye(COUNT)), np.float64)
 
 
+@cache
+def _spline() -> CubicSpline:
+    """Return the spline whose values are the weights of eta at the knots."""
+    return CubicSpline([*KNOTS, 1.0], np.eye(len(KNOTS) + 1)[:, :-1], bc_type="natural")
+
+
 @dataclass(frozen=True, eq=False)
 class Shapes:
     """The deviations of the shapes of some curves."""
 
     of: Mapping[str, Array]
     """By curve: COUNT independent coordinates times the relative deviation of the force."""
+    dead_bands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """By curve: the commands at which thrust begins, ahead and astern; 0 where there is none."""
     exact_astern: frozenset[str] = frozenset()
     """The curves that do not deviate astern."""
 
@@ -50,13 +60,14 @@ class Shapes:
         if curve not in self.of:
             return commands
         eta = _root() @ self.of[curve] / _POWER
-        size = np.abs(commands)
-        half = len(KNOTS)
-        ends = [*KNOTS, 1.0]
-        ahead, astern = (np.interp(size, ends, [*part, 0.0]) for part in (eta[:half], eta[half:]))
+        size, is_astern, half = np.abs(commands), commands < 0.0, len(KNOTS)
+        weights = _spline()(np.maximum(size, KNOTS[0]))
+        ahead, astern = weights @ eta[:half], weights @ eta[half:]
         if curve in self.exact_astern:
             astern = 0.0 * astern
-        return np.asarray(np.sign(commands) * np.clip(size * (1.0 + np.where(commands < 0.0, astern, ahead)), 0.0, 1.0))
+        band = np.where(is_astern, *reversed(self.dead_bands.get(curve, (0.0, 0.0))))
+        beyond = np.maximum(size - band, 0.0) * np.where(is_astern, astern, ahead)
+        return np.asarray(np.sign(commands) * np.clip(size + beyond, 0.0, 1.0))
 
     def inputs(self, layout: Layout, inputs: Array) -> Array:
         """Return rows of inputs with the commands of the prior curves. The inputs of the layout are its thrusters'."""

@@ -10,8 +10,8 @@ innovation eps_k and its variance S_k. The coefficients theta and the noise phi 
 
     J(theta, phi) = sum_k [ log S_k + rho(eps_k^2 / S_k) ]  -  2 log prior(theta, phi)
 
-where rho(u^2) = u^2 up to |u| = 4 and grows linearly in |u| beyond (Huber). The rows of the tables of tank tests are
-samples too: their innovation is measured minus model, and S is the square of their noise.
+where rho(u^2) = u^2 up to |u| = c = 3, and c^2 (1 + log(u^2 / c^2)) beyond, so that outliers count hardly more the
+farther they are. The rows of the tables of tank tests are samples too: their innovation is measured minus model, and S is the square of their noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ from rov_fmu.tank.arrays import Array
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
-OUTLYING = 4.0
+OUTLYING = 3.0
 """The size of an innovation, in standard deviations, from which it counts less (as in filter.c)."""
 
 
@@ -84,17 +84,18 @@ class Data:
     def information(self, chosen: Array | slice = slice(None)) -> tuple[Array, Array]:
         """Return the gradient and the Fisher information of the part of J that some samples contribute."""
         u = self.normalised[chosen]
-        weight = np.minimum(1.0, OUTLYING / np.maximum(np.abs(u), 1e-300))
+        weight = np.minimum(1.0, OUTLYING**2 / np.maximum(u * u, 1e-300))
         A = self.slopes[chosen] / np.sqrt(self.variances[chosen])[:, None]
         B = self.log_slopes[chosen]
-        return 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u), 2.0 * A.T @ A + B.T @ B
+        gradient = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
+        return gradient, 2.0 * (A.T * weight) @ A + B.T @ B
 
 
 def cost(innovations: Array, variances: Array) -> float:
     """Return the sum over the samples of log S + rho(eps^2 / S)."""
-    u = np.abs(innovations) / np.sqrt(variances)
-    rho = np.where(u > OUTLYING, OUTLYING**2 + 2.0 * OUTLYING * (u - OUTLYING), u * u)
-    return float(np.sum(np.log(variances) + rho))
+    u = innovations**2 / variances
+    beyond = OUTLYING**2 * (1.0 + np.log(np.maximum(u, OUTLYING**2) / OUTLYING**2))
+    return float(np.sum(np.log(variances) + np.where(u > OUTLYING**2, beyond, u)))
 
 
 class Objective:

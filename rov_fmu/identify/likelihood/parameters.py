@@ -192,12 +192,16 @@ class Table:
 
     def shapes(self, z: Sequence[float]) -> Shapes:
         """Return the deviations of the shapes of the curves."""
-        found = {}
+        found, bands = {}, {}
         for curve in self.layout.curves:
             if (first := self.place("thrust shape", curve.name, "1")) is not None:
                 found[curve.name] = self.shape_deviation * np.array(z[first : first + COUNT])
+                ahead = self.base.get(curve.coefficient("c_0"), 0.0)
+                astern = self.base.get(curve.coefficient(f"c_0{REVERSE}"), ahead)
+                fitted = self.place("dead band", curve.name)
+                bands[curve.name] = (ahead, astern) if fitted is None else (z[fitted], z[fitted])
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
-        return Shapes(found, frozenset(reverse))
+        return Shapes(found, bands, frozenset(reverse))
 
     def of_log(self, z: Sequence[float], one: Recorded) -> Parameters:
         """Return the parameters of the filter for a log."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, fitted
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
@@ -41,18 +42,49 @@ def test_a_warped_command_has_its_sign_and_is_whole_at_the_ends(seed: int) -> No
     assert np.abs(warped / np.where(COMMANDS, COMMANDS, 1.0) - 1.0).max() > 0.01
 
 
-def test_the_deviation_is_linear_between_knots_and_constant_below_them() -> None:
-    shape = drawn(1)
+def deviations(shape: Shapes, *commands: float) -> list[float]:
+    """Return eta at some commands of the rear curve, which has no dead band."""
+    warped = shape.commands("rear", np.array(commands)).tolist()
+    return [acting / c - 1.0 for acting, c in zip(warped, commands, strict=True)]
 
-    def eta(*commands: float) -> list[float]:
-        warped = shape.commands("rear", np.array(commands)).tolist()
-        return [acting / c - 1.0 for acting, c in zip(warped, commands, strict=True)]
 
-    low, high = eta(*KNOTS[1:3])
-    (middle,) = eta(0.5 * (KNOTS[1] + KNOTS[2]))
-    assert middle == pytest.approx(0.5 * (low + high))
-    assert eta(0.01, 0.05) == pytest.approx(eta(KNOTS[0]) * 2)
-    assert eta(-0.3) != pytest.approx(eta(0.3))
+def test_the_deviation_is_smooth_and_constant_below_the_knots() -> None:
+    """eta and its slope have no jump at a knot; at the outer ones its curvature is 0."""
+    shape, h = drawn(1), 1e-4
+    for knot in KNOTS[1:]:
+        below, at, above = deviations(shape, knot - h, knot, knot + h)
+        assert at - below == pytest.approx(above - at, abs=1e-3 * h)
+    first, second, third = deviations(shape, KNOTS[0], KNOTS[0] + h, KNOTS[0] + 2.0 * h)
+    assert third - 2.0 * second + first == pytest.approx(0.0, abs=1e-2 * h**2 + 1e-11)
+    assert deviations(shape, 0.01, 0.05) == pytest.approx([first, first])
+    assert deviations(shape, -0.3) != pytest.approx(deviations(shape, 0.3))
+
+
+def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
+    """The thrust of another maker's propeller, 51.5 N ((c - 0.06) / 0.94)^1.45, from the curve of the BlueROV2."""
+    k = load_vehicle(SHIPPED["bluerov2"]).rov
+    (curve,) = k.layout.curves
+    commands = np.linspace(0.02, 0.8, 40)
+    truth = 51.5 * np.maximum(commands - 0.06, 0.0) ** 1.45 / 0.94**1.45
+
+    def errors(p: np.ndarray) -> np.ndarray:
+        rov = k.replaced({"c_0_t200": float(p[0])})
+        shape = Shapes({curve.name: np.concatenate([p[2:], np.zeros(len(KNOTS))])}, {curve.name: (float(p[0]), 0.0)})
+        return np.exp(p[1]) * np.array([shape.force(rov, curve, c) for c in commands.tolist()]) - truth
+
+    best = least_squares(errors, [0.06, *np.zeros(1 + len(KNOTS))], diff_step=1e-5)
+    assert np.abs(best.fun).max() < 0.05
+    assert best.x[0] == pytest.approx(0.06, abs=0.015)
+
+
+def test_thrust_begins_at_the_dead_band_whatever_the_shape() -> None:
+    k = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"c_0_t200": 0.07})
+    (curve,) = k.layout.curves
+    for seed in range(3):
+        deviation = 0.1 * np.random.default_rng(seed).standard_normal(COUNT)
+        shape = Shapes({curve.name: deviation}, {curve.name: (0.07, 0.07)})
+        assert [shape.force(k, curve, c) for c in (0.0, 0.069, -0.069)] == [0.0, 0.0, 0.0]
+        assert shape.force(k, curve, 0.071) > 0.0 > shape.force(k, curve, -0.071)
 
 
 def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:

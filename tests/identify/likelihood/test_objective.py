@@ -153,7 +153,7 @@ def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
     expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(place.tolist(), parameters, strict=True))
     for off, S in [*((run.innovations, run.variances) for run in runs), objective.row_values(place)]:
         u = np.abs(off) / np.sqrt(S)
-        expected += float(np.sum(np.log(S) + np.where(u > 4.0, 8.0 * u - 16.0, u * u)))
+        expected += float(np.sum(np.log(S) + np.where(u > 3.0, 9.0 + 9.0 * np.log(np.maximum(u, 3.0) ** 2 / 9.0), u * u)))
     assert objective.value(place, runs) == pytest.approx(expected, rel=1e-12)
 
 
@@ -192,20 +192,29 @@ def one_sample(u: float) -> Data:
     return Data(np.array([u]), np.ones(1), np.ones((1, 1)), np.zeros((1, 1)))
 
 
-def test_innovations_count_linearly_beyond_four_standard_deviations() -> None:
-    sizes = np.array([0.0, 1.0, 3.999, 4.001, 10.0, 100.0])
+def test_innovations_count_hardly_more_beyond_three_standard_deviations() -> None:
+    sizes = np.array([0.0, 1.0, 2.999, 3.001, 30.0, 300.0])
     costs = [cost(np.array([u]), np.ones(1)) for u in sizes]
     assert costs[:2] == [0.0, 1.0]
-    assert costs[3] - costs[2] == pytest.approx(0.016, rel=1e-3)
-    assert costs[5] - costs[4] == pytest.approx(8.0 * 90.0)
-    for u in (-50.0, -2.0, 0.5, 3.0, 7.0, 50.0):
+    assert costs[3] - costs[2] == pytest.approx(0.012, rel=1e-3)
+    assert costs[5] - costs[4] == pytest.approx(9.0 * np.log(100.0))
+    for u in (-50.0, -2.0, 0.5, 3.5, 7.0, 50.0):
         above, below = (cost(np.array([u + h]), np.ones(1)) for h in (1e-6, -1e-6))
         gradient, information = one_sample(u).information()
         assert gradient[0] == pytest.approx((above - below) / 2e-6, rel=1e-5)
-        assert information[0, 0] == 2.0, "that of a normal sample, whatever its innovation is"
+        assert information[0, 0] == pytest.approx(2.0 * min(1.0, 9.0 / u**2)), "an outlier tells less"
 
 
-def test_an_outlier_in_a_log_costs_by_its_distance(objective: Objective, place: Array) -> None:
+def test_a_tenth_of_outliers_leaves_the_noise_of_the_others() -> None:
+    """The variance at which the costs of normal samples and of far outliers balance is below that of the samples."""
+    random = np.random.default_rng(1)
+    off = np.where(np.arange(4000) % 20 == 0, 500.0, 1.0) * random.standard_normal(4000)
+    sizes = np.geomspace(0.5, 20.0, 200)
+    best = sizes[np.argmin([cost(off, np.full(4000, size**2)) for size in sizes])]
+    assert 1.0 < best < 1.6
+
+
+def test_an_outlier_in_a_log_costs_by_the_logarithm_of_its_distance(objective: Objective, place: Array) -> None:
     record = objective.records[0]
 
     def moved(by: float) -> float:
@@ -217,8 +226,9 @@ def test_an_outlier_in_a_log_costs_by_its_distance(objective: Objective, place: 
         finally:
             objective.records[0] = record
 
-    first, second, third = (moved(by) for by in (100.0, 200.0, 300.0))
+    first, second, third = (moved(by) for by in (100.0, 1000.0, 10000.0))
     assert third - second == pytest.approx(second - first, rel=0.02)
+    assert third - second == pytest.approx(9.0 * np.log(100.0), rel=0.02)
 
 
 def test_some_samples_have_their_share_of_the_information(objective: Objective, place: Array) -> None:
