@@ -12,7 +12,7 @@ import pytest
 import tomlkit
 
 from rov_fmu.identify import assess, causes, slips
-from rov_fmu.identify.identify import _STARTS, identify
+from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records
 from rov_fmu.identify.likelihood.parameters import OPTIONAL
 from rov_fmu.identify.result import KEPT, MOST_UNKNOWN, Answer, Disturbance, Prediction, Verdict
@@ -93,14 +93,6 @@ def test_the_states_of_the_filter_are_those_of_the_code() -> None:
     (places,) = re.findall(r"enum \{\n +N_AXES.*?\n +N_X,", code, re.DOTALL)
     named = re.findall(r"\| `([A-Z]+)` \|", METHOD.read_text("utf-8"))
     assert named == re.findall(r"^ +((?!N_)[A-Z]+)(?: =|,)", places, re.MULTILINE)
-
-
-def test_the_starts_of_the_method_are_those_of_the_code() -> None:
-    page, (first, second) = text(METHOD), _STARTS
-    assert first == {"slow": 1.0, "white": 2.0}
-    assert second == {"slow": 1.0, "white": 4.0, "quadratic": 0.7}
-    assert "Both begin with the slow processes one deviation above the means of their priors" in page
-    assert "The first has the white noise two deviations above, and the second four, with 0.7 deviations more" in page
 
 
 def test_the_numbers_of_the_method_are_those_of_the_code() -> None:

@@ -11,7 +11,8 @@ innovation eps_k and its variance S_k. The coefficients theta and the noise phi 
     J(theta, phi) = sum_k [ log S_k + rho(eps_k^2 / S_k) ]  -  2 log prior(theta, phi)
 
 where rho(u^2) = u^2 up to |u| = c = 3, and c^2 (1 + log(u^2 / c^2)) beyond, so that outliers count hardly more the
-farther they are. The rows of the tables of tank tests are samples too: their innovation is measured minus model, and S is the square of their noise.
+farther they are. The rows of the tables of tank tests are samples too: their innovation is measured minus model, and S
+is the square of their noise.
 """
 
 from collections.abc import Callable, Sequence

@@ -153,7 +153,9 @@ def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
     expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(place.tolist(), parameters, strict=True))
     for off, S in [*((run.innovations, run.variances) for run in runs), objective.row_values(place)]:
         u = np.abs(off) / np.sqrt(S)
-        expected += float(np.sum(np.log(S) + np.where(u > 3.0, 9.0 + 9.0 * np.log(np.maximum(u, 3.0) ** 2 / 9.0), u * u)))
+        expected += float(
+            np.sum(np.log(S) + np.where(u > 3.0, 9.0 + 9.0 * np.log(np.maximum(u, 3.0) ** 2 / 9.0), u * u))
+        )
     assert objective.value(place, runs) == pytest.approx(expected, rel=1e-12)
 
 
