@@ -7,6 +7,7 @@ from math import inf, isfinite, log
 import numpy as np
 
 from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.curves import NO_SHAPES, Shapes
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
 from rov_fmu.identify.likelihood.solve import Minimum, minimise, total
@@ -184,26 +185,33 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 # ---- Answers ---------------------------------------------------------------------------------------------------------
 
 
-def answers(posterior: Posterior, axis: Axis) -> tuple[Answer, ...]:
-    """Return how fast, how long and how far, for the usual commands of an axis."""
+def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...]:
+    """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
+
+    The values are those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit,
+    whose curves bend freely, the intervals are wider by the difference.
+    """
     table = posterior.table
 
-    def values(z: Array) -> Array:
-        rov, shapes = Rov(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist())
+    def values(rov: Rov, shapes: Shapes) -> Array:
         return np.array([_response(shapes.motion(rov, axis, c)) for c in COMMANDS])
 
     def logarithms(z: Array) -> Array:
+        fitted = values(Rov(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log(np.abs(values(z))).ravel()
+            return np.log(np.abs(fitted)).ravel()
 
     slopes = posterior.slopes(logarithms, posterior.of_vehicle)
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
     variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(COMMANDS), 3)
     # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
     variances[:, :2] += (_OF_THRUST * table.get(posterior.z.tolist(), "slow gain")) ** 2
-    errors = np.sqrt(variances)
+    of_file = values(vehicle, NO_SHAPES)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z).reshape(of_file.shape)) / QUANTILE
+    errors = np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0)
     found = []
-    for command, error, (V, rise, stop) in zip(COMMANDS, errors, values(posterior.z).tolist(), strict=True):
+    for command, error, (V, rise, stop) in zip(COMMANDS, errors, of_file.tolist(), strict=True):
         half = max(QUANTILE * error[0], _EXACT_SPEED) / QUANTILE
         steady = around(abs(V), abs(V) * half, positive=True)
         signed = steady if V >= 0.0 else (-steady[1], -steady[0])

@@ -40,7 +40,7 @@ _CONTRADICTION = 0.15
 _FULL = 0.98
 _SATURATED = 0.2
 """Logs are doubted in which thrusters have at least the command _FULL for this share of the time."""
-_NEGLIGIBLE = 0.005
+_NEGLIGIBLE = 0.01
 """A disturbance below this share of the thrust is not told."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""

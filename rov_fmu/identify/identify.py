@@ -50,6 +50,8 @@ _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 _ROW_STEPS = 10
 """The steps of a fit without the rows of one command."""
+_EXACT_BAND = 0.01
+"""A dead band is never claimed to better than this command: thrust begins gradually."""
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
 _QUICK = 4.0
@@ -420,6 +422,8 @@ def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Known]:
 def _interval(rov: Rov, name: str, error: float) -> Interval:
     """Return the 95 % interval of a coefficient within its bounds."""
     declaration = rov.layout.coefficients[name]
+    if name.startswith("c_0"):
+        error = max(error, _EXACT_BAND / QUANTILE)
     low, high = around(rov[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
     return max(low, declaration.minimum), min(high, declaration.maximum)
 
@@ -447,7 +451,7 @@ def _axis(
     held_out: "_HeldOut",
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
-    answers = assess.answers(fit.averaged, axis)
+    answers = assess.answers(fit.averaged, axis, vehicle.rov)
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
@@ -522,6 +526,8 @@ def _effects(fit: Fit) -> Iterator[Effect]:
         posterior = fit.posterior.without([m for m in gone if m != n])
         factor, unit = _in_units(fit.known, p)
         value, error = number(p, posterior.z[n]) * factor, posterior.errors[n] * factor
+        if p.kind == "dead band":
+            error = max(error, _EXACT_BAND / QUANTILE)
         if p.kind == "load":
             axis = next(axis for axis in fit.known.fitted if axis.name == p.of)
             value += fit.known.coefficients[axis.coefficient("F_0")]

@@ -70,7 +70,7 @@ def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
     def errors(p: np.ndarray) -> np.ndarray:
         rov = k.replaced({"c_0_t200": float(p[0])})
         shape = Shapes({curve.name: np.concatenate([p[2:], np.zeros(len(KNOTS))])}, {curve.name: (float(p[0]), 0.0)})
-        return np.exp(p[1]) * np.array([shape.force(rov, curve, c) for c in commands.tolist()]) - truth
+        return np.asarray(np.exp(p[1]) * np.array([shape.force(rov, curve, c) for c in commands.tolist()]) - truth)
 
     best = least_squares(errors, [0.06, *np.zeros(1 + len(KNOTS))], diff_step=1e-5)
     assert np.abs(best.fun).max() < 0.05
