@@ -41,7 +41,7 @@ enum {
 static const double TURN = 6.283185307179586;
 static const double MARGIN = 0.005;   /* s: how near to a step a change of a command matters */
 static const double TINY = 1e-60;
-static const double OUTLYING = 3.0; /* standard deviations: larger innovations count ever less, as those of an outlier */
+static const double OUTLYING = 3.0; /* standard deviations: a larger innovation corrects the states as if it were no larger (Huber) */
 
 /* How a sensor's value follows from the states. */
 enum { STATE, OVER_GROUND, ANGLE };
@@ -575,7 +575,7 @@ static void take(const filter *f, belief *b, ptrdiff_t k, int repeats, double *o
     }
     double PH[N_X];
     *variance = project(f, b, sensor, PH);
-    const double size = fabs(*off) / sqrt(*variance), weight = size > OUTLYING ? OUTLYING * OUTLYING / (size * size) : 1.0;
+    const double size = fabs(*off) / sqrt(*variance), weight = size > OUTLYING ? OUTLYING / size : 1.0;
     memset(gain, 0, N_X * sizeof gain[0]);
     for (int a = 0; a < f->count; a++) {
         const double share = weight * PH[a] / *variance;

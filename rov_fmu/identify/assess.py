@@ -188,8 +188,8 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
-    The values are those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit,
-    whose curves bend freely, the intervals are wider by the difference.
+    The values are those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the
+    fit, whose curves bend freely, the intervals are wider by the difference.
     """
     table = posterior.table
 

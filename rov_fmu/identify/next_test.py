@@ -29,7 +29,10 @@ _RATE = 10.0
 
 
 def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: TankLimits) -> NextTest | None:
-    """Return the test that narrows the least certain steady velocity of an axis most; None if it has no log or needs no test."""
+    """Return the test that narrows the least certain steady velocity of an axis most.
+
+    None if no log tests the axis, or if all its velocities are well known.
+    """
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
 
     def motion(z: Array, command: float) -> Riccati:
