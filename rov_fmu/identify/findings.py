@@ -42,6 +42,8 @@ _SATURATED = 0.2
 """Logs are doubted in which thrusters have at least the command _FULL for this share of the time."""
 _NEGLIGIBLE = 0.01
 """A disturbance below this share of the thrust is not told."""
+_MOST_OUTLIERS = 0.005
+"""Outliers are told if more of a sensor's samples are."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 _BETA, _BETA_WITH_ADDED_MASS = (0.05, 1.1), (0.3, 3.0)
@@ -104,6 +106,7 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "{files}: the thrusters had full commands for {share:.0%} of the time. If they cannot follow, they push "
             "less than the model says"
         ),
+        "outliers": "{axes}: {share:.0%} of the samples of the {quantity} are outliers, which hardly count in the fit",
         "clock": (
             "{files}: the commands act {time} s {beside} their rows, although the rows are {interval} s apart. Is the "
             "clock of the commands another one?"
@@ -222,6 +225,10 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for log_of in identification.folder.logs:
         found += _on_log(identification, log_of)
     found += filter(None, map(_logging, identification.logging))
+    for sensor in identification.sensors:
+        if sensor.outliers > _MOST_OUTLIERS:
+            numbers = {"share": sensor.outliers}
+            found.append(Finding("outliers", sensor.axis.name, names={"quantity": sensor.quantity}, numbers=numbers))
     found += [_effect(identification, effect) for effect in identification.effects if effect.kept]
     for slip in identification.slips:
         found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
@@ -272,9 +279,14 @@ def _on_trust(result: AxisResult) -> Iterator[Finding]:
 
 
 def _on_predictions(result: AxisResult) -> Iterator[Finding]:
-    """Yield a finding for each prediction that is worse than one of no change."""
-    for p in result.predictions:
-        if p.error > p.unchanged:
+    """Yield a finding for each prediction that is worse than one of no change.
+
+    That a position drifts away over a whole log is told only if it is predicted well over a shorter time.
+    """
+    worse = [p for p in result.predictions if p.error > p.unchanged]
+    warned = {(p.file, p.quantity) for p in worse if p.is_judged}
+    for p in worse:
+        if p.is_judged or (p.file, p.quantity) not in warned:
             names = {"quantity": p.quantity}
             names |= {"error": size_in_words(p.error, p.unit), "unchanged": size_in_words(p.unchanged, p.unit)}
             kind = "worse than no change" if p.is_judged else "drift"
@@ -329,8 +341,6 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
 
 _REMEDIES = {
     "the voltage": ": `voltage = true` in [fit] takes it into account",
-    "the roll": ": `attitude = true` in [fit] takes it into account",
-    "the pitch": ": `attitude = true` in [fit] takes it into account",
     "the depth": ", as when the buoyancy changes with the pressure, or a tether pulls",
     "the distance": ", as when a tether pulls",
     "the command": ", as when thrusters saturate",

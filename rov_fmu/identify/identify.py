@@ -52,6 +52,8 @@ _ROW_STEPS = 10
 """The steps of a fit without the rows of one command."""
 _EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
+_OUTLIER = 6.0
+"""A sample is an outlier if it is so many standard deviations beside its prediction."""
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
 _QUICK = 4.0
@@ -584,14 +586,18 @@ def _logging(fit: Fit) -> Iterator[Logging]:
 def _sensors(fit: Fit) -> Iterator[Sensor]:
     z, table = fit.best.z.tolist(), fit.posterior.table
     counts: dict[str, int] = {}
+    outlying: dict[str, list[bool]] = {}
     first: dict[str, Measured] = {}
-    for one in fit.objective.logs:
-        for m in one.measured:
+    for one, record, data in zip(fit.objective.logs, fit.objective.records, fit.best.data, strict=False):
+        for number, m in enumerate(one.measured):
             name = m.channel.quantity.name
             counts[name] = counts.get(name, 0) + len(m.channel.values)
+            far = np.abs(data.normalised[record.sensor == number]) > _OUTLIER
+            outlying.setdefault(name, []).extend(far.tolist())
             first.setdefault(name, m)
     for name, m in first.items():
         white = table.get(z, "white noise", name)
         coloured = white * table.get(z, "coloured noise", name)
         time = table.get(z, "correlation time", name)
-        yield Sensor(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name])
+        share = float(np.mean(outlying[name]))
+        yield Sensor(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name], share)

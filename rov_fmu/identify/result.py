@@ -168,6 +168,8 @@ class Sensor:
     correlation: float
     """The correlation time of the coloured noise, s."""
     samples: int
+    outliers: float = 0.0
+    """The share of the samples that are far from their predictions."""
 
 
 @dataclass(frozen=True)

@@ -82,9 +82,9 @@ def _with_error(known: tuple[float, Interval] | None, unit: str) -> str:
     if not (known and 0.0 < abs(known[0]) < inf):
         return "-"
     value, interval = known
-    half = max(abs(end / value - 1.0) for end in interval)
-    words, _, _ = in_words(value, interval, unit).partition(" (")
-    return f"{words} ±{max(half, 0.01):.0%}" if half < 1.0 else f"{words} ±>100%"
+    half = max(0.01, *(abs(end / value - 1.0) for end in interval))
+    words, _, _ = in_words(value, (value * (1.0 - half), value * (1.0 + half)), unit).partition(" (")
+    return f"{words} ±{half:.0%}" if half < 1.0 else f"{words} ±>100%"
 
 
 def _name(p: Prediction) -> str:

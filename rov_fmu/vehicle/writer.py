@@ -1,5 +1,6 @@
 """Writing vehicle files (TOML), completely or not at all."""
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -232,10 +233,17 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
     """Return the file to write, whose draft is checked by loading it. Raises VehicleFileError."""
 
     def check(draft: Path) -> None:
+        def named(message: object) -> str:
+            return str(message).replace(str(draft), str(path))
+
         try:
-            load_vehicle(draft, coming=coming)
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                load_vehicle(draft, coming=coming)
         except VehicleFileError as error:
-            raise VehicleFileError(str(error).replace(str(draft), str(path))) from error
+            raise VehicleFileError(named(error)) from error
+        for warning in told:
+            warnings.warn(named(warning.message), warning.category, stacklevel=2)
 
     try:
         return Output(path, text.encode(), check)

@@ -111,6 +111,13 @@ def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
 
 
+def test_a_doubt_about_what_is_written_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "light.toml"
+    light = load_vehicle(SIX_AXES)
+    with pytest.warns(UserWarning, match=rf"^{re.escape(str(path))}: body\.W\.value = 10\.0: "):
+        write_vehicle(replace(light, rov=light.rov.replaced({"W": 10.0})), path)
+
+
 @pytest.mark.parametrize("name", ["nowhere/out.toml", "."])
 def test_nowhere_to_write(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", str(TESTS), "-o", str(tmp_path / name)]) == 2
