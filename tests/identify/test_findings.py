@@ -312,7 +312,7 @@ def test_a_quiet_result_tells_its_coverage_alone() -> None:
 
 
 def test_a_prediction_that_is_worse_than_no_change_is_never_silent() -> None:
-    """Neither for an axis that is not to be used, nor over a whole log, where bands are not judged. Nor is it told twice."""
+    """Neither for an axis that is not to be used, nor over a whole log, where bands are not judged. Once is enough."""
     soon, whole = (prediction(HEAVE, "depth", error=0.8, span=span) for span in (10.0, np.inf))
     for worse, kinds in (([soon, whole], ["worse than no change"]), ([whole], ["drift"])):
         result = quiet(axes=(axis_result(HEAVE, without_findings().axes[2].verdict, worse),))

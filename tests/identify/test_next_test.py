@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.identify import Fit, fit_all
+from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import NextTest
 from rov_fmu.model.layout import HEAVE, YAW, Axis

@@ -1,0 +1,101 @@
+"""The optional effects with their evidence, and what the fit found about loggers and sensors."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rov_fmu.identify.identified_vehicle import EXACT_BAND
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.parameters import Beginning, Parameter
+from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
+from rov_fmu.identify.likelihood.records import Measured
+from rov_fmu.identify.result import Effect, Logging, Sensor
+
+_OUTLIER = 6.0
+"""A sample is an outlier if it is so many standard deviations beside its prediction."""
+
+
+def effects_of(fit: Fit) -> Iterator[Effect]:
+    """Yield all optional effects with their evidence, beside those that are kept."""
+    table, gone = fit.posterior.table, fit.posterior.absent
+    for n, p in enumerate(table.parameters):
+        if p.null is None:
+            continue
+        posterior = fit.posterior.without([m for m in gone if m != n])
+        factor, unit = _in_units(fit.known, p)
+        value, error = number(p, posterior.z[n]) * factor, posterior.errors[n] * factor
+        if p.kind == "dead band":
+            error = max(error, EXACT_BAND / QUANTILE)
+        if p.kind == "load":
+            axis = next(axis for axis in fit.known.fitted if axis.name == p.of)
+            value += fit.known.coefficients[axis.coefficient("F_0")]
+        if p.kind in ("reverse thrust", "drag astern"):
+            low, high = (float(np.exp(end)) for end in around(value, error))
+            yield Effect(p.kind, p.of, _WORDS[p.kind], float(np.exp(value)), (low, high), "1", posterior.evidence(n))
+            continue
+        yield Effect(
+            p.kind,
+            p.of,
+            " ".join(filter(None, (_WORDS[p.kind], f"to the {p.part}" if p.part else ""))),
+            value,
+            around(value, error),
+            unit,
+            posterior.evidence(n),
+        )
+
+
+_WORDS = {
+    "reverse thrust": "thrust astern relative to thrust ahead",
+    "dead band": "dead band",
+    "lag": "time constant of the thrusters",
+    "dead time": "dead time of the commands",
+    "drag astern": "drag astern relative to drag ahead",
+    "load": "constant load",
+    "current": "current",
+    "voltage": "exponent of thrust over voltage",
+}
+
+
+def _in_units(known: Beginning, p: Parameter) -> tuple[float, str]:
+    """Return what turns the number of an effect into its unit, and the unit."""
+    if p.kind == "load":
+        return known.full[p.of], next(axis for axis in known.fitted if axis.name == p.of).load
+    return 1.0, p.unit
+
+
+def loggers_of(fit: Fit) -> Iterator[Logging]:
+    """Yield how long after their rows the commands of each log act, s, without the dead time of the vehicle."""
+    posterior, table = fit.posterior, fit.posterior.table
+    for one in fit.objective.logs:
+        place = table.place("logging offset", one.log.file)
+        if place is None:
+            continue
+        total = np.zeros(len(posterior.z))
+        total[place] = 1.0
+        dead = table.place("dead time")
+        if dead is not None and dead in posterior.absent:  # the vehicle keeps none, so the logger has all of it
+            total[dead] = 1.0
+        offset, error = float(total @ posterior.z), float(np.sqrt(total @ posterior.covariance @ total))
+        width = table.get(posterior.z.tolist(), "logging width", one.log.file) * one.interval
+        yield Logging(one.log.file, one.interval, offset, around(offset, error), width)
+
+
+def sensors_of(fit: Fit) -> Iterator[Sensor]:
+    """Yield the noise and the outliers of each measured quantity over all logs."""
+    z, table = fit.best.z.tolist(), fit.posterior.table
+    counts: dict[str, int] = {}
+    outlying: dict[str, list[bool]] = {}
+    first: dict[str, Measured] = {}
+    for one, record, data in zip(fit.objective.logs, fit.objective.records, fit.best.data, strict=False):
+        for place, m in enumerate(one.measured):
+            name = m.channel.quantity.name
+            counts[name] = counts.get(name, 0) + len(m.channel.values)
+            far = np.abs(data.normalised[record.sensor == place]) > _OUTLIER
+            outlying.setdefault(name, []).extend(far.tolist())
+            first.setdefault(name, m)
+    for name, m in first.items():
+        white = table.get(z, "white noise", name)
+        coloured = white * table.get(z, "coloured noise", name)
+        time = table.get(z, "correlation time", name)
+        share = float(np.mean(outlying[name]))
+        yield Sensor(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name], share)

@@ -1,0 +1,252 @@
+"""The vehicle of a fit, with the sources, intervals and correlations of its coefficients."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rov_fmu import __version__
+from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.likelihood.curves import fitted
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.parameters import LEAST_LAG
+from rov_fmu.identify.likelihood.posterior import QUANTILE, around
+from rov_fmu.identify.result import (
+    Interval,
+    Known,
+)
+from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
+from rov_fmu.vehicle.uncertainty import NORMAL
+from rov_fmu.vehicle.vehicle import Provenance, Vehicle
+
+_TOLD = 0.8
+"""A coefficient is identified where its standard error is at most this share of that of its prior."""
+EXACT_BAND = 0.01
+"""A dead band is never claimed to better than this command: thrust begins gradually."""
+
+
+def identified_vehicle(tests: Tests, fit: Fit) -> Vehicle:
+    """Return the vehicle with its sources, intervals and correlations."""
+    given, kept = tests.given, fit.kept
+    layout = _layout(tests, fit)
+    coefficients = _in_file(fit, kept.z)
+    coefficients |= {  # a file has no smaller exponent
+        c.coefficient("n_V"): max(coefficients[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
+    }
+    rov = Rov(layout, {name: coefficients.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
+    known = {name: q for name, q in given.known.items() if name in layout.coefficients}
+    identified = {one.name: one.interval for one in _identified(fit, rov) if one.interval}
+    sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
+    base = given.description.base_quantities
+    sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
+    intervals = {name: q.interval for name, q in known.items() if q.interval}
+    estimates: dict[str, Estimated] = {}
+    changed = _changed(fit, rov)
+    names = [name for name in changed if name in identified or name in intervals]
+    for name in changed:
+        sources[name] = _SOURCE if name in identified else f"{sources[name]}; adapted to the tests"
+        if name not in names:
+            sources[name] = "Assumed: the tests do not determine it"
+    if names:
+        held = [name for name in changed if name not in names and not name.startswith("alpha_")]
+        _, covariance, _ = _numbers(fit, [*names, *held])
+        marginal = np.sqrt(np.diag(covariance))
+        covariance = _given_the_last(covariance, len(names))
+        errors = np.sqrt(np.diag(covariance))
+        for n, name in enumerate(names):
+            intervals[name] = identified.get(name) or _interval(rov, name, float(marginal[n]))
+            others = {
+                other: float(np.clip(covariance[n, m] / (errors[n] * errors[m]), -1.0, 1.0))
+                for m, other in enumerate(names[:n])
+                if errors[n] * errors[m] > 0.0
+            }
+            estimates[name] = Estimated(
+                error=float(errors[n]) * QUANTILE / NORMAL,
+                correlation={k: round(v, 6) for k, v in others.items() if abs(v) > 1e-6},
+            )
+    validity = given.description.tables.validity
+    made = Provenance(f"rov-fmu {__version__} identify", METHOD, tests.inputs, data=_data(fit))
+    return Vehicle(
+        **dict(given.head),
+        rov=rov,
+        sources=sources,
+        command_range=validity.command_range if validity else _command_range(fit),
+        alternatives={},
+        data=None,
+        limits=given.description.limits,
+        intervals=intervals,
+        estimates=estimates,
+        provenance=made,
+        voltage_source="" if layout.voltage is None else "Mean voltage of the logs",
+        thruster_sources=given.thruster_sources,
+    )
+
+
+def _given_the_last(covariance: Array, count: int) -> Array:
+    """Return the covariance of the first numbers, given the values of the others.
+
+    The vehicle file has these others without an error. Drag that shares the error of a thrust curve must not be drawn
+    with this error beside a curve that stays.
+    """
+    first, last = slice(count), slice(count, None)
+    regression = covariance[first, last] @ np.linalg.pinv(covariance[last, last], hermitian=True)
+    found = covariance[first, first] - regression @ covariance[last, first]
+    np.fill_diagonal(found, np.maximum(np.diag(found), 0.0))
+    return np.asarray(found)
+
+
+METHOD = (
+    "maximum a posteriori by an extended Kalman filter with slow forces and coloured noise (docs/identify-method.md)"
+)
+_SOURCE = "Identified from the tests, as the method says"
+
+
+def _in_file(fit: Fit, z: Array) -> dict[str, float]:
+    """Return the coefficients of the vehicle file for the coordinates of the parameters.
+
+    A file has no shapes of curves: a_t and b_t are those of the nearest curve over the tested commands.
+    """
+    table, (low, high) = fit.kept.table, _command_range(fit)
+    coefficients = table.coefficients(z.tolist())
+    shapes, rov = table.shapes(z.tolist()), Rov(table.layout, coefficients)
+    for curve in fit.known.curves:
+        if curve.name in shapes.of:
+            c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
+
+            def force(command: float, curve: Curve = curve) -> float:
+                return shapes.force(rov, curve, command)
+
+            coefficients |= fitted(curve, force, c_0, low, high)
+    return coefficients | {name: table.base[name] for name in table.exact}
+
+
+def _changed(fit: Fit, rov: Rov) -> list[str]:
+    """Return the names of the coefficients of the vehicle that the parameters change."""
+    z, changed = fit.posterior.z, dict[str, None]()
+    before = _in_file(fit, z)
+    for n in fit.posterior.of_vehicle:
+        moved = z.copy()
+        moved[n] += 0.1 * fit.posterior.table.parameters[n].deviation + 0.01
+        changed |= dict.fromkeys(name for name, value in _in_file(fit, moved).items() if value != before[name])
+    return [name for name in rov.coefficients if name in changed]
+
+
+def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
+    """Return some coefficients of the vehicle file, their covariance, and their covariance by the prior."""
+
+    def values(z: Array) -> Array:
+        coefficients = _in_file(fit, z)
+        return np.array([coefficients[name] for name in names])
+
+    return fit.averaged.numbers(values)
+
+
+def _layout(tests: Tests, fit: Fit) -> Layout:
+    """Return the layout without the effects that are absent."""
+    table = fit.kept.table
+    present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in fit.posterior.absent}
+    base, own = tests.given.base, tests.given.description.known
+    coefficients = table.coefficients(fit.kept.z.tolist())
+
+    def has_axis_key(axis: Axis, key: str) -> bool:
+        if axis.coefficient(key) in own:
+            return True
+        if key == "F_0":
+            return coefficients[axis.coefficient(key)] != 0.0
+        if key.endswith(REVERSE):
+            return axis.coefficient(key) in base or ("drag astern", axis.name) in present
+        return True
+
+    def has_curve_key(curve: Curve, key: str) -> bool:
+        if curve.coefficient(key) in own:
+            return True
+        if key.startswith("c_0"):
+            return coefficients[curve.coefficient(key)] > 0.0
+        if key in ("V_0", "n_V"):
+            return with_voltage
+        if key == "T":
+            return coefficients[curve.coefficient(key)] > LEAST_LAG * 1.0001
+        if key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
+            is_measured = curve.coefficient(key) in tests.given.known or _has_backward_rows(tests, curve)
+            return curve.coefficient(key) in base or is_measured or ("reverse thrust", curve.name) in present
+        return True
+
+    layout = table.layout
+    exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
+    with_voltage = tests.given.rov.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    return replace(
+        layout,
+        voltage=layout.voltage if with_voltage else None,
+        mix=tests.given.rov.layout.mix,
+        pulse=tests.given.rov.layout.pulse,
+        has_dead_time=tests.given.rov.layout.has_dead_time,
+        axes=tuple(replace(f, keys=tuple(k for k in f.keys if has_axis_key(f.axis, k))) for f in layout.axes),
+        curves=tuple(replace(c, keys=tuple(k for k in c.keys if has_curve_key(c, k))) for c in layout.curves),
+    )
+
+
+def _has_backward_rows(tests: Tests, curve: Curve) -> bool:
+    return any(name == curve.name and any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust"))
+
+
+def _data(fit: Fit) -> str:
+    """Return what the vehicle was identified from, in words."""
+    dives = sum(not one.log.follows_axis for one in fit.objective.logs)
+    parts = ["a dive log" if dives == 1 else f"{dives} dive logs"] if dives else []
+    if fit.objective.rows or dives < len(fit.objective.logs):
+        parts.insert(0, "tank tests")
+    return " and ".join(parts) or "given values"
+
+
+def _command_range(fit: Fit) -> tuple[float, float]:
+    """Return the weakest and the strongest command of the tests."""
+    used = [abs(row.command) for row in fit.objective.rows]
+    for one in fit.objective.logs:
+        assert one.log.commands
+        used += np.abs(one.log.commands.value).tolist()
+    used = [round(c, 6) for c in used if c > 1e-3]
+    low, high = min(used, default=0.0), max(used, default=1.0)
+    return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
+
+
+def _identified(fit: Fit, rov: Rov) -> Iterator[Known]:
+    """Yield the coefficients of the vehicle that the tests determine."""
+    names = [name for name in _changed(fit, rov) if not name.startswith("alpha_")]
+    for one in _known_of(fit, rov, names):
+        if one.interval:
+            yield one
+
+
+def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Known]:
+    """Yield coefficients with their intervals, where the tests determine them."""
+    if not names:
+        return
+    _, covariance, prior = _numbers(fit, names)
+    began = _in_file(fit, np.array([p.mean for p in fit.posterior.table.parameters]))
+    for n, name in enumerate(names):
+        error, before = float(np.sqrt(covariance[n, n])), float(np.sqrt(prior[n, n]))
+        told = error / before if before > 0.0 else 0.0
+        declaration, value = rov.layout.coefficients[name], rov[name]
+        interval: Interval | None = _interval(rov, name, error)
+        if not told <= _TOLD or not error > 0.0:
+            interval = None
+        unit = "" if declaration.unit == "1" else f" {declaration.unit}"
+        yield Known(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
+
+
+def _interval(rov: Rov, name: str, error: float) -> Interval:
+    """Return the 95 % interval of a coefficient within its bounds."""
+    declaration = rov.layout.coefficients[name]
+    if name.startswith("c_0"):
+        error = max(error, EXACT_BAND / QUANTILE)
+    low, high = around(rov[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
+    return max(low, declaration.minimum), min(high, declaration.maximum)
+
+
+def known_of(fit: Fit, vehicle: Vehicle, names: Sequence[str]) -> Iterator[Known]:
+    """Yield those of some coefficients that the fit changes, with intervals where the tests determine them."""
+    changed = _changed(fit, vehicle.rov)
+    yield from _known_of(fit, vehicle.rov, [n for n in names if n in changed])

@@ -1,0 +1,114 @@
+"""The fit: two starts on few samples, the better one to the end on all, and the posterior there."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rov_fmu.engine.filter import DivergedError
+from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.likelihood.objective import Objective, TableRow
+from rov_fmu.identify.likelihood.parameters import Beginning, table_of
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.records import Recorded
+from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import Progress, silent
+from rov_fmu.tank.arrays import Array
+
+_SAME = 0.01
+"""Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
+_QUICK = 4.0
+"""The reduction of J by a step at which a quick fit ends."""
+_STARTS: tuple[Mapping[str, float], ...] = (
+    {"slow": 1.0, "white": 2.0},
+    {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
+)
+"""Two starts: how many deviations of their priors some kinds of parameters are above their means, by their first word.
+
+With much noise, J has few minima far from the data.
+"""
+_CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
+"""The start if the motion diverges from both others: a heavier vehicle with less drag."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The objective at its minimum."""
+
+    known: Beginning
+    objective: Objective
+    best: Minimum
+    posterior: Posterior
+    """With all effects, also those without evidence."""
+    averaged: Posterior
+    """Averaged over the presence of the effects without evidence: the intervals are wide enough for these."""
+    kept: Posterior
+    """Given that the effects without evidence are absent: the values of the vehicle."""
+    difference: float
+    """How much larger J is at the end of the second start."""
+
+
+def fit_all(
+    tests: Tests, known: Beginning, logs: Sequence[Recorded], rows: Sequence[TableRow], on_progress: Progress = silent
+) -> Fit:
+    """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples."""
+    table = table_of(known, logs, sorted({row.noise for row in rows}))
+    quick = Objective(table, logs, rows, thinned=True)
+    full = Objective(table, logs, rows)
+    ends: list[Minimum] = []
+    for n, louder in enumerate((*_STARTS, _CAREFUL)):
+        if n == len(_STARTS) and ends:
+            break
+
+        def show(step: int, n: int = n) -> None:
+            words = f"start {n + 1} of 2" if n < len(_STARTS) else "a more careful start"
+            on_progress(words, 0.25 * min(n, 1) + 0.25 * min(step / 20.0, 1.0))
+
+        start = quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
+        try:
+            ends.append(minimise(quick, start, on_step=show, enough=_QUICK, last=False))
+        except DivergedError:
+            continue
+    if not ends:
+        raise DataFileError(f"{tests.folder.path}: no simulation of the logs stays finite. Are units and signs right?")
+    ends.sort(key=lambda end: end.value)
+
+    def show_full(step: int) -> None:
+        on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
+
+    best = minimise(full, _scaled(known, full, ends[0].z), on_step=show_full)
+    scaled = _scaled(known, full, best.z)
+    if full.prior(scaled) < full.prior(best.z) - ENOUGH:
+        best = minimise(full, scaled, on_step=show_full, most=2)
+    posterior = Posterior.of(table, best.z, best.information)
+    difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
+    apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
+    if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
+        difference = 0.0
+    kept = posterior.without(posterior.absent)
+    averaged = replace(posterior.averaged, z=kept.z)
+    return Fit(known, full, best, posterior, averaged, kept, float(difference))
+
+
+def _scaled(known: Beginning, objective: Objective, z: Array) -> Array:
+    """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
+
+    The data do not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
+    """
+    kinds = ("thrust scale", "inertia", "quadratic drag", "linear drag")
+    curves = {t.curve for axis in known.fitted for t in known.layout.drivers(axis)}
+    everything = [*(("thrust scale", name) for name in curves), *((k, a.name) for k in kinds[1:] for a in known.fitted)]
+    is_measured = any(row.quantity == "force" for row in objective.rows)
+    if is_measured or any(objective.table.place(kind, of) is None for kind, of in everything):
+        return z
+    direction = np.zeros(len(z))
+    for n, p in enumerate(objective.table.parameters):
+        if p.kind in kinds:
+            direction[n] = 1.0
+        elif p.kind == "load":
+            axis = next(axis for axis in known.fitted if axis.name == p.of)
+            direction[n] = z[n] + known.coefficients[axis.coefficient("F_0")] / known.full[p.of]
+    weight = direction / objective.deviation**2
+    moved = z - direction * float(weight @ (z - objective.mean)) / float(weight @ direction)
+    return np.clip(moved, objective.low, objective.high)

@@ -1,0 +1,65 @@
+"""The rows of tables of tank tests: what the vehicle says about each, and what a fit without it says."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.objective import Objective, TableRow
+from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.result import (
+    Point,
+)
+from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.rov import Rov
+
+_ROW_STEPS = 10
+"""The steps of a fit without the rows of one command."""
+
+HeldOut = Mapping[tuple[str, str, float], float]
+"""The value of a row by a fit without it, by the quantity, the curve or axis, and the command."""
+
+
+def points_of(tests: Tests, held_out: HeldOut, rov: Rov, kind: str, only: str | None = None) -> Iterator[Point]:
+    """Yield the rows of tables with what the vehicle says about them, also held out."""
+    quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
+    for subject, rows in tests.rows(kind):
+        if only and subject != only:
+            continue
+        for row in rows:
+            of: Curve | Axis = (
+                next(c for c in rov.layout.curves if c.name == subject)
+                if kind == "thrust"
+                else rov.layout.kinds[subject].axis
+            )
+            one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
+            unit = "N" if kind == "thrust" else "s" if kind == "time_constant" else rov.layout.kinds[subject].axis.unit
+            out = held_out.get((quantity, subject, row.command), np.nan)
+            counts = tests.counts(kind, subject, row.command)
+            numbers = row.command, row.value, one.model(rov, NO_SHAPES), out
+            yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
+
+
+def held_out_rows(fit: Fit) -> HeldOut:
+    """Return the value of each row of the tables by a fit without all rows of the same size of the command."""
+    objective, rows = fit.objective, fit.objective.rows
+    found: dict[tuple[str, str, float], float] = {}
+    groups: dict[tuple[str, str, float], list[int]] = {}
+    for n, row in enumerate(rows):
+        kind = "force" if row.quantity == "force" else "motion"
+        groups.setdefault((kind, row.subject.name, abs(row.command)), []).append(n)
+    for members in groups.values():
+        others = [row for n, row in enumerate(rows) if n not in members]
+        z = minimise(
+            Objective(objective.table, objective.logs, others, thinned=True),
+            fit.best.z,
+            most=_ROW_STEPS,
+            with_noise=False,
+        ).z
+        rov = Rov(objective.table.layout, objective.table.coefficients(z.tolist()))
+        shapes = objective.table.shapes(z.tolist())
+        for row in (rows[n] for n in members):
+            found[row.quantity, row.subject.name, row.command] = row.model(rov, shapes)
+    return found
