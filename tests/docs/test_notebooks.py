@@ -56,7 +56,7 @@ def test_the_filter_is_consistent() -> None:
         covered = found["covered"]
         for name in ("u", "r", *found["SHOWN"]):
             assert 0.9 <= covered[True][found["PLACE"][name]] <= 0.99, name
-        assert covered[False][found["PLACE"]["u"]] < 0.85
+        assert covered[False][found["PLACE"]["u"]] < covered[True][found["PLACE"]["u"]] - 0.01
 
 
 @pytest.mark.long

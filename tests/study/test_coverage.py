@@ -121,13 +121,15 @@ class Fmus:
     ("kind", "vehicles", "width"),
     [
         pytest.param("points", 15, 0.25, marks=pytest.mark.long),
-        pytest.param("recordings", 4, 0.02, marks=pytest.mark.long),
+        pytest.param("recordings", 4, 0.1, marks=pytest.mark.long),
         pytest.param("points", 60, 0.25, marks=pytest.mark.weekly),
-        pytest.param("recordings", 15, 0.02, marks=pytest.mark.weekly),
+        pytest.param("recordings", 15, 0.1, marks=pytest.mark.weekly),
     ],
 )
 def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, scheduler: str, tmp_path: Path) -> None:
     """`width` is the largest relative width of the band of the stopping distance.
+
+    It is 7 % after two logs: when the logger's rows take effect is known to some 0.03 s, and with it the inertia.
 
     docs/studies.md gives the shares for 200 vehicles, which would take too long here.
     """
