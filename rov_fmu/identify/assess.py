@@ -25,6 +25,7 @@ from rov_fmu.model.layout import Axis
 from rov_fmu.model.riccati import Riccati
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.uncertainty import NORMAL
 
 COMMANDS = (0.3, -0.3, 0.5, -0.5)
 """The commands of the answers."""
@@ -151,7 +152,7 @@ def _predicted(objective: Objective, part: _Part, z: Array, covariance: Array) -
                 unchanged=_unchanged(record.time[at], measured, span),
                 noise=objective.table.get(z.tolist(), "white noise", m.channel.quantity.name),
                 error=float(np.sqrt(np.mean(off**2))),
-                coverage=float(np.mean(np.abs(off) <= 1.96 * deviation)),
+                coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
             )
 
 

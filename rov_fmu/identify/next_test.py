@@ -128,12 +128,7 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     free = proposed.run(z, number, begin=0.0)
     proposed.records[number] = replace(record, value=-free.innovations)
     run = proposed.run(z, number)
-    data = Data(
-        run.innovations,
-        run.variances,
-        np.zeros((len(run.innovations), len(z))),
-        np.zeros((len(run.innovations), len(z))),
-    )
+    data = Data.of(run, len(z))
     for k, parameter in enumerate(objective.table.parameters):
         if parameter.of_motion and parameter.log is None and objective.concerns(parameter, number):
             proposed.differentiate(z, number, k, run, data)

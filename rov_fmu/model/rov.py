@@ -179,7 +179,7 @@ class Rov:
         F = self.commanded(inputs)
         return tuple(
             self.acceleration_of(
-                form, self._along(form.axis, F), inputs[form.axis.external], self.loss(form.axis, inputs)
+                form, self.along(form.axis, F), inputs[form.axis.external], self.loss(form.axis, inputs)
             )
             for form in self.layout.axes
         )
@@ -190,9 +190,10 @@ class Rov:
 
     def force(self, axis: Axis, command: float) -> float:
         """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""
-        return self._along(axis, self.commanded(self.held_inputs(axis, command)))
+        return self.along(axis, self.commanded(self.held_inputs(axis, command)))
 
-    def _along(self, axis: Axis, F: Values) -> float:
+    def along(self, axis: Axis, F: Values) -> float:
+        """Return the thrust (N) or torque (N.m) along an axis of thrusters with some forces, N."""
         return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
 
     def strongest(self, axis: Axis) -> float:

@@ -93,8 +93,7 @@ class Shapes:
             acting = self.commands(curve.name, np.array([value])) if curve else [value]
             inputs[name] = inputs[delayed_name(name)] = float(acting[0])
         F = rov.commanded(inputs)
-        along = sum(rov.effect(t, axis) * F[t.name] for t in layout.drivers(axis))
-        return rov.acceleration_of(layout.kinds[axis.name], along, loss=rov.loss(axis, inputs))
+        return rov.acceleration_of(layout.kinds[axis.name], rov.along(axis, F), loss=rov.loss(axis, inputs))
 
 
 NO_SHAPES = Shapes({})

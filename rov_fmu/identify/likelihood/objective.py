@@ -78,6 +78,12 @@ class Data:
     log_slopes: Array
     """n x p: the derivatives of log S."""
 
+    @classmethod
+    def of(cls, run: Run, parameters: int) -> "Data":
+        """Return the innovations of a run, with derivatives of 0."""
+        empty = np.zeros((len(run.innovations), parameters))
+        return cls(run.innovations, run.variances, empty, empty.copy())
+
     @property
     def normalised(self) -> Array:
         return self.innovations / np.sqrt(self.variances)
@@ -109,15 +115,10 @@ class Objective:
         self.table, self.logs, self.rows = table, logs, rows
         self.records = [one.thinned if thinned else one.record for one in logs]
         steps = _QUICK_STEPS if thinned else {}
-        self.filters = [Filter(self.rov_of(table.base, one), **steps) for one in logs]
+        self.filters = [Filter(one.rov(table.base), **steps) for one in logs]
         p = table.parameters
         self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
         self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
-
-    @staticmethod
-    def rov_of(coefficients: "dict[str, float] | object", one: Recorded) -> Rov:
-        """Return the part of the vehicle that a log concerns."""
-        return Rov(one.layout, {name: coefficients[name] for name in one.layout.coefficients})  # type: ignore[index]
 
     # ---- One log ----
 
@@ -180,16 +181,7 @@ class Objective:
         time, and the change of the gains adds nothing to them on average. Without those with respect to the noise,
         these are the ones of earlier data, or 0.
         """
-        size = len(z)
-        found = [
-            Data(
-                run.innovations,
-                run.variances,
-                np.zeros((len(run.innovations), size)),
-                np.zeros((len(run.innovations), size)),
-            )
-            for run in runs
-        ]
+        found = [Data.of(run, len(z)) for run in runs]
         work: list[Callable[[], None]] = []
         for n, run in enumerate(runs):
             for k, parameter in enumerate(self.table.parameters):

@@ -4,7 +4,7 @@ Nothing is resampled onto a common grid. Samples that come faster than the vehic
 which keeps what they tell and bounds the time of a fit.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, sin
 
@@ -13,6 +13,7 @@ import numpy as np
 from rov_fmu.engine.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.io.messages import MOST, first_of
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
@@ -67,6 +68,16 @@ class Recorded:
         return any(
             s.is_velocity and s.over_ground and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors
         )
+
+    def rov(self, coefficients: Mapping[str, float]) -> Rov:
+        """Return the part of a vehicle that the log concerns."""
+        return Rov(self.layout, {name: coefficients[name] for name in self.layout.coefficients})
+
+    def thrust(self, coefficients: Mapping[str, float], axis: Axis, rows: Array) -> Array:
+        """Return the steady thrust of a vehicle along an axis for some rows of inputs, N or N m."""
+        rov, names, usual = self.rov(coefficients), [*self.layout.inputs], self.layout.usual_inputs
+        forces = (rov.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
+        return np.array([rov.along(axis, F) for F in forces])
 
 
 def recorded(log: Log, layout: Layout) -> Recorded | None:
@@ -287,9 +298,13 @@ def typical(some: Sequence[Recorded], axis: Axis) -> float:
             if m.sensor.axis is axis:
                 time, values = m.channel.time, m.channel.values
                 if not m.sensor.is_velocity:
-                    lag = max(1, int(np.searchsorted(time, time[0] + 1.0)))
-                    if lag >= len(time):
-                        continue
-                    values = (values[lag:] - values[:-lag]) / (time[lag:] - time[:-lag])
-                found.append(float(np.quantile(np.abs(values), 0.9)))
+                    values = changes(time, values) / changes(time, time)
+                if len(values):
+                    found.append(float(np.quantile(np.abs(values), 0.9)))
     return max(found, default=0.0)
+
+
+def changes(time: Array, values: Array) -> Array:
+    """Return by how much values change in about 1 s, from each sample that has another one so much later."""
+    lag = max(1, int(np.searchsorted(time, time[0] + 1.0)))
+    return np.asarray(values[lag:] - values[:-lag])

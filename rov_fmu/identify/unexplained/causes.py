@@ -96,12 +96,7 @@ def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis:
     if axis is None:
         thrusters = [names.index(f"u_{thruster.name}") for thruster in one.layout.thrusters]
         return np.asarray(np.max(np.abs(inputs[:, thrusters]), axis=1))
-    rov = Objective.rov_of(objective.table.coefficients(z.tolist()), one)
-    found = []
-    for row in inputs.tolist():
-        thrust = rov.commanded(one.layout.usual_inputs | dict(zip(names, row, strict=True)))
-        found.append(sum(rov.effect(t, axis) * thrust[t.name] for t in one.layout.drivers(axis)))
-    return np.array(found)
+    return one.thrust(objective.table.coefficients(z.tolist()), axis, inputs)
 
 
 def _distance(objective: Objective, number: int, run: Run, time: Array, axis: Axis) -> Array | None:

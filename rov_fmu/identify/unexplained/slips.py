@@ -23,7 +23,7 @@ from rov_fmu.engine.filter import DivergedError
 from rov_fmu.identify.beginning import Tests, begin
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
-from rov_fmu.identify.likelihood.records import Measured
+from rov_fmu.identify.likelihood.records import Measured, changes
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
 from rov_fmu.model.layout import REVERSE
@@ -45,8 +45,6 @@ unexplained than another one does: a heading that is scaled and then wrapped may
 _DENSITY, _MOVING, _TURNING, _SLOWEST = 1000.0, 1.5, 6.0, 0.1
 """The density of water, and the usual drag of vehicles of the volume V = m/rho: 1.5 rho V^(2/3) v^2 / 2, and about an
 axis 6 I r^2 / 2, both within a factor of 8. The drag becomes linear below 0.1 m/s or rad/s."""
-_LAG = 1.0
-"""Positions are compared by how far they change in this time, s."""
 _UNHEEDED = 1e6
 """The factor of a sensor's noise with which it corrects nothing."""
 _STEPS = 12
@@ -183,8 +181,7 @@ def _likeness(m: Measured, time: Array, measured: Array, simulated: Array) -> tu
     """Return the ratio of measured to simulated motion, and the share of the variance that it leaves unexplained."""
     if not m.sensor.is_velocity:
         simulated = np.unwrap(simulated) if m.channel.quantity.wraps else simulated
-        lag = max(1, int(np.searchsorted(time, time[0] + _LAG)))
-        measured, simulated = measured[lag:] - measured[:-lag], simulated[lag:] - simulated[:-lag]
+        measured, simulated = changes(time, measured), changes(time, simulated)
     if len(measured) < 2 or not np.ptp(measured) or not np.ptp(simulated):
         return 0.0, 1.0
     covariance = np.cov(measured, simulated)
