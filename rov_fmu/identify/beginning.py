@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.identify.given import Given, Narrowed, Tested, narrowed, with_axis_alone
+from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axis_alone
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
-from rov_fmu.identify.likelihood.records import Recorded, driven_axes, recorded, typical
+from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorded, typical
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import did_you_mean, first_of, lines_on
 from rov_fmu.io.toml_file import key_line
@@ -46,8 +46,8 @@ class Tests:
     """All tests of a folder, and the vehicle that they concern."""
 
     folder: Folder
-    given: Given
-    tested: Tested
+    given: GivenVehicle
+    tested: TestContents
     inputs: Mapping[str, str]
     """The SHA-256 hash of every file that was read, by its name."""
     findings: tuple[Finding, ...]
@@ -80,7 +80,7 @@ def load_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = la
     useless = [one.refusal(folder) for one in logs] if not tested.axes else []
     if not tested.thrust:
         found.mistakes += useless
-    vehicle = Narrowed(None)
+    vehicle = Narrowing(None)
     # If no axis was found, it may be in a file that could not be read.
     if description and (tested.axes or not found.mistakes):
         vehicle = narrowed(description, tested, folder, useless)
@@ -163,7 +163,7 @@ def _driven_together(found: Folder) -> Iterator[Finding]:
                     yield Finding("together", axis.name, file=log.file, names={"axis": axis.name})
 
 
-def _tested(found: Folder, logs: Sequence[_Contents]) -> Tested:
+def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
     """Return what the files test. A log that could not be read may test the axis in its name."""
     description = found.rov_file.description
     windows = description.tables.windows if description else {}
@@ -176,7 +176,7 @@ def _tested(found: Folder, logs: Sequence[_Contents]) -> Tested:
         return any(low <= row.command < 0.0 for row in found.rows.get((kind, subject), ()))
 
     unread = filter(None, subjects("log")) if found.mistakes else ()
-    return Tested(
+    return TestContents(
         {name: (found.files["thrust", name][0], has_backward_rows("thrust", name)) for name in subjects("thrust")},
         {name: has_backward_rows("steady", name) for name in subjects("steady")},
         subjects("time_constant"),
@@ -197,7 +197,7 @@ def _layout_of(log: Log, of: Folder | Layout) -> Layout:
 # ---- The prior -------------------------------------------------------------------------------------------------------
 
 
-def begin(tests: Tests) -> tuple[Beginning, list[Recorded], list[TableRow]]:
+def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
     given = tests.given
     deviations = given.description.tables.priors
@@ -232,7 +232,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[Recorded], list[TableRow]]:
     return known, logs, [*_table_rows(tests, rov)]
 
 
-def _exact(given: Given, layout: Layout, measured: Sequence[str]) -> frozenset[str]:
+def _exact(given: GivenVehicle, layout: Layout, measured: Sequence[str]) -> frozenset[str]:
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
     leave as they are. The curves of a base are uncertain unless their forces were measured, and so is a lag."""
     uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}
@@ -240,7 +240,7 @@ def _exact(given: Given, layout: Layout, measured: Sequence[str]) -> frozenset[s
     return frozenset(n for n in given.known if n not in uncertain or (n in own and not own[n].interval))
 
 
-def _thrust_errors(given: Given, curves: Sequence[Curve]) -> dict[str, float]:
+def _thrust_errors(given: GivenVehicle, curves: Sequence[Curve]) -> dict[str, float]:
     """Return the relative standard error of the forces of a curve whose a_t rov.toml gives with an interval."""
     found = {}
     for curve in curves:
@@ -335,7 +335,7 @@ def _rough_thrust(rov: Rov, curve: Curve, rows: Sequence[Row]) -> dict[str, floa
     return found
 
 
-def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[Recorded]) -> dict[str, float]:
+def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
     """Return drag and β from a large velocity and the thrust in the tests, as the centre of their prior."""
     points = [(abs(row.value), row.command) for name, rows in tests.rows("steady") if name == axis.name for row in rows]
     V = max((value for value, _ in points), default=0.0) or typical(logs, axis) or 1.0
@@ -353,7 +353,7 @@ def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[Recorded]) ->
     }
 
 
-def _forces(rov: Rov, axis: Axis, logs: Sequence[Recorded]) -> Iterator[float]:
+def _forces(rov: Rov, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
     """Yield the sizes of the thrust along an axis for some rows of the logs."""
     for one in (one for one in logs if axis.name in one.layout.kinds):
         some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]

@@ -8,7 +8,7 @@ from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import Beginning, Parameter
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
-from rov_fmu.identify.likelihood.records import Measured
+from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, Sensor
 
 _OUTLIER = 6.0
@@ -85,7 +85,7 @@ def sensors_of(fit: Fit) -> Iterator[Sensor]:
     z, table = fit.best.z.tolist(), fit.posterior.table
     counts: dict[str, int] = {}
     outlying: dict[str, list[bool]] = {}
-    first: dict[str, Measured] = {}
+    first: dict[str, SampledChannel] = {}
     for one, record, data in zip(fit.objective.logs, fit.objective.records, fit.best.data, strict=False):
         for place, m in enumerate(one.measured):
             name = m.channel.quantity.name

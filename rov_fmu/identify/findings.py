@@ -14,11 +14,11 @@ from rov_fmu.identify.result import (
     MOST_UNKNOWN,
     Answer,
     AxisResult,
+    Coefficient,
     Disturbance,
     Effect,
     Identification,
     Interval,
-    Known,
     Logging,
     Point,
 )
@@ -312,7 +312,7 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
 
 
 def _not_identified(
-    known: Sequence[Known], of: str, instead: str = "", *, axis: str = "", curve: str = ""
+    known: Sequence[Coefficient], of: str, instead: str = "", *, axis: str = "", curve: str = ""
 ) -> Iterator[Finding]:
     if names := [one.name for one in known if one.interval is None]:
         words = {"of": of, "coefficients": listed(names), "instead": instead}

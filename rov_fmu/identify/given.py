@@ -32,7 +32,7 @@ UNKNOWN = 1.0
 
 
 @dataclass(frozen=True)
-class Given:
+class GivenVehicle:
     """What is known about the vehicle before the identification."""
 
     description: Description
@@ -53,7 +53,7 @@ class Given:
 
 
 @dataclass(frozen=True)
-class Tested:
+class TestContents:
     """What the files of a folder test."""
 
     thrust: Mapping[str, tuple[str, bool]]
@@ -72,10 +72,10 @@ class Tested:
 
 
 @dataclass(frozen=True)
-class Narrowed:
+class Narrowing:
     """The vehicle that can be identified from the tests, or the mistakes that prevent it."""
 
-    given: Given | None
+    given: GivenVehicle | None
     rov_file_mistakes: tuple[str, ...] = ()
     """Lines about rov.toml."""
     test_mistakes: tuple[str, ...] = ()
@@ -84,7 +84,7 @@ class Narrowed:
     """What is left out of the vehicle."""
 
 
-def narrowed(description: Description, tested: Tested, folder: Path, useless: Sequence[str] = ()) -> Narrowed:
+def narrowed(description: Description, tested: TestContents, folder: Path, useless: Sequence[str] = ()) -> Narrowing:
     """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing.
 
     `useless` has a line for each log that tests nothing.
@@ -95,21 +95,21 @@ def narrowed(description: Description, tested: Tested, folder: Path, useless: Se
     layout = _with_axes_alone(wide, axes)
     if not layout.axes:
         line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
-        return Narrowed(None, test_mistakes=tuple(useless) or (line,))
+        return Narrowing(None, test_mistakes=tuple(useless) or (line,))
     hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
     hardware = hardware or [*check_part_names(_with_every_effect(layout, description.requests))]
     hardware += _missing_hardware(description, layout, known)
     tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
     if hardware or tests or description.tables.vehicle is None:
         in_rov_file = tuple(f"{description.path}: {mistake}" for mistake in hardware)
-        return Narrowed(None, in_rov_file, tuple(f"{folder}: {mistake}" for mistake in tests))
+        return Narrowing(None, in_rov_file, tuple(f"{folder}: {mistake}" for mistake in tests))
     given = _given(description, description.tables.vehicle, layout, known)
-    return Narrowed(given, findings=tuple(_left_out(description, tested, layout)))
+    return Narrowing(given, findings=tuple(_left_out(description, tested, layout)))
 
 
-def _given(description: Description, head: Head, layout: Layout, known: Mapping[str, Quantity]) -> Given:
+def _given(description: Description, head: Head, layout: Layout, known: Mapping[str, Quantity]) -> GivenVehicle:
     names = layout.coefficients
-    return Given(
+    return GivenVehicle(
         description=description,
         head=head,
         rov=Rov(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
@@ -120,7 +120,7 @@ def _given(description: Description, head: Head, layout: Layout, known: Mapping[
     )
 
 
-def _kept_from_base(description: Description, tested: Tested) -> dict[str, Quantity]:
+def _kept_from_base(description: Description, tested: TestContents) -> dict[str, Quantity]:
     """Return the coefficients of the base that no test replaces."""
     requests = description.requests
     replaced = {coefficient_name("T", name) for name in requests.lag}
@@ -171,7 +171,7 @@ def _with_every_effect(layout: Layout, requests: Requests) -> Layout:
     return replace(layout, axes=axes, curves=curves, has_dead_time=True)
 
 
-def _is_tested_or_known(axis: Axis, tested: Tested, known: Collection[str]) -> bool:
+def _is_tested_or_known(axis: Axis, tested: TestContents, known: Collection[str]) -> bool:
     return axis.name in tested.axes or {axis.coefficient("a_d"), axis.coefficient("b_d")} <= {*known}
 
 
@@ -212,7 +212,7 @@ def _with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     return replace(layout, mix=kept, thrusters=thrusters, curves=curves_left)
 
 
-def _left_out(description: Description, tested: Tested, layout: Layout) -> Iterator[Finding]:
+def _left_out(description: Description, tested: TestContents, layout: Layout) -> Iterator[Finding]:
     """Yield a finding for each part that is described or tested but not in the layout."""
     for name in description.axes:
         if name not in layout.kinds:
@@ -243,7 +243,7 @@ def _missing_hardware(description: Description, layout: Layout, known: Collectio
 
 
 def _missing_or_doubled_tests(
-    description: Description, tested: Tested, layout: Layout, known: Collection[str]
+    description: Description, tested: TestContents, layout: Layout, known: Collection[str]
 ) -> Iterator[str]:
     """Yield a line for each coefficient that neither a test nor rov.toml gives, and for each that both give."""
     for curve in layout.curves:

@@ -12,8 +12,8 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import (
+    Coefficient,
     Interval,
-    Known,
 )
 from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout
 from rov_fmu.model.rov import Rov
@@ -212,7 +212,7 @@ def _command_range(fit: Fit) -> tuple[float, float]:
     return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
 
 
-def _identified(fit: Fit, rov: Rov) -> Iterator[Known]:
+def _identified(fit: Fit, rov: Rov) -> Iterator[Coefficient]:
     """Yield the coefficients of the vehicle that the tests determine."""
     names = [name for name in _changed(fit, rov) if not name.startswith("alpha_")]
     for one in _known_of(fit, rov, names):
@@ -220,7 +220,7 @@ def _identified(fit: Fit, rov: Rov) -> Iterator[Known]:
             yield one
 
 
-def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Known]:
+def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Coefficient]:
     """Yield coefficients with their intervals, where the tests determine them."""
     if not names:
         return
@@ -234,7 +234,7 @@ def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Known]:
         if not told <= _TOLD or not error > 0.0:
             interval = None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-        yield Known(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
+        yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
 
 
 def _interval(rov: Rov, name: str, error: float) -> Interval:
@@ -246,7 +246,7 @@ def _interval(rov: Rov, name: str, error: float) -> Interval:
     return max(low, declaration.minimum), min(high, declaration.maximum)
 
 
-def known_of(fit: Fit, vehicle: Vehicle, names: Sequence[str]) -> Iterator[Known]:
+def known_of(fit: Fit, vehicle: Vehicle, names: Sequence[str]) -> Iterator[Coefficient]:
     """Yield those of some coefficients that the fit changes, with intervals where the tests determine them."""
     changed = _changed(fit, vehicle.rov)
     yield from _known_of(fit, vehicle.rov, [n for n in names if n in changed])

@@ -28,7 +28,7 @@ DISAGREEMENT = 40.0
 
 
 @dataclass(frozen=True)
-class Known:
+class Coefficient:
     """An identified number with its 95 % interval."""
 
     name: str
@@ -239,7 +239,7 @@ class AxisResult:
     axis: Axis
     verdict: Verdict
     answers: tuple[Answer, ...]
-    known: tuple[Known, ...]
+    known: tuple[Coefficient, ...]
     """The coefficients of the axis; those of curves stand in `Identification.curves`."""
     predictions: tuple[Prediction, ...]
     """Held-out predictions; empty where the axis has only tables or a single short log."""
@@ -274,7 +274,7 @@ class Identification:
     against: Vehicle | None
     """The vehicle to compare with."""
     axes: tuple[AxisResult, ...]
-    curves: Mapping[str, tuple[Known, ...]]
+    curves: Mapping[str, tuple[Coefficient, ...]]
     """The coefficients of each thrust curve."""
     forces: tuple[Point, ...]
     """The measured forces of thrust tables."""

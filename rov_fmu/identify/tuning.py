@@ -30,7 +30,7 @@ class TuningError(ValueError):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Target:
     """A wanted V_ss (m/s, rad/s) or Tau (s) at a held command, a fraction of the full command."""
 
     quantity: str
@@ -50,12 +50,12 @@ class Tuning:
 
     axis: Axis
     rov: Rov
-    points: Sequence[Wanted]
+    points: Sequence[Target]
     intervals: Mapping[str, Interval | None]
     """The 95 % interval of each tuned coefficient, by its name; None if there are not more points than coefficients."""
 
 
-def tune(rov: Rov, axis: Axis, points: Sequence[Wanted]) -> Tuning:
+def tune(rov: Rov, axis: Axis, points: Sequence[Target]) -> Tuning:
     """Find α and β for wanted points. Without any Tau, β stays. Raises TuningError.
 
     The intervals of many points follow from their scatter, by Student's distribution.
@@ -82,7 +82,7 @@ def tune(rov: Rov, axis: Axis, points: Sequence[Wanted]) -> Tuning:
     return Tuning(axis, tuned(fit.x), points, intervals)
 
 
-def _closed_form(rov: Rov, axis: Axis, points: Sequence[Wanted]) -> Rov:
+def _closed_form(rov: Rov, axis: Axis, points: Sequence[Target]) -> Rov:
     """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
     if rov.loss(axis, rov.held_inputs(axis, 1.0)):
         raise TuningError(
@@ -116,7 +116,7 @@ def _holding(rov: Rov, axis: Axis, V: float) -> float:
     return -plain.inertia(form) * plain.acceleration_of(form, 0.0).acceleration(V)
 
 
-def impossible(rov: Rov, axis: Axis, point: Wanted) -> str | None:
+def impossible(rov: Rov, axis: Axis, point: Target) -> str | None:
     """Return the reason why no tuning gives the point, or None."""
     c, value = point.command, point.value
     if not 0.0 < abs(c) <= 1.0:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
-from rov_fmu.identify.tuning import Tuning, TuningError, Wanted, impossible, tune
+from rov_fmu.identify.tuning import Target, Tuning, TuningError, impossible, tune
 from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
@@ -43,7 +43,7 @@ def tune_vehicle(
     elif command is None or V_ss is None:
         raise InputError("tune: give --command and --v-ss (and --tau), or --points")
     else:
-        wanted = [Wanted("V_ss", command, V_ss)] + ([] if Tau is None else [Wanted("Tau", command, Tau)])
+        wanted = [Target("V_ss", command, V_ss)] + ([] if Tau is None else [Target("Tau", command, Tau)])
     try:
         tuning = tune(vehicle.rov, axis, wanted)
     except TuningError as error:
@@ -53,13 +53,13 @@ def tune_vehicle(
     return tuning
 
 
-def source(wanted: Sequence[Wanted]) -> str:
+def source(wanted: Sequence[Target]) -> str:
     """Return the source of coefficients that are tuned to some points."""
     points = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in wanted[:2])
     return f"Tuned to {points}{', ...' if len(wanted) > 2 else ''}"
 
 
-def read_points(path: Path, rov: Rov, axis: Axis) -> list[Wanted]:
+def read_points(path: Path, rov: Rov, axis: Axis) -> list[Target]:
     """Read wanted points from a CSV file with command, velocity and time constant, which may have blanks.
 
     Raises DataFileError.
@@ -72,7 +72,7 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> list[Wanted]:
     for quantity, column in (("V_ss", "velocity"), ("Tau", "time constant")):
         for n, value in enumerate(table.values.get(column, ())):
             if isfinite(value):
-                points.append(Wanted(quantity, table.values["command"][n], value))
+                points.append(Target(quantity, table.values["command"][n], value))
                 if reason := impossible(rov, axis, points[-1]):
                     raise table.error(n, column, reason)
     if not any(point.quantity == "V_ss" for point in points):

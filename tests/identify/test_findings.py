@@ -18,7 +18,7 @@ from rov_fmu.identify.findings import (
     sentences,
     warnings,
 )
-from rov_fmu.identify.result import Disturbance, Effect, Identification, Known, Logging, Point, Slip
+from rov_fmu.identify.result import Coefficient, Disturbance, Effect, Identification, Logging, Point, Slip
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank import findings as reading
@@ -64,8 +64,8 @@ def with_channels(*names: str) -> Identification:
     return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=replace(base, rov=rov))
 
 
-def unidentified(*names: str) -> tuple[Known, ...]:
-    return tuple(Known(name, 1.0, None, "1", "1 within a factor of 3", 1.0) for name in names)
+def unidentified(*names: str) -> tuple[Coefficient, ...]:
+    return tuple(Coefficient(name, 1.0, None, "1", "1 within a factor of 3", 1.0) for name in names)
 
 
 def forces(*ratios: float) -> tuple[Point, ...]:
@@ -75,7 +75,7 @@ def forces(*ratios: float) -> tuple[Point, ...]:
     )
 
 
-BETA = Known("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
+BETA = Coefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
 DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
 OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
 LATER = Effect("dead time", "", "dead time of the commands", 0.2, (0.1, 0.3), "s", 12.0)

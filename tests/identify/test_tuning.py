@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t
 
 from rov_fmu.cli import main
-from rov_fmu.identify.tuning import Tuning, TuningError, Wanted, implausible, tune
+from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.interface.tune_command import source
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
@@ -31,12 +31,12 @@ def k(vehicle: Vehicle) -> Rov:
 
 def tuned_to(k: Rov, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Tuning:
     """Tune to one command."""
-    return tune(k, axis, [Wanted("V_ss", command, V_ss)] + ([] if Tau is None else [Wanted("Tau", command, Tau)]))
+    return tune(k, axis, [Target("V_ss", command, V_ss)] + ([] if Tau is None else [Target("Tau", command, Tau)]))
 
 
 def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
     """For a turn to starboard, the left thruster pushes ahead and the right one astern, by the paper's (4)."""
-    points = [Wanted("V_ss", command, sign * 0.5) for command, sign in ((0.3, 1), (-0.4, -1))]
+    points = [Target("V_ss", command, sign * 0.5) for command, sign in ((0.3, 1), (-0.4, -1))]
     print_tuning(tune(k, YAW, points))
     said = capsys.readouterr().out
     assert "A command of 30% of yaw: u_l = 0.3, u_r = -0.3\n" in said
@@ -51,7 +51,7 @@ def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
     k: Rov, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tuned = tuned_to(k, HEAVE, 0.3, 0.175)
-    print_tuning(replace(tuned, points=(Wanted("V_ss", 0.3, 0.175 * (1.0 + 1e-5)),)))
+    print_tuning(replace(tuned, points=(Target("V_ss", 0.3, 0.175 * (1.0 + 1e-5)),)))
     said = capsys.readouterr().out
     assert "+0.0%" in said
     assert "-0.0%" not in said
@@ -74,7 +74,7 @@ def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: f
 
 def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
     measured = {"V_ss": {0.2: 1.34, 0.3: 1.51, 0.5: 2.61, 0.7: 4.06}, "Tau": {0.2: 3.05, 0.3: 1.95, 0.5: 1.41}}
-    points = [Wanted(q, c, value) for q, values in measured.items() for c, value in values.items()]
+    points = [Target(q, c, value) for q, values in measured.items() for c, value in values.items()]
     tuning = tune(k, YAW, points)
     low, high = tuning.intervals["alpha_r"] or (nan, nan)
     alpha, beta = tuning.rov["alpha_r"], tuning.rov["beta_r"]
@@ -92,7 +92,7 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
 
 def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
     assert tuned_to(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
-    tuning = tune(k, SURGE, [Wanted("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
+    tuning = tune(k, SURGE, [Target("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
     assert tuning.rov["beta_u"] == k["beta_u"]
     assert [*tuning.intervals] == ["alpha_u"]
 
@@ -100,7 +100,7 @@ def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
 def test_intervals_are_those_of_linear_regression(k: Rov) -> None:
     """With linear drag, V_ss is proportional to α, so that its relative errors are linear in α."""
     plain = k.replaced({"alpha_u": 1.0, "a_d_u": 0.0})
-    wanted = [Wanted("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 1.06), (0.7, 1.47), (-0.4, -0.6))]
+    wanted = [Target("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 1.06), (0.7, 1.47), (-0.4, -0.6))]
     ratios = np.array([p.by(plain, SURGE) / p.value for p in wanted])
     alpha = ratios.sum() / (ratios @ ratios)
     errors = alpha * ratios - 1.0
@@ -155,7 +155,7 @@ def test_what_no_tuning_gives(
     ],
 )
 def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: list[str], k: Rov) -> None:
-    points = (Wanted("V_ss", 0.3, 0.2), Wanted("Tau", 0.3, 2.0))
+    points = (Target("V_ss", 0.3, 0.2), Target("Tau", 0.3, 2.0))
     rov = k.replaced({"alpha_w": alpha, "beta_w": beta})
     found = [*implausible(Tuning(HEAVE, rov, points, {"alpha_w": None, "beta_w": None}))]
     assert [finding.kind for finding in found] == kinds
@@ -169,7 +169,7 @@ def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: 
 
 @pytest.mark.parametrize(("count", "more"), [(2, ""), (3, ", ...")])
 def test_the_source_names_the_first_two_points(count: int, more: str) -> None:
-    points = [Wanted("V_ss", c, V) for c, V in ((0.3, 0.2), (0.4, 0.25), (0.5, 0.31))]
+    points = [Target("V_ss", c, V) for c, V in ((0.3, 0.2), (0.4, 0.25), (0.5, 0.31))]
     assert source(points[:count]) == f"Tuned to V_ss = 0.2 at 30%, V_ss = 0.25 at 40%{more}"
 
 
@@ -233,7 +233,7 @@ def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float
 def test_both_directions_are_tuned_together() -> None:
     commands = (-0.8, -0.3, 0.3, 0.8)
     known = BUOYANT.replaced({"alpha_w": 1.3, "beta_w": 0.4})
-    wanted = [Wanted(q, c, known.response(HEAVE, c)[q == "Tau"]) for q in ("V_ss", "Tau") for c in commands]
+    wanted = [Target(q, c, known.response(HEAVE, c)[q == "Tau"]) for q in ("V_ss", "Tau") for c in commands]
     assert wanted[0].value * wanted[3].value < 0.0
     tuning = tune(BUOYANT, HEAVE, wanted)
     assert [tuning.rov["alpha_w"], tuning.rov["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)

@@ -15,10 +15,10 @@ from rov_fmu.identify.findings import facts, findings_of, warnings
 from rov_fmu.identify.result import (
     Answer,
     AxisResult,
+    Coefficient,
     Disturbance,
     Effect,
     Identification,
-    Known,
     Logging,
     NextTest,
     Point,
@@ -74,9 +74,9 @@ def axis_result(
     """Return an axis whose V_ss is `scale` times the command."""
     name = axis.coefficient
     known = (
-        Known(name("a_d"), 10.0, (9.0, 11.0), "N.s2/m2", "20 within a factor of 2, from the base", 0.1),
-        Known(name("b_d"), 2.0, (0.5, 3.5), "N.s/m", "4 within a factor of 3, from the base", 0.4),
-        Known(name("beta"), 0.8, (0.7, 0.9), "1", "0.65 within a factor of 1.5", 0.2),
+        Coefficient(name("a_d"), 10.0, (9.0, 11.0), "N.s2/m2", "20 within a factor of 2, from the base", 0.1),
+        Coefficient(name("b_d"), 2.0, (0.5, 3.5), "N.s/m", "4 within a factor of 3, from the base", 0.4),
+        Coefficient(name("beta"), 0.8, (0.7, 0.9), "1", "0.65 within a factor of 1.5", 0.2),
     )
     points = (
         Point(axis.name, "V_ss", axis.unit, "steady.csv", 0.3, 0.29 * scale, 0.3 * scale, 0.31 * scale, counts=True),
@@ -142,7 +142,7 @@ def without_findings() -> Identification:
         vehicle=vehicle,
         against=None,
         axes=axes,
-        curves={"top": (Known("b_t_top", 10.0, (9.0, 11.0), "N", "11 within 10 %, from the forces", 0.9),)},
+        curves={"top": (Coefficient("b_t_top", 10.0, (9.0, 11.0), "N", "11 within 10 %, from the forces", 0.9),)},
         forces=forces,
         effects=(
             Effect("lag", "top", "lag of the thrusters", 0.12, (0.11, 0.13), "s", 50.0),

@@ -368,7 +368,7 @@ def test_intervals_of_the_printout_are_neither_too_small_nor_endless(capsys: pyt
     print_identification(told(replace(bare(), axes=(wide, exact))))
     out = capsys.readouterr().out
     assert "0.50 m/s ±>100%" in out
-    assert "0.50000 m/s ±1%" in out
+    assert "0.500 m/s ±1%" in out
 
 
 def test_effects_of_the_vehicle_have_no_owner(capsys: pytest.CaptureFixture[str]) -> None:

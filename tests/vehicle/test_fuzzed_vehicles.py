@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import archive, native_content
 from rov_fmu.fmu.osp import osp_model_description
-from rov_fmu.identify.tuning import Wanted, tune
+from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.model.layout import YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -114,7 +114,7 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
         form = vehicle.layout.kinds["yaw"]
         force, drag = vehicle.rov.force(YAW, 0.3), [vehicle.rov[form.coefficient(key)] for key in ("a_d", "b_d")]
         if force > 1e-3 and max(drag) > 1e-3:
-            rov = tune(vehicle.rov, YAW, [Wanted("V_ss", 0.3, min(1.0, 0.1 * force / sum(drag)))]).rov
+            rov = tune(vehicle.rov, YAW, [Target("V_ss", 0.3, min(1.0, 0.1 * force / sum(drag)))]).rov
             write_tuned(
                 path, path.with_name("tuned.toml"), {name: rov[name] for name in ("alpha_r", "beta_r")}, "Tuned"
             )

@@ -10,7 +10,7 @@ from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.records import Recorded
+from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
@@ -50,7 +50,7 @@ class Fit:
 
 
 def fit_all(
-    tests: Tests, known: Beginning, logs: Sequence[Recorded], rows: Sequence[TableRow], on_progress: Progress = silent
+    tests: Tests, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
 ) -> Fit:
     """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples."""
     table = table_of(known, logs, sorted({row.noise for row in rows}))

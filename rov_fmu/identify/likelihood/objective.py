@@ -25,7 +25,7 @@ from rov_fmu.engine.filter import Filter, Run
 from rov_fmu.engine.simulation import usable_cores
 from rov_fmu.identify.likelihood.curves import Shapes
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
-from rov_fmu.identify.likelihood.records import Recorded
+from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.model.layout import Axis, Curve, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -109,7 +109,7 @@ class Objective:
     """J for some logs and rows of tables."""
 
     def __init__(
-        self, table: Table, logs: Sequence[Recorded], rows: Sequence[TableRow], *, thinned: bool = False
+        self, table: Table, logs: Sequence[SampledLog], rows: Sequence[TableRow], *, thinned: bool = False
     ) -> None:
         """Make the filters. Raises BuildError."""
         self.table, self.logs, self.rows = table, logs, rows

@@ -14,7 +14,7 @@ import numpy as np
 
 from rov_fmu.engine.filter import Parameters, Slow
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
-from rov_fmu.identify.likelihood.records import Recorded
+from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.model.layout import HEAVE, REVERSE, Axis, Curve, Layout, coefficient_name
 
 
@@ -203,7 +203,7 @@ class Table:
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
         return Shapes(found, bands, frozenset(reverse))
 
-    def of_log(self, z: Sequence[float], one: Recorded) -> Parameters:
+    def of_log(self, z: Sequence[float], one: SampledLog) -> Parameters:
         """Return the parameters of the filter for a log."""
         file, layout = one.log.file, one.layout
         found = self.coefficients(z)
@@ -269,14 +269,14 @@ class Beginning:
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
 
 
-def table_of(known: Beginning, logs: Sequence[Recorded], row_noises: Sequence[str]) -> Table:
+def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
     shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
     found = tuple(_parameters(known, logs, row_noises))
     return Table(known.layout, known.coefficients, known.full, found, shape, known.exact)
 
 
-def _parameters(known: Beginning, logs: Sequence[Recorded], row_noises: Sequence[str]) -> Iterator[Parameter]:
+def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
     def prior(key: str) -> float:
         """Return a deviation. Where the thrust is exact, so is its shape."""
         if key.startswith("thrust_") or key == "dead_band":
@@ -342,7 +342,7 @@ def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parame
             yield Parameter("load", name, deviation=prior("load"), null=null)
 
 
-def _of_one_log(one: Recorded, number: int, prior: Callable[[str], float]) -> Iterator[Parameter]:
+def _of_one_log(one: SampledLog, number: int, prior: Callable[[str], float]) -> Iterator[Parameter]:
     file, half = one.log.file, 0.5 * one.interval
     least = max(half, 0.005)
     yield Parameter("logging offset", file, mean=-half, deviation=least, log=number, unit="s")
@@ -352,7 +352,7 @@ def _of_one_log(one: Recorded, number: int, prior: Callable[[str], float]) -> It
             yield Parameter("current", file, part, deviation=prior("current"), null=0.0, log=number, unit="m/s")
 
 
-def _of_noise(known: Beginning, logs: Sequence[Recorded], prior: Callable[[str], float]) -> Iterator[Parameter]:
+def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str], float]) -> Iterator[Parameter]:
     def size(kind: str, of: str, key: str) -> Iterator[Parameter]:
         """Yield the size of a slow process, unless it is exactly 0."""
         usual, least, largest = _SIZES[key]

@@ -35,7 +35,7 @@ depth controller, or to rounded pulses."""
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class SampledChannel:
     """One channel of a log that the filter reads."""
 
     channel: Channel
@@ -45,12 +45,12 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class SampledLog:
     """A log that is fitted, with the part of the vehicle that it concerns."""
 
     log: Log
     layout: Layout
-    measured: tuple[Measured, ...]
+    measured: tuple[SampledChannel, ...]
     record: Record
     thinned: Record
     """The same with fewer samples."""
@@ -80,7 +80,7 @@ class Recorded:
         return np.array([rov.along(axis, F) for F in forces])
 
 
-def recorded(log: Log, layout: Layout) -> Recorded | None:
+def recorded(log: Log, layout: Layout) -> SampledLog | None:
     """Return what the filter reads of a log; None if it tests none of these axes."""
     if not driven_axes(log, layout)[0]:
         return None
@@ -95,7 +95,7 @@ def recorded(log: Log, layout: Layout) -> Recorded | None:
     record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout))
     time, value, sensor = thin
     thinned = replace(record, time=time, value=value, sensor=sensor)
-    return Recorded(log, layout, measured, record, thinned, log.commands.interval)
+    return SampledLog(log, layout, measured, record, thinned, log.commands.interval)
 
 
 def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
@@ -170,7 +170,7 @@ def _why_not_tested(log: Log, layout: Layout, axis: Axis) -> str:
     return "cancelling thrusters" if moved else "constant push"
 
 
-def _measured(log: Log, layout: Layout) -> Iterator[Measured]:
+def _measured(log: Log, layout: Layout) -> Iterator[SampledChannel]:
     """Yield the channels that the filter reads."""
     for axis, channel in _channels(log, layout):
         if _why_left_out(channel):
@@ -178,11 +178,11 @@ def _measured(log: Log, layout: Layout) -> Iterator[Measured]:
         differences = np.diff(channel.values, 3) / np.sqrt(20.0)  # of white noise, these have its standard deviation
         noise = float(1.4826 * np.median(np.abs(differences))) or float(np.std(differences))
         sensor = Sensor(axis, channel.quantity.is_velocity, over_ground=log.axis is None)  # in a tank, water is ground
-        yield Measured(channel, sensor, max(noise, 1e-9))
+        yield SampledChannel(channel, sensor, max(noise, 1e-9))
 
 
 def _samples(
-    measured: Sequence[Measured], begin: float, rate: float, *, averaged: bool
+    measured: Sequence[SampledChannel], begin: float, rate: float, *, averaged: bool
 ) -> tuple[Array, Array, np.ndarray]:
     """Return the times, the values and the sensors of all samples in the order of time."""
     times, values, sensors = [], [], []
@@ -249,7 +249,7 @@ def _tilt(log: Log, layout: Layout) -> Array:
     return np.array([time, values, unwrapped(pitch)[pitch.there][first]])
 
 
-def _start(measured: Sequence[Measured], layout: Layout) -> tuple[dict[str, float], dict[str, float]]:
+def _start(measured: Sequence[SampledChannel], layout: Layout) -> tuple[dict[str, float], dict[str, float]]:
     """Return the states at the first sample, and the standard deviations of those that the filter follows."""
     start = dict(layout.at_rest)
     first = {(m.sensor.axis.name, m.sensor.is_velocity): m for m in measured}
@@ -290,7 +290,7 @@ def _quaternion(phi: float, theta: float, psi: float) -> dict[str, float]:
     }
 
 
-def typical(some: Sequence[Recorded], axis: Axis) -> float:
+def typical(some: Sequence[SampledLog], axis: Axis) -> float:
     """Return a large velocity along an axis in the logs, m/s or rad/s: the 90 % quantile of its size; 0 if unknown."""
     found = []
     for one in some:

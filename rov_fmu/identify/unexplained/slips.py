@@ -23,7 +23,7 @@ from rov_fmu.engine.filter import DivergedError
 from rov_fmu.identify.beginning import Tests, begin
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
-from rov_fmu.identify.likelihood.records import Measured, changes
+from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
 from rov_fmu.model.layout import REVERSE
@@ -177,7 +177,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
     return record.value - np.where(is_angle[record.sensor], alone.innovations, corrected.innovations)
 
 
-def _likeness(m: Measured, time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
+def _likeness(m: SampledChannel, time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
     """Return the ratio of measured to simulated motion, and the share of the variance that it leaves unexplained."""
     if not m.sensor.is_velocity:
         simulated = np.unwrap(simulated) if m.channel.quantity.wraps else simulated

@@ -15,10 +15,10 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import (
     Answer,
     AxisResult,
+    Coefficient,
     Disturbance,
     Effect,
     Identification,
-    Known,
     Prediction,
     Verdict,
 )
@@ -113,7 +113,7 @@ def test_what_is_judged_is_read_from_the_result() -> None:
         HEAVE,
         Verdict("do not use", ()),
         (Answer(HEAVE, 0.3, (0.2, (0.1, 0.3)), number, number),),
-        (Known("a_d_w", 41.0, (40.0, 42.0), "1", "", 0.2), Known("b_d_w", 1.0, None, "1", "", 1.0)),
+        (Coefficient("a_d_w", 41.0, (40.0, 42.0), "1", "", 0.2), Coefficient("b_d_w", 1.0, None, "1", "", 1.0)),
         (depth,),
         (),
         None,
@@ -127,7 +127,7 @@ def test_what_is_judged_is_read_from_the_result() -> None:
 
     nothing = cast("Any", None)  # of the rest nothing is read
     result = Identification(
-        nothing, {}, nothing, None, (heave,), {"top": (Known("T_top", 0.1, (0.0, 0.2), "s", "", 0.1),)}, (),
+        nothing, {}, nothing, None, (heave,), {"top": (Coefficient("T_top", 0.1, (0.0, 0.2), "s", "", 0.1),)}, (),
         (effect("lag", "", 9.0), effect("current", "a.csv", 9.0), effect("load", "heave", 3.0)),
         (force(HEAVE, "the voltage", 9.0), force(None, "", 9.0), force(HEAVE, "the time", 3.0)),
         (), (), nothing, 0.0, 0.0,
