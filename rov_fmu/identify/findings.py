@@ -22,6 +22,7 @@ from rov_fmu.identify.result import (
     Logging,
     Point,
 )
+from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.model.layout import AXES, COUPLED_AXES
 from rov_fmu.tank import findings
@@ -46,9 +47,6 @@ _MOST_OUTLIERS = 0.005
 """Outliers are told if more of a sensor's samples are."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
-_BETA, _BETA_WITH_ADDED_MASS = (0.05, 1.1), (0.3, 3.0)
-"""The possible β: with β = 1.1 the inertia would be 10 % below the mass, which wrong forces or masses may explain."""
-
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
 
 _OWN: dict[Heading, dict[str, SentenceForm]] = {
@@ -301,7 +299,7 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
     beta = next((known for known in result.known if known.name == axis.coefficient("beta")), None)
     if beta and beta.interval:
         has_added = "m_a" in identification.vehicle.layout.kinds[axis.name].keys
-        low, high = _BETA_WITH_ADDED_MASS if has_added else _BETA
+        low, high = BETA_WITH_ADDED_MASS if has_added else BETA
         if beta.interval[1] < low or beta.interval[0] > high:
             inertia = f"{axis.inertia} with the added one" if has_added else axis.inertia
             names = {"factor": significant(1.0 / beta.value, 2), "inertia": inertia, "mass": axis.inertia}

@@ -22,7 +22,8 @@ ALPHA = 0.5, 2.0
 """The range of a plausible α. Thrust that is measured in a tank is known to better than a factor of 2; the paper has α
 of 1.1 to 1.2."""
 BETA, BETA_WITH_ADDED_MASS = (0.05, 1.2), (0.3, 3.0)
-"""The range of a plausible β: without added mass, the inertia is between about that of the vehicle and 20 times it."""
+"""The range of a plausible β: without added mass, the inertia is between 20 times that of the vehicle and a little less
+than it, which wrong forces or masses may explain."""
 
 
 class TuningError(ValueError):
