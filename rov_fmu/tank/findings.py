@@ -134,10 +134,13 @@ SENTENCES: dict[str, SentenceForm] = {
     "time of arrival": (
         "{files}: {count:#message} of {topics} without a time in the header: the time of arrival is used"
     ),
-    "other clock": ("{files}: it has another clock than the commands. The fit finds the difference, up to {most:g} s"),
+    "other clock": (
+        "{files}: it has another clock than the commands. Its times are used as they are, as if both clocks agreed. "
+        "Correct them if they do not"
+    ),
     "aligned clock": (
-        "{files}: it has another clock than the commands, and their times do not overlap. Its first "
-        "sample is moved to the first command. The fit finds the remaining difference, up to {most:g} s"
+        "{files}: it has another clock than the commands, and their times do not overlap. Its first sample is moved to "
+        "the first command, as if both had begun at once. Correct its times if they did not"
     ),
     "dropouts": "{files}: the autopilot lost data {count:#time}, for up to {longest:.3g} s",
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",

@@ -28,7 +28,7 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
 from rov_fmu.tank.description import ROV_FILE, Dive, Requests, RovFile, read_description
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.log import CLOCK_ERROR, Commands, Log
+from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.parsers import one_parser, open_table
@@ -279,8 +279,7 @@ def _read_description(folder: Path) -> RovFile:
 def _together(path: Path, logs: Sequence[Log], other_clock: Collection[str]) -> Log:
     """Return the log of a dive of several files, of which one has the commands. Raises DataFileError.
 
-    A file with another clock than the commands is one of the log's `other_clocks`. If its times do not overlap with
-    those of the commands, its first sample is moved to the first command.
+    If the times of a file do not overlap with those of the commands, its first sample is moved to the first command.
     """
     commanding = [log for log in logs if log.commands]
     if len(commanding) != 1:
@@ -302,7 +301,6 @@ def _joined(first: Log, parts: Sequence[Log]) -> Log:
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
         unread=tuple(item for log in parts for item in log.unread),
-        other_clocks=frozenset().union(*(log.other_clocks for log in parts)),
     )
 
 
@@ -320,8 +318,7 @@ def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
     return replace(
         log,
         channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
-        findings=(*log.findings, Finding(kind, file=log.file, numbers={"most": CLOCK_ERROR})),
-        other_clocks=frozenset([log.file]),
+        findings=(*log.findings, Finding(kind, file=log.file)),
     )
 
 

@@ -18,8 +18,6 @@ from rov_fmu.tank.findings import Finding
 
 LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
-CLOCK_ERROR = 5.0
-"""The largest error of times that were aligned with those of another clock, s."""
 
 
 @dataclass(frozen=True, order=True)
@@ -131,8 +129,6 @@ class Log:
     """The only axis that the log is a test of; None for a dive."""
     follows_axis: bool = False
     """True if the log has one command, which all thrusters of its axis follow."""
-    other_clocks: frozenset[str] = frozenset()
-    """The files whose times are those of another clock than that of the commands."""
     findings: tuple[Finding, ...] = ()
     """What was left out, taken or doubted."""
     unread: tuple[tuple[str, str], ...] = ()

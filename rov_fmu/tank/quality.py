@@ -16,9 +16,8 @@ _MOST_SOURCES = 4
 """The largest number of sources that are not used and told."""
 _LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
 """A gap is longer than this time, s, and than this many usual intervals."""
-_ROUNDING = 0.01
-_TURN = 2.0 * pi + 2.0 * _ROUNDING
-"""What rounding may add to the bounds of a wrapped angle, and the width of these bounds, rad."""
+_TURN = 2.0 * pi + 0.3
+"""The largest range of a wrapped angle, rad: noise and filters exceed a turn a little where the angle wraps."""
 _APART = 2.0
 """The time over which changes of a position are compared with a velocity, s."""
 _SAME_SCALE, _CLEAR = 0.01, 4.0
@@ -115,16 +114,14 @@ def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
 def unwrapped(channel: Channel) -> Array:
     """Return the values without jumps of a full turn, if they are angles; NaN stays NaN.
 
-    An angle is already continuous if it is not within -180° ... 180° or 0° ... 360°, or if it never jumps by more than
-    half a turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is
-    assumed.
+    An angle is already continuous if it ranges over clearly more than a turn, or if it never jumps by more than half a
+    turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is assumed.
     """
     found, there = channel.values.copy(), channel.there
     values = found[there]
     jumps = np.abs(np.diff(values)) > pi
     jumps[np.isin(channel.time[there][:-1], [start for start, _ in gaps(channel.time, found)])] = False
-    in_one_turn = any(((low <= values) & (values <= low + _TURN)).all() for low in (-pi - _ROUNDING, -_ROUNDING))
-    if channel.quantity.wraps and jumps.any() and in_one_turn:
+    if channel.quantity.wraps and jumps.any() and spread(values) < _TURN:
         found[there] = np.unwrap(values)
     return found
 

@@ -118,7 +118,14 @@ def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
     ("rows", "told"),
     [
         ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
-        ([f"12.5.2026,30,{n}" for n in range(N)], r"both a time and a command: '12.5.2026' is no time in time \[s\]"),
+        (
+            [f"12.5.2026,30,{n}" for n in range(N)],
+            r"line 2, column 'time \[s\]' = 12.5.2026: is no time, and no row",
+        ),
+        (
+            ["0,,1", "1,none,1"],
+            r"line 3, column 'command \[%\]' = none: is no number, and no row has both a time and",
+        ),
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
         ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
     ],

@@ -177,5 +177,5 @@ def _numbers(
     for title, place in places.items():
         values = np.frombuffer(table.values[place])
         numbers[title] = found = values[np.isfinite(values)]
-        ranges[title] = "text" if table.unread[place] > len(found) else range_in_words(found)
+        ranges[title] = "text" if len(table.unread[place]) > len(found) else range_in_words(found)
     return numbers, ranges

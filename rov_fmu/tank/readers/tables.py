@@ -194,10 +194,11 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
     timed = np.isfinite(columns["time"])
     rows = np.flatnonzero(np.all([np.isfinite(columns[name]) for name in ("time", *commanding)], axis=0))
     if not rows.size:
-        unread = (text["time"] for text in table.rows()) if table.unread["time"] else ()
-        quoted = next((f": {shown(text)} is no time in {table.headers['time']}" for text in unread if text), "")
         what = "both a time and a command" if commanding else "a time"
-        raise DataFileError(f"{table.path}: no row has {what}{quoted}")
+        for name in (name for name in ("time", *commanding) if table.unread[name]):
+            reason = f"is no {'time' if name == 'time' else 'number'}, and no row has {what}"
+            raise table.error(table.unread[name][0], name, reason)
+        raise DataFileError(f"{table.path}: no row has {what}")
     late: list[int] = []
     merged, since = rows.size, 0.0
     for own in np.split(rows, restart_rows(columns["time"][rows])):
@@ -221,9 +222,9 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
 def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> None:
     """Add what the cells tell: too many in a row, no numbers, and no pulses."""
     content.count("torn rows", table.torn)
-    for name, count in table.unread.items():
+    for name, rows in table.unread.items():
         if name not in ("time", *commanding):
-            content.count("unread cells", count, column=name)
+            content.count("unread cells", len(rows), column=name)
     for name in (name for name in commanding if table.units[name] in PULSES):
         count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
         content.count("no pulse", count, column=name)
