@@ -23,6 +23,8 @@ from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
     EULER,
+    HULL,
+    LEAST_PRESSURE,
     MESSAGES,
     NED,
     NOT_MEASURED,
@@ -47,9 +49,6 @@ _COMPARED, _LEAST_COMPARED = 1.0, 8
 _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
 """A velocity contradicts the positions if the root mean square of the difference is more than the first share of the
 motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
-_HULL = 0.02, 0.05
-"""A barometer is inside the hull if the depth that follows from it changes by less than the first number, m, and if its
-pressure differs from that of the atmosphere by less than the second share."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
 """Words in the names of frames that are fixed to the earth."""
 
@@ -289,13 +288,13 @@ def _reason_against_pressure(values: Array) -> str:
     if not len(known):
         return ""
     low, high = float(known.min()), float(known.max())
-    if high < 0.01 * ATMOSPHERE:
+    if high < LEAST_PRESSURE * ATMOSPHERE:
         return (
             f"its pressures of {low:.4g} ... {high:.4g} are below 1 % of an atmosphere, so they are not in Pa. Name "
             'their unit in rov.toml, such as "pressure [kPa]"'
         )
     change, from_air = (high - low) / PRESSURE_GRADIENT, abs(high / ATMOSPHERE - 1.0)
-    if change < _HULL[0] and from_air < _HULL[1]:
+    if change < HULL[0] and from_air < HULL[1]:
         return (
             f"its pressure changes by only {1000.0 * change:.2g} mm of water and is that of the air, so the barometer "
             "seems to be inside the hull"

@@ -21,6 +21,7 @@ from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
+from rov_fmu.tank.columns import command_columns, thrusters_of
 from rov_fmu.tank.readers.tables import rules_of_page
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -126,7 +127,7 @@ def _data(flown: Flown) -> dict[str, Any]:
         "inputs": len(layout.inputs),
         "states": len(layout.state),
         "commands": list(layout.commands),
-        "mixed": bool(layout.mix),
+        "columns": list(_columns(layout)),
         "csv": rules_of_page(),
         "axes": [_axis(rov, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
         "thrusters": [
@@ -137,6 +138,24 @@ def _data(flown: Flown) -> dict[str, Any]:
         "tests": list(_tests(vehicle)),
         "size": size_of(rov),
     }
+
+
+def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
+    """Yield the columns of commands that a recording may have.
+
+    `gains` are those of the vehicle's commands in the command of the column. `shares` are the commands that give this
+    command best, while those of the other columns of its `kind` are 0.
+    """
+    thrusters = thrusters_of(layout)
+    kinds = [{name: column.also for name, column in kind.items()} for kind in command_columns(layout)]
+    kinds[0] = dict.fromkeys(layout.commands, ()) | kinds[0]  # fins have commands, too
+    for n, kind in enumerate(kinds):
+        gains = [{name: 1.0} if name in layout.commands else layout.gains[thrusters[name]] for name in kind]
+        matrix = np.array([[own.get(command, 0.0) for command in layout.commands] for own in gains])
+        shares = np.linalg.pinv(matrix, rcond=1e-9).T
+        for (name, also), own, share in zip(kind.items(), gains, shares, strict=True):
+            by_command = dict(zip(layout.commands, map(float, share), strict=True))
+            yield {"name": name, "also": also, "kind": n, "gains": own, "shares": by_command}
 
 
 def _keys(layout: Layout) -> list[str]:

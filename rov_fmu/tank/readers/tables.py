@@ -28,7 +28,7 @@ from rov_fmu.io.csv_table import (
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import QUANTITIES, TIMES
+from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, QUANTITIES, TIMES
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, restart_rows
 from rov_fmu.tank.columns import (
@@ -46,7 +46,7 @@ from rov_fmu.tank.columns import (
     thrusters_of,
 )
 from rov_fmu.tank.findings import SENTENCES, Finding, refusals
-from rov_fmu.tank.log import Source
+from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 
 _MOST_UNORDERED = 0.2
@@ -70,6 +70,13 @@ def rules_of_page() -> dict[str, Any]:
         "mostUnordered": _MOST_UNORDERED,
         "leastAfter": LEAST_AFTER,
         "again": AGAIN,
+        "leastSamples": LEAST_SAMPLES,
+        "pressures": {
+            "atmosphere": ATMOSPHERE,
+            "gradient": PRESSURE_GRADIENT,
+            "hull": HULL,
+            "least": LEAST_PRESSURE * ATMOSPHERE,
+        },
     }
 
 
