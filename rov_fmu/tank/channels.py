@@ -38,12 +38,15 @@ from rov_fmu.tank.catalogue import (
     Quantity,
     words_of,
 )
+from rov_fmu.tank.clocks import ascending
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Source
 
 _ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Turns east, north, up into north, east, down."""
 _FLU = np.diag([1.0, -1.0, -1.0])
 """Turns forward, left, up into forward, starboard, down."""
+_LARGEST = 1e12
+"""The size of a time or of a value that no clock and no sensor shows."""
 _COMPARED, _LEAST_COMPARED = 1.0, 8
 """The time over which the changes of a position are compared with a velocity, s, and the least number of changes."""
 _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
@@ -65,6 +68,17 @@ class Topic:
     where the sender marks them as unknown."""
     unused: str = ""
     """Why the reader says that it must not be used; empty if it may be."""
+
+    @classmethod
+    def of_messages(cls, source: Source, time: Array, fields: Mapping[str, Array]) -> "Topic":
+        """Return the topic of messages in any order. Of messages with the same time, the last number counts.
+
+        Times that no clock shows are left out, and values that no sensor shows become NaN.
+        """
+        timed = np.abs(time) < _LARGEST
+        known = (np.where(np.abs(values[timed]) < _LARGEST, values[timed], np.nan) for values in fields.values())
+        ordered, *columns = ascending(time[timed], *known)
+        return cls(source, ordered, dict(zip(fields, columns, strict=True)))
 
     def full_fields(self) -> Iterator[tuple[str, Array]]:
         """Yield the fields with the name of the topic, as rov.toml names them."""

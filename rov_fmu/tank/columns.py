@@ -201,18 +201,22 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
     return Names({**WELL_KNOWN, **tables.columns}, entries, tables.logs), mistakes
 
 
+def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:
+    """Return True for the names of inputs that drive several thrusters; False for those of thrusters or of an axis."""
+    return bool(layout.mix) and {*names} <= {*layout.commands}
+
+
 def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list[str], Array]:
     """Return the names of the thrusters, and n x thrusters commands within ±1, from n commands of inputs or thrusters.
 
-    An input or a thruster without a command has the command 0.
+    An input or a thruster without a command has the command 0. The command of an axis, and those of a vehicle whose
+    thrusters are not known, keep their names.
     """
-    count = len(next(iter(values.values())))
-    still = np.zeros(count)
-    if layout.mix and values.keys() <= {*layout.commands}:
-        mixed = {
-            t: sum((g * values.get(u, still) for u, g in gains.items()), still) for t, gains in layout.gains.items()
-        }
-    else:
-        mixed = {t.name: values.get(t.name, still) for t in layout.thrusters}
-    fractions = np.column_stack([*mixed.values()])
-    return [*mixed], np.clip(fractions, -1.0, 1.0, out=fractions)
+    named = [] if COMMAND in values else [thruster.name for thruster in layout.thrusters]
+    gains = layout.gains if is_of_inputs(layout, values) else {}
+    still = np.zeros(len(next(iter(values.values()))))
+    mixed = {
+        name: sum((gain * values.get(one, still) for one, gain in gains.get(name, {name: 1.0}).items()), still)
+        for name in named or values
+    }
+    return [*mixed], np.clip(np.column_stack([*mixed.values()]), -1.0, 1.0)

@@ -29,7 +29,7 @@ from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import NOT_COMMANDED, OUTPUTS, Output, words_of
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import ascending, held
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
 from rov_fmu.vehicle.quantity import Finite
 
@@ -164,15 +164,11 @@ def commands_of(
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
     """Yield findings about the outputs and the vehicle that are used, if there are others."""
     if len(vehicles) > 1:
-        yield _finding(path, "several vehicles", vehicles=listed(vehicles), vehicle=best.source.vehicle)
+        yield about(path.name, "several vehicles", vehicles=listed(vehicles), vehicle=best.source.vehicle)
     others = [str(outputs.source) for outputs in own if outputs is not best]
     if others or best.source.topic != best.source.kind:  # a message of an autopilot without rivals explains itself
         left = f"; not used: {listed(dict.fromkeys(others))}" if others else ""
-        yield _finding(path, "source of commands", source=str(best.source), others=left)
-
-
-def _finding(path: Path, kind: str, **names: str) -> Finding:
-    return Finding(kind, file=path.name, names=names)
+        yield about(path.name, "source of commands", source=str(best.source), others=left)
 
 
 # ---- Which outputs ---------------------------------------------------------------------------------------------------
@@ -260,7 +256,7 @@ def _fractions(
     series = {name: (outputs.series[n][0], np.nan_to_num(outputs.series[n][1])) for name, n in numbers.items()}
     findings = []
     if outputs.rule.unit != "1" and "MOT_1_DIRECTION" not in parameters.told:
-        findings.append(_finding(path, "unknown direction"))
+        findings.append(about(path.name, "unknown direction"))
     if not series or not _are_pulses(path, outputs):
         return series, findings
     turned, without_pulse, ranges = [], 0, []
@@ -276,13 +272,13 @@ def _fractions(
         span = np.where(values > neutral, high - neutral, neutral - low) * np.where(is_turned, -1.0, 1.0)
         series[name] = time, np.where(is_none, 0.0, (values - neutral) / span)
     if without_pulse:
-        findings.append(Finding("no servo pulse", file=path.name, numbers={"count": without_pulse}))
+        findings.append(about(path.name, "no servo pulse", count=without_pulse))
     if ranges[0] != [f"{end:g}" for end in (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN)]:
         findings.append(
-            _finding(path, "range of pulses", **dict(zip(("low", "neutral", "high"), ranges[0], strict=True)))
+            about(path.name, "range of pulses", **dict(zip(("low", "neutral", "high"), ranges[0], strict=True)))
         )
     if turned:
-        findings.append(_finding(path, "reversed motors", thrusters=", ".join(turned)))
+        findings.append(about(path.name, "reversed motors", thrusters=", ".join(turned)))
     begin = max(time[0] for time, _ in series.values())
     return series, [*findings, *_changes(path, parameters, begin)]
 
@@ -294,7 +290,7 @@ def _changes(path: Path, parameters: Parameters, begin: float) -> Iterator[Findi
         times, told = parameters.told[name]
         for time in times[1:][np.diff(told) != 0.0] - begin:
             changed.setdefault(f"{time:.4g}", []).append(name)
-    yield from (_finding(path, "parameter changed", name=", ".join(names), at=at) for at, names in changed.items())
+    yield from (about(path.name, "parameter changed", name=", ".join(names), at=at) for at, names in changed.items())
 
 
 def _are_pulses(path: Path, outputs: _Outputs) -> bool:

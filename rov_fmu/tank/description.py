@@ -7,7 +7,7 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
@@ -108,7 +108,7 @@ def _check_curve_names(value: object) -> object:
 _Curves = Annotated[Any, AfterValidator(_check_curve_names)]
 
 
-class _Fit(Strict):
+class Requests(Strict):
     """The table [fit]: what is fitted in addition to thrust, drag and β."""
 
     lag: _Curves = ()
@@ -118,20 +118,6 @@ class _Fit(Strict):
     attitude: bool = False
     """True when the vehicle is simulated at the logged roll and pitch."""
 
-
-@dataclass(frozen=True)
-class Requests:
-    """What is fitted on request."""
-
-    lag: tuple[str, ...] = ()
-    """The curves whose thrusters' lag is fitted."""
-    voltage: bool = False
-    """True when thrust depends on the logged voltage."""
-    attitude: bool = False
-    """True when the vehicle is simulated at the logged roll and pitch."""
-    measured_at: Mapping[str, float] = field(default_factory=dict)
-    """The voltage at which the thrust of a curve was measured, V, where it is given."""
-
     @property
     def quantities(self) -> dict[str, tuple[str, ...]]:
         """The quantities that every log must have, by the key of [fit] that needs them."""
@@ -139,7 +125,7 @@ class Requests:
 
     def of(self, curves: Collection[str]) -> "Requests":
         """Return the requests for some curves."""
-        return replace(self, lag=tuple(name for name in self.lag if name in curves))
+        return self.model_copy(update={"lag": tuple(name for name in self.lag if name in curves)})
 
 
 class Dive(Strict):
@@ -191,7 +177,7 @@ class RovTables(OpenHardware):
     windows: dict[str, _Window] = Field(default={})
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
-    fit: _Fit = _Fit()
+    fit: Requests = Requests()
     priors: dict[str, _Deviation] = Field(default={})
     """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""
     columns: dict[str, str] = Field(default={})
@@ -237,7 +223,9 @@ class Description:
     thruster_sources: Mapping[str, Mapping[str, str]]
     """The sources of each thruster's direction and position."""
     requests: Requests
-    """What is fitted on request."""
+    """What is fitted on request, with the names of the curves."""
+    measured_at: Mapping[str, float]
+    """The voltage at which the thrust of a curve was measured, V, where it is given and thrust depends on it."""
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base_name: str
@@ -341,6 +329,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
     names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
     layout = _largest_layout(start, axis_keys, {*known_names} - names.keys())
+    curves = tuple(curve.name for curve in layout.curves)
     given = {name: quantity for name, quantity in file.quantities(layout).items() if quantity} | dict(file.known)
     return Description(
         path=path,
@@ -351,18 +340,11 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         named=tuple(dict.fromkeys([*given, *known_names])),
         base_quantities=_quantities(base) if base else {},
         thruster_sources=thruster_sources,
-        requests=_requests(file, layout, names),
+        requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
+        measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=limits,
         base_name=data.get("base", ""),
     )
-
-
-def _requests(file: RovTables, layout: Layout, voltages: Mapping[str, str]) -> Requests:
-    """Return what [fit] asks for; `voltages` has the curves by the names of their V_0."""
-    curves = tuple(curve.name for curve in layout.curves)
-    requests: dict[str, Any] = {key: curves if value is True and key == "lag" else value for key, value in file.fit}
-    measured_at = {voltages[name]: file.known[name].value for name in voltages.keys() & file.known.keys()}
-    return Requests(**requests, measured_at=measured_at)
 
 
 def _start(file: RovTables, base: Vehicle | None) -> tuple[Layout, Mapping[str, Mapping[str, str]], tuple[str, ...]]:

@@ -30,6 +30,13 @@ class Finding:
     """The numbers that the sentence needs. In a sentence about several files they become ranges."""
 
 
+def about(file: str, kind: str, axis: str = "", /, **words: str | float) -> Finding:
+    """Return a finding about a file, with the words and the numbers that its sentence needs."""
+    names = {name: word for name, word in words.items() if isinstance(word, str)}
+    numbers = {name: word for name, word in words.items() if not isinstance(word, str)}
+    return Finding(kind, axis, file=file, names=names, numbers=numbers)
+
+
 def sentences(findings: Iterable[Finding], forms: Mapping[str, SentenceForm]) -> tuple[str, ...]:
     """Return the sentences of the findings; similar findings share one sentence.
 

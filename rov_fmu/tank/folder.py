@@ -27,7 +27,7 @@ from rov_fmu.model.layout import AXES, Layout
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
 from rov_fmu.tank.description import ROV_FILE, Dive, Requests, RovFile, read_description
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
@@ -145,7 +145,7 @@ class Folder:
         if content not in self.originals:
             self.originals[content] = name
             return False
-        self.findings.append(Finding("copy", file=name, names={"original": self.originals[content]}))
+        self.findings.append(about(name, "copy", original=self.originals[content]))
         return True
 
     def _add(self, logs: Sequence[Log]) -> None:
@@ -245,7 +245,7 @@ def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = l
 def unreadable(path: Path, error: FileError) -> Finding:
     """Return the finding about a file that cannot be read, with the first reason."""
     first, *_ = str(error).splitlines()
-    return Finding("unreadable file", file=path.name, names={"reason": first.removeprefix(f"{path}: ")})
+    return about(path.name, "unreadable file", reason=first.removeprefix(f"{path}: "))
 
 
 def test_files(folder: Path) -> list[Path]:
@@ -306,7 +306,7 @@ def _joined(first: Log, parts: Sequence[Log]) -> Log:
 
 def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
     """Return a file of a dive on the clock of the commands, with a finding if it has another clock."""
-    times = [channel.time[channel.there] for channel in log.channels if channel.count]
+    times = [channel.samples[0] for channel in log.channels if channel.count]
     if not times:
         return log
     start, end = min(time[0] for time in times), max(time[-1] for time in times)
@@ -318,7 +318,7 @@ def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
     return replace(
         log,
         channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
-        findings=(*log.findings, Finding(kind, file=log.file)),
+        findings=(*log.findings, about(log.file, kind)),
     )
 
 

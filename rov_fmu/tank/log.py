@@ -67,6 +67,11 @@ class Channel:
         return np.isfinite(self.values)
 
     @property
+    def samples(self) -> tuple[Array, Array]:
+        """The times and the values of the measurements that there are."""
+        return self.time[self.there], self.values[self.there]
+
+    @property
     def count(self) -> int:
         """The number of samples with a measurement."""
         return int(self.there.sum())

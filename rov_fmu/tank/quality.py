@@ -9,7 +9,7 @@ import numpy as np
 from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 
 _MOST_SOURCES = 4
@@ -43,7 +43,7 @@ def checked(log: Log) -> Log:
     findings = [*log.findings, *frozen]
     used = [channel for channel in channels if not channel.unused]
     if any(channel.derived_from == "pressure" for channel in used):
-        findings.append(Finding("depth by pressure", file=log.file))
+        findings.append(about(log.file, "depth by pressure"))
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
     for channel in used:
         if not channel.quantity.is_velocity:
@@ -71,9 +71,7 @@ def sources(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
             groups.setdefault(("channel left out", str(channel.source), channel.unused), []).append(channel)
     for (kind, source, words), own in sorted(groups.items(), key=lambda group: group[0][0]):
         quantities = listed(dict.fromkeys(channel.quantity.name for channel in own))
-        names = {"quantities": quantities, "source": source, "words": words}
-        numbers = {"rate": rate(own[0].time[own[0].there])} if kind == "source" else {}
-        yield Finding(kind, file=file, names=names, numbers=numbers)
+        yield about(file, kind, quantities=quantities, source=source, words=words, rate=rate(own[0].samples[0]))
 
 
 def rate(time: Array) -> float:
@@ -130,8 +128,8 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
     from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
 
-    axis, unit, there = channel.quantity.axis, channel.quantity.unit, channel.there
-    time, values = channel.time[there], unwrapped(channel)[there]
+    axis, unit = channel.quantity.axis, channel.quantity.unit
+    time, values = replace(channel, values=unwrapped(channel)).samples
     steps = np.diff(values)
     if unit not in ("m", "rad") or len(values) < LEAST_SAMPLES or not steps.any():
         return None
@@ -145,8 +143,9 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
         return None
     factor, shown_unit = in_degrees(unit)
     told = [f"{factor * steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in places]
-    names = {"quantity": channel.quantity.name, "jumps": ", ".join(first_of(told, MOST))}
-    return Finding("jumps", axis.name if axis else "", file=file, names=names, numbers={"count": len(places)})
+    jumps = ", ".join(first_of(told, MOST))
+    name = axis.name if axis else ""
+    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=jumps, count=len(places))
 
 
 def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> list[Finding]:
@@ -163,8 +162,8 @@ def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> 
     tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
     if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
         return []
-    time, values = position.time[position.there], unwrapped(position)[position.there]
-    at, speeds = velocity.time[velocity.there], velocity.values[velocity.there]
+    time, values = replace(position, values=unwrapped(position)).samples
+    at, speeds = velocity.samples
     ends = np.arange(max(time[0], at[0]), min(time[-1], at[-1]), _APART)
     rows = np.unique(np.searchsorted(time, ends))
     travelled = np.interp(time[rows], at, cumulative_trapezoid(speeds, at, initial=0.0))
@@ -174,8 +173,7 @@ def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> 
     (scale, _), covariance = np.polyfit(implied, actual, 1, cov=True)
     if abs(scale - 1.0) < max(_SAME_SCALE, _CLEAR * np.sqrt(covariance[0, 0])):
         return []
-    names = {"quantity": position.quantity.name}
-    return [Finding("scales differ", axis.name, file=file, names=names, numbers={"factor": float(scale)})]
+    return [about(file, "scales differ", axis.name, quantity=position.quantity.name, factor=float(scale))]
 
 
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------
@@ -196,13 +194,14 @@ def _without_frozen(file: str, channels: Sequence[Channel]) -> tuple[list[Channe
     if len({*names}) < 2:
         return [*channels], []
     kept = [replace(c, values=np.where(c.time < together.get(c, np.inf), c.values, np.nan)) for c in channels]
-    numbers = {"start": min(together.values()) - first, "end": last - first}
-    return kept, [Finding("frozen sensors", file=file, names={"sensors": listed(names)}, numbers=numbers)]
+    start = min(together.values()) - first
+    return kept, [about(file, "frozen sensors", sensors=listed(names), start=start, end=last - first)]
 
 
 def _frozen_from(channel: Channel, duration: float) -> float | None:
     """Return the time after which a sensor with visible noise keeps its last value exactly, or None."""
-    time, steps = channel.time[channel.there], np.diff(channel.values[channel.there])
+    time, values = channel.samples
+    steps = np.diff(values)
     start = int(np.max(np.flatnonzero(steps), initial=-1)) + 1
     if start < LEAST_SAMPLES or time[-1] - time[start] <= max(_LEAST_TIME, _LEAST_SHARE * duration):
         return None

@@ -12,9 +12,9 @@ import numpy as np
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import in_rows
-from rov_fmu.tank.columns import COMMAND, Entry, Names, thruster_commands, thrusters_of
+from rov_fmu.tank.columns import COMMAND, Entry, Names, is_of_inputs, thruster_commands, thrusters_of
 from rov_fmu.tank.commands import LogKeys, Series, commands_of
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
@@ -38,9 +38,7 @@ def read_logs(
         content, entries = read_table(path, layout, axis, names, kind.open(path), is_part=is_part)
     else:
         content = read_parsed(path, kind, {name.partition(".")[0] for name in entries})
-    content.findings += [
-        Finding("clock restarts", file=path.name, names={"at": f"{piece.since:.4g}"}) for piece in content.pieces[1:]
-    ]
+    content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
     return [_log(path, content, piece, layout, entries, names.keys, axis) for piece in content.pieces]
 
 
@@ -66,10 +64,15 @@ def _log(
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
     used = {channel.source.topic for channel in channels} | {source.topic}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}
+    commands = None
+    if series:
+        rows, values = in_rows(series)
+        thrusters, fractions = thruster_commands(layout, values)
+        commands = Commands.of_rows(thrusters, rows, fractions, source)
     unread = content.unread | described(topic for topic in piece.topics if topic.source.topic not in used)
     return Log(
         file,
-        _commands(layout, series, source) if series else None,
+        commands,
         tuple(channels),
         axis,
         follows_axis=COMMAND in series,
@@ -99,15 +102,6 @@ def _meant(
     return channels, commands, labels
 
 
-def _commands(layout: Layout, series: Mapping[str, Series], source: Source) -> Commands:
-    """Return the commands of thrusters, from those of an axis, of inputs or of thrusters."""
-    rows, values = in_rows(series)
-    if COMMAND in series or not layout.thrusters:
-        return Commands.of_rows([*values], rows, np.clip(np.column_stack([*values.values()]), -1.0, 1.0), source)
-    thrusters, fractions = thruster_commands(layout, values)
-    return Commands.of_rows(thrusters, rows, fractions, source)
-
-
 def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str]) -> Iterator[Finding]:
     """Yield a finding for each column or thruster with commands beyond ±1, which become ±1, and for each without any.
 
@@ -115,11 +109,8 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
     """
     for name, (_, values) in series.items():
         if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
-            names = {"column": labels.get(name, f"thruster {name}")}
-            yield Finding("beyond full thrust", file=file, names=names, numbers={"count": count})
-    columns = thrusters_of(layout)
-    if layout.mix and series.keys() <= {*layout.commands}:
-        columns = {name: name for name in layout.commands}
-    for column, name in columns.items():
+            yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
+    inputs = {name: name for name in layout.commands}
+    for column, name in (inputs if is_of_inputs(layout, series) else thrusters_of(layout)).items():
         if series and not {name, COMMAND} & series.keys():
-            yield Finding("missing column", file=file, names={"column": column})
+            yield about(file, "missing column", column=column)

@@ -120,8 +120,9 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
         return Inspection(path, path.name, (), (), ranges, (), columns)
     rows, _ = read_rows(path, kind, axis, columns)
     numbers = zip(*((row.command, row.value) for row in rows), strict=True)
+    no_times = np.full(len(rows), nan)
     channels = (
-        Row(name, next(iter(column.units)) if name != COMMAND else "1", nan, nan, len(own), nan, min(own), max(own), ())
+        _row(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
         for (name, column), own in zip(of_table.items(), numbers, strict=True)
     )
     return Inspection(path, path.name, (), tuple(channels), unread, (), columns)

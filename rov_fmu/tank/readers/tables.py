@@ -45,7 +45,7 @@ from rov_fmu.tank.columns import (
     refuse_slips,
     thrusters_of,
 )
-from rov_fmu.tank.findings import SENTENCES, Finding, refusals
+from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 
@@ -243,8 +243,7 @@ def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
     usual = float(np.median(intervals)) if len(intervals) else 0.0
     if usual <= 1.0 / _SLOW and (usual == 0.0 or usual >= _SHORTEST):
         return None
-    names = {"column": table.headers["time"], "rate": f"{1.0 / usual:.3g}"}
-    return Finding("unlikely rate", file=table.path.name, names=names)
+    return about(table.path.name, "unlikely rate", column=table.headers["time"], rate=f"{1.0 / usual:.3g}")
 
 
 # ---- Variables of MATLAB ---------------------------------------------------------------------------------------------
@@ -259,7 +258,7 @@ def open_matlab(path: Path) -> Callable[[], TextIO]:
     from scipy.io import loadmat
 
     try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+        content = loadmat(path, simplify_cells=True)
     except NotImplementedError:
         reason = "is a .mat file of version 7.3 (HDF5), which SciPy does not read: save it with -v7"
         raise DataFileError(f"{path}: {reason}") from None
@@ -286,8 +285,7 @@ def _vectors(place: str, value: Any) -> Iterator[tuple[str, Array]]:
         elif value.ndim == 2 and value.size:
             columns = value.T if value.shape[0] >= value.shape[1] else value
             yield from ((f"{place}({n})", column.astype(float)) for n, column in enumerate(columns, start=1))
-        return
-    fields = value if isinstance(value, dict) else {n: getattr(value, n) for n in getattr(value, "_fieldnames", ())}
-    for name, inner in fields.items():
-        if not name.startswith("__"):
-            yield from _vectors(f"{place}.{name}" if place else name, inner)
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            if not name.startswith("__"):
+                yield from _vectors(f"{place}.{name}" if place else name, inner)
