@@ -122,6 +122,11 @@ class _Outputs:
             n for n, (_, values) in self.series.items() if (np.isfinite(values) & ~np.isin(values, NO_OUTPUT)).any()
         ]
 
+    @property
+    def activity(self) -> float:
+        """How much the outputs change."""
+        return sum(spread(values) for _, values in self.series.values())
+
 
 @dataclass(frozen=True, eq=False)
 class Commanded:
@@ -211,12 +216,7 @@ def _best(candidates: Sequence[_Outputs], thrusters: int, parameters: Parameters
     """Return the outputs of one vehicle that drive the motors: those that fit best, and change most."""
     same = [outputs for outputs in candidates if outputs.rule is candidates[0].rule]
     module = _motor_module(parameters)
-    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, _activity(o)))
-
-
-def _activity(outputs: _Outputs) -> float:
-    """Return how much the outputs change."""
-    return sum(spread(values) for _, values in outputs.series.values())
+    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, o.activity))
 
 
 def _motor_module(parameters: Parameters) -> str:

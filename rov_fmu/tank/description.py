@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, similar
+from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     Strict,
@@ -128,16 +128,31 @@ class Requests(Strict):
         return self.model_copy(update={"lag": tuple(name for name in self.lag if name in curves)})
 
 
+def _check_files(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+    """Check that a dive has several files, which are in the folder of rov.toml."""
+    if len({*names}) < 2:
+        raise ValueError("must be two or more files: a log of one file needs no table")
+    for name in names:
+        if Path(name).name != name or not (folder_of(info) / name).is_file():
+            raise ValueError(f"there is no such file in this folder: {shown(name)}")
+    return names
+
+
+def _check_clocks(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+    """Check that the files of another clock are files of the dive."""
+    files = info.data.get("files", names)
+    for name in names:
+        if name not in files:
+            raise ValueError(f"must be of its files: {shown(name)} is not{did_you_mean(name, files)}")
+    return names
+
+
 class Dive(Strict):
     """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
 
-    files: Annotated[
-        tuple[str, ...],
-        BeforeValidator(as_tuple),
-        _must_be("two or more files: a log of one file needs no table", lambda files: len({*files}) > 1),
-    ]
+    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_files)]
     """The files, one of which has the commands."""
-    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
+    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_clocks)] = ()
     """The files whose times come from another clock than the times of the commands."""
 
 

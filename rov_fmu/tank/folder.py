@@ -108,24 +108,17 @@ class Folder:
         with one_parser():
             for path in paths:
                 self.read(path)
-            for name, dive in self.rov_file.tables.dives.items():
-                self.read_dive(name, dive)
+            for dive in self.rov_file.tables.dives.values():
+                self.read_dive(dive)
         if self.mistakes or not (self.logs or self.rows):
             self.mistakes += self.unreadable
         self.logs = [checked(log) for log in self.logs]
         self.findings += [finding for log in self.logs for finding in log.findings]
 
-    def read_dive(self, name: str, dive: Dive) -> None:
+    def read_dive(self, dive: Dive) -> None:
         """Read the files of a dive together."""
         try:
-            for other in dive.other_clock:
-                if other not in dive.files:
-                    reason = f"must be one of its files{did_you_mean(other, dive.files)}"
-                    raise self._error(f"dives.{name}.other_clock", reason, other)
             paths = [self.path / part for part in dive.files]
-            for part, path in zip(dive.files, paths, strict=True):
-                if path.name != part or not path.is_file():
-                    raise self._error(f"dives.{name}.files", "there is no such file in this folder", part)
             digests = dict(zip(dive.files, map(file_hash, paths), strict=True))
             if self._is_copy(join_names(dive.files), ("dive", *sorted(digests.values()))):
                 return
@@ -135,9 +128,6 @@ class Folder:
                 self._add([_together(paths[0], logs, dive.other_clock)])
         except FileError as error:
             self.mistakes += str(error).splitlines()
-
-    def _error(self, key: str, reason: str, value: str) -> DataFileError:
-        return DataFileError(f"{self.path / ROV_FILE}: {key_line(key, reason, value)}")
 
     def _is_copy(self, name: str, content: tuple[str, ...]) -> bool:
         """Return True, and add a finding, if an earlier file has the same content. The same data must not count

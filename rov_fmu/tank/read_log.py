@@ -54,11 +54,11 @@ def _log(
     """Return the log of a piece: what `entries` say of its fields, and what is recognised besides."""
     is_first = piece is content.pieces[0]
     file = path.name if is_first else f"{path.name} (from {piece.since:.4g} s)"
-    named, told, labels = _meant(piece, entries, content.headers)
+    named, told, labels = _meant(piece, entries)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
     commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
-    source = commanded.sender or Source.of_several([content.headers.get(field, field) for field in labels.values()])
+    source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
     findings = [*content.findings * is_first, *commanded.findings, *_findings(file, layout, series, labels)]
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
@@ -82,9 +82,7 @@ def _log(
     )
 
 
-def _meant(
-    piece: Piece, entries: Mapping[str, Entry], headers: Mapping[str, str]
-) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
+def _meant(piece: Piece, entries: Mapping[str, Entry]) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
     """Return the channels and the commands that `entries` say that fields are, and the fields of the commands."""
     channels: list[Channel] = []
     commands: dict[str, Series] = {}
@@ -94,7 +92,7 @@ def _meant(
             if entry := entries.get(field):
                 converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
                 if entry.quantity:
-                    source = replace(topic.source, topic=headers.get(field, field))
+                    source = replace(topic.source, topic=field)
                     channels += of_scalar(entry.quantity, source, topic.time, converted)
                 else:
                     labels[entry.name] = field

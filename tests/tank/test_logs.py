@@ -52,7 +52,7 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
         ("unread cells", 1),
     ]
     assert {finding.file for finding in log.findings} == {"log.csv"}
-    assert log.findings[-1].names == {"column": "depth"}
+    assert log.findings[-1].names == {"column": "depth [cm]"}
     depth = used(log.log, "depth")
     assert depth.time[depth.there] == pytest.approx(0.1 * np.arange(N))
     expected = 0.01 * np.arange(N)
@@ -225,7 +225,7 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
     assert commanded(log.log, "t")[[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
     for kind in ("no pulse", "beyond full thrust"):
-        assert Finding(kind, file="log.csv", names={"column": "u_t"}, numbers={"count": 2}) in log.findings
+        assert Finding(kind, file="log.csv", names={"column": "u_t [us]"}, numbers={"count": 2}) in log.findings
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------

@@ -106,12 +106,18 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
 @pytest.mark.parametrize(
     ("dive", "line"),
     [
-        ('files = ["commands.csv", "dept.csv"]', "rov.toml: dives.may.files = 'dept.csv': there is no such file"),
+        (
+            'files = ["commands.csv", "dept.csv"]',
+            "rov.toml: dives.may.files = ['commands.csv', 'dept.csv']: there is no such file in this folder: 'dept.c",
+        ),
         (
             'files = ["heading.csv", "depth.csv"]',
             "heading.csv: exactly one file of the dive must have the commands. The files with commands are: none",
         ),
-        (f'{FILES}\nother_clock = ["depht.csv"]', "rov.toml: dives.may.other_clock = 'depht.csv': must be one of"),
+        (
+            f'{FILES}\nother_clock = ["depht.csv"]',
+            "rov.toml: dives.may.other_clock = ['depht.csv']: must be of its files: 'depht.csv' is not; did you mean",
+        ),
         ('files = ["commands.csv"]', "rov.toml: dives.may.files = ['commands.csv']: must be two or more files"),
         (f"{FILES}\nclocks = 2", "rov.toml: dives.may.clocks: there is no such key"),
     ],

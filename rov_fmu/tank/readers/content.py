@@ -47,8 +47,6 @@ class Content:
     """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()
     """All headers of a table."""
-    headers: Mapping[str, str] = field(default_factory=dict)
-    """The headers of the columns of a table that are read, by their field."""
 
     def count(self, kind: str, count: int, **words: str | float) -> None:
         """Add a finding about something that was counted, if there is any."""

@@ -112,14 +112,18 @@ def read_table(
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
-    content = Content(path.name, [], names=frozenset(table.header), headers=table.headers)
+    content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, commanding)
     if unlikely:
         content.findings.append(unlikely)
     thrusters = thrusters_of(layout)
-    entries = {name: Entry(thrusters.get(name, name), None) for name in commanding}
-    return content, entries | {name: Entry(name, QUANTITIES[quantity.name]) for name, quantity in quantities.items()}
+    entries = {
+        header: Entry(thrusters.get(name, name), QUANTITIES[quantities[name].name] if name in quantities else None)
+        for name, header in table.headers.items()
+        if name in commanding or name in quantities
+    }
+    return content, entries
 
 
 # ---- Columns ---------------------------------------------------------------------------------------------------------
@@ -212,8 +216,8 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
         times = columns["time"][own]
         late += own[times < np.maximum.accumulate(times)].tolist()
         # One column after the other, because a log may be as large as the memory allows.
-        fields = {name: ascending(times, values[own])[1] for name, values in columns.items()}
-        time = fields.pop("time")
+        fields = {table.headers[name]: ascending(times, values[own])[1] for name, values in columns.items()}
+        time = fields.pop(table.headers["time"])
         content.pieces.append(Piece([Topic(Source(""), time, fields)], since=since))
         merged -= len(time)
         since += float(time[-1] - time[0])
@@ -231,10 +235,10 @@ def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> 
     content.count("torn rows", table.torn)
     for name, rows in table.unread.items():
         if name not in ("time", *commanding):
-            content.count("unread cells", len(rows), column=name)
+            content.count("unread cells", len(rows), column=table.headers[name])
     for name in (name for name in commanding if table.units[name] in PULSES):
         count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
-        content.count("no pulse", count, column=name)
+        content.count("no pulse", count, column=table.headers[name])
 
 
 def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
