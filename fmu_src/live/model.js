@@ -17,7 +17,7 @@
 /**
  * A column of commands of a recording: its name, others that need a known unit, and its kind, of which a recording has one. `gains` are
  * those of the vehicle's commands in it. `shares` are the commands that give it best.
- * @typedef {{name: string, also: string[], kind: number, gains: Record<string, number>, shares: Record<string, number>}} CommandColumn
+ * @typedef {{name: string, also: string[], kind: string, gains: Record<string, number>, shares: Record<string, number>}} CommandColumn
  */
 /**
  * The rules by which tables are read, from rov_fmu/tank/readers/tables.py: the pattern of a number; the units of times and commands, and

@@ -276,7 +276,7 @@ function columnOf(header, file, vehicle) {
 
 /** Returns the column of the command of an axis. @param {Axis[]} axes @param {number} alone The axis, or -1. @returns {CommandColumn} */
 function ofAxis(axes, alone) {
-  if (alone >= 0) return { name: "command", also: [], kind: -1, gains: {}, shares: axes[alone].signs };
+  if (alone >= 0) return { name: "command", also: [], kind: "axis", gains: {}, shares: axes[alone].signs };
   const example = `log_${axes[0].name}.csv`;
   throw new Unreadable(`the name of the file does not tell whose axis its command is: call it ${example} or the like`);
 }

@@ -12,7 +12,16 @@ import numpy as np
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import in_rows
-from rov_fmu.tank.columns import COMMAND, Entry, Names, is_of_inputs, thruster_commands, thrusters_of
+from rov_fmu.tank.columns import (
+    COMMAND,
+    INPUTS,
+    THRUSTERS,
+    Entry,
+    Names,
+    columns_of_log,
+    is_of_inputs,
+    thruster_commands,
+)
 from rov_fmu.tank.commands import LogKeys, Series, commands_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
@@ -108,7 +117,8 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
     for name, (_, values) in series.items():
         if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
             yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
-    inputs = {name: name for name in layout.commands}
-    for column, name in (inputs if is_of_inputs(layout, series) else thrusters_of(layout)).items():
-        if series and not {name, COMMAND} & series.keys():
-            yield about(file, "missing column", column=column)
+    expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
+    for title, column in columns_of_log(layout, None).items():
+        is_expected = column.commands == expected and column.entry and column.entry.name not in series
+        if is_expected and series and COMMAND not in series:
+            yield about(file, "missing column", column=title)

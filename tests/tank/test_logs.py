@@ -255,7 +255,7 @@ REFUSED = {
     "two kinds": (
         "time [s],command [%],u_t [%],depth [m]",
         "0,0,0,0",
-        "columns 'u_t [%]', 'command [%]'",
+        "columns 'command [%]', 'u_t [%]'",
     ),
     "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "this column occurs twice"),
     "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),

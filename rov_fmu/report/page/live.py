@@ -21,7 +21,7 @@ from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
-from rov_fmu.tank.columns import command_columns, thrusters_of
+from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, Entry, LogColumn, columns_of_log
 from rov_fmu.tank.readers.tables import rules_of_page
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -146,16 +146,20 @@ def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
     `gains` are those of the vehicle's commands in the command of the column. `shares` are the commands that give this
     command best, while those of the other columns of its `kind` are 0.
     """
-    thrusters = thrusters_of(layout)
-    kinds = [{name: column.also for name, column in kind.items()} for kind in command_columns(layout)]
-    kinds[0] = dict.fromkeys(layout.commands, ()) | kinds[0]  # fins have commands, too
-    for n, kind in enumerate(kinds):
-        gains = [{name: 1.0} if name in layout.commands else layout.gains[thrusters[name]] for name in kind]
-        matrix = np.array([[own.get(command, 0.0) for command in layout.commands] for own in gains])
-        shares = np.linalg.pinv(matrix, rcond=1e-9).T
-        for (name, also), own, share in zip(kind.items(), gains, shares, strict=True):
+    columns = {name: one for name, one in columns_of_log(layout, None).items() if one.commands}
+    fins = {name: LogColumn(FRACTION, Entry(name), INPUTS if layout.mix else THRUSTERS) for name in layout.commands}
+    for kind in (INPUTS, THRUSTERS):
+        own = {name: one for name, one in (fins | columns).items() if one.commands == kind}
+        gains = [
+            {name: 1.0} if name in layout.commands else layout.gains[one.entry.name]
+            for name, one in own.items()
+            if one.entry
+        ]
+        matrix = np.array([[row.get(command, 0.0) for command in layout.commands] for row in gains])
+        shares = np.linalg.pinv(matrix, rcond=1e-9).T if gains else ()
+        for (name, one), row, share in zip(own.items(), gains, shares, strict=True):
             by_command = dict(zip(layout.commands, map(float, share), strict=True))
-            yield {"name": name, "also": also, "kind": n, "gains": own, "shares": by_command}
+            yield {"name": name, "also": one.column.also, "kind": kind, "gains": row, "shares": by_command}
 
 
 def _keys(layout: Layout) -> list[str]:

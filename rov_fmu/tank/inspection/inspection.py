@@ -14,7 +14,7 @@ from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, read_colum
 from rov_fmu.io.messages import shown
 from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.columns import COMMAND, TIME, columns_of, columns_of_log, has_column, names_of
+from rov_fmu.tank.columns import COMMAND, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import kind_of_table, test_files
@@ -86,7 +86,7 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
         if not description:
             layout, columns = guessed(titles, numbers, axis, layouts)
         names, _ = names_of(layout, RovTables(columns=columns, logs=tables.logs))
-        is_column = KnownColumns(columns_of_log(layout, axis)).has
+        is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {title: ranges[title] for title in titles if not is_column(meant[title])}
         if len(unread) > len(titles) - 2 or not has_column(meant.values(), {"time": TIME}):

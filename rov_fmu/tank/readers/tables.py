@@ -6,7 +6,7 @@ that cannot be used are left out and counted.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -20,7 +20,6 @@ from rov_fmu.io.csv_table import (
     NUMBER,
     PULSES,
     SPAN,
-    Column,
     Columns,
     DataFileError,
     read_columns,
@@ -28,22 +27,24 @@ from rov_fmu.io.csv_table import (
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, QUANTITIES, TIMES
+from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, restart_rows
 from rov_fmu.tank.columns import (
+    AXIS,
     COMMAND,
     FRACTION,
+    INPUTS,
     RENAMING,
     SLIPS,
+    THRUSTERS,
     WELL_KNOWN,
     Entry,
+    LogColumn,
     Names,
     columns_of_log,
-    command_columns,
-    motion_columns,
+    known_columns,
     refuse_slips,
-    thrusters_of,
 )
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
@@ -93,12 +94,11 @@ def read_table(
 
     `open_stream` opens its lines. A part of a dive may have only commands or only motion.
     """
-    quantities = motion_columns(axis)
-    kinds = command_columns(layout, axis)
-    check = partial(_wrong_columns, path=path, layout=layout, axis=axis, kinds=kinds, is_part=is_part)
+    known = columns_of_log(layout, axis, names.keys)
+    check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
         path,
-        columns_of_log(layout, axis, names.keys),
+        known_columns(known),
         others=True,
         loose=True,
         renamed=names.columns,
@@ -106,7 +106,7 @@ def read_table(
         check_header=check,
         open_stream=open_stream,
     )
-    commanding = next(_commanding(table.values, kinds), [])
+    commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
     values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
     unlikely = _unlikely_rate(table, values["time"])
@@ -117,21 +117,10 @@ def read_table(
     _tell_cells(content, table, commanding)
     if unlikely:
         content.findings.append(unlikely)
-    thrusters = thrusters_of(layout)
-    entries = {
-        header: Entry(thrusters.get(name, name), QUANTITIES[quantities[name].name] if name in quantities else None)
-        for name, header in table.headers.items()
-        if name in commanding or name in quantities
-    }
-    return content, entries
+    return content, {header: entry for name, header in table.headers.items() if (entry := known[name].entry)}
 
 
 # ---- Columns ---------------------------------------------------------------------------------------------------------
-
-
-def _commanding(names: Collection[str], kinds: Iterable[Mapping[str, Column]]) -> Iterator[list[str]]:
-    """Yield the columns of commands among the names, those of each kind."""
-    return filter(None, ([name for name in columns if name in names] for columns in kinds))
 
 
 def _wrong_columns(
@@ -140,17 +129,14 @@ def _wrong_columns(
     path: Path,
     layout: Layout,
     axis: Axis | None,
-    kinds: Sequence[Mapping[str, Column]],
+    known: Mapping[str, LogColumn],
     is_part: bool,
 ) -> Iterator[str]:
     """Yield a line for every mistake in the columns of a log, from the headers that are read and the others."""
-    found = [*_commanding(headers, kinds)]
+    found = {known[name].commands: shown(title) for name, title in headers.items() if known[name].commands}
     if len(found) > 1:
-        titles = ", ".join(shown(headers[names[0]]) for names in found)
-        yield (
-            f"columns {titles}: a log must have the commands of the axis, of the inputs or of the thrusters, "
-            "but only one of these"
-        )
+        reason = "a log must have the commands of the axis, of the inputs or of the thrusters, but only one of these"
+        yield f"columns {', '.join(found.values())}: {reason}"
     if is_part and headers.keys() != {"time"}:
         return
     unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
@@ -160,26 +146,29 @@ def _wrong_columns(
         yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
         return
     if not found:
-        yield _no_commands(kinds, unread, others, renaming)
-    yield from _no_motion(headers, layout, axis, renaming)
+        yield _no_commands(known, unread, others, renaming)
+    yield from _no_motion(headers, layout, axis, known, renaming)
 
 
-def _no_motion(headers: Mapping[str, str], layout: Layout, axis: Axis | None, renaming: str) -> Iterator[str]:
+def _no_motion(
+    headers: Mapping[str, str], layout: Layout, axis: Axis | None, known: Mapping[str, LogColumn], renaming: str
+) -> Iterator[str]:
     """Yield the line about a log without a column of the motion along an axis, nor one of the pressure."""
     axes = [axis] if axis else [form.axis for form in layout.axes]
-    wanted = {name: quantity for name, quantity in motion_columns(axis).items() if quantity.axis in axes}
+    quantities = {name: one.entry.quantity for name, one in known.items() if one.entry and one.entry.quantity}
+    wanted = {name: quantity.unit for name, quantity in quantities.items() if quantity.axis in axes}
     if not headers.keys() & {*wanted, "pressure"}:
-        titles = " or ".join(f"'{name} [{quantity.unit}]'" for name, quantity in wanted.items())
+        titles = " or ".join(f"'{name} [{unit}]'" for name, unit in wanted.items())
         yield f"column {titles} is missing{renaming}"
 
 
 def _no_commands(
-    kinds: Sequence[Mapping[str, Column]], unread: Mapping[str, str], others: Sequence[str], renaming: str
+    known: Mapping[str, LogColumn], unread: Mapping[str, str], others: Sequence[str], renaming: str
 ) -> str:
     """Return the line about a log without a column of commands, with the headers that may be meant."""
+    kinds = [[name for name, one in known.items() if one.commands == kind] for kind in (INPUTS, THRUSTERS, AXIS)]
     wanted = " or ".join(", ".join(columns) for columns in kinds if columns)
-    known = [name for columns in kinds for name in columns]
-    near = dict.fromkeys(unread[name] for column in known for name in similar(column, unread))
+    near = dict.fromkeys(unread[name] for columns in kinds for column in columns for name in similar(column, unread))
     near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
     hint = f"; is it the column {' or '.join(near)}?" if near else ""
     hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
