@@ -290,7 +290,7 @@ def _joined(first: Log, parts: Sequence[Log]) -> Log:
         channels=tuple(replace(channel, file=log.file) for log in parts for channel in log.channels),
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
-        unread=tuple(item for log in parts for item in log.unread),
+        unread={name: what for log in parts for name, what in log.unread.items()},
     )
 
 

@@ -4,7 +4,7 @@ Nothing in a log is resampled or copied onto the times of something else. Every 
 identification, `--inspect`, the flight page and `simulate` use it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -136,8 +136,8 @@ class Log:
     """True if the log has one command, which all thrusters of its axis follow."""
     findings: tuple[Finding, ...] = ()
     """What was left out, taken or doubted."""
-    unread: tuple[tuple[str, str], ...] = ()
-    """The name and a description of everything that is not recognised."""
+    unread: Mapping[str, str] = field(default_factory=dict)
+    """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()
     """The keys that the tables [columns] and [topics] of rov.toml may have for this log."""
 

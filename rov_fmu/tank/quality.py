@@ -64,7 +64,7 @@ def sources(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
     used = {channel.quantity.name for channel in channels if not channel.unused}
     groups: dict[tuple[str, str, str], list[Channel]] = {}
     for channel in channels:
-        others = "" if channel.unused else "".join(_others(channel, channels))
+        others = "" if channel.unused else _others(channel, channels)
         if not channel.unused and (channel.source.kind or others):
             groups.setdefault(("source", str(channel.source), others), []).append(channel)
         elif channel.quantity.name not in used:
@@ -80,17 +80,15 @@ def rate(time: Array) -> float:
     return 1.0 / float(np.median(intervals)) if len(intervals) else 0.0
 
 
-def _others(channel: Channel, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield the words about the sources of the same quantity that are not used."""
-    unused = [other for other in channels if other.unused and other.quantity == channel.quantity]
-    rivals = f"{channel.source} is used"
-    told = [
+def _others(channel: Channel, channels: Sequence[Channel]) -> str:
+    """Return words about the other sources of the same quantity, which are not used, or an empty text."""
+    own, rivals = str(channel.source), f"{channel.source} is used"
+    told = dict.fromkeys(
         f"{other.source}{'' if other.unused == rivals else f' ({other.unused})'}"
-        for other in unused
-        if str(other.source) != str(channel.source)
-    ]
-    if told:
-        yield f"; also in {', '.join(first_of([*dict.fromkeys(told)], _MOST_SOURCES))}, not used"
+        for other in channels
+        if other.unused and other.quantity == channel.quantity and str(other.source) != own
+    )
+    return f"; also in {', '.join(first_of([*told], _MOST_SOURCES))}, not used" if told else ""
 
 
 # ---- Gaps, angles and jumps ------------------------------------------------------------------------------------------

@@ -86,7 +86,7 @@ def _log(
         axis,
         follows_axis=COMMAND in series,
         findings=tuple(findings),
-        unread=tuple(unread.items()),
+        unread=unread,
         names=content.names or frozenset(piece.fields),
     )
 

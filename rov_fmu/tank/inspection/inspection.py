@@ -19,7 +19,7 @@ from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import kind_of_table, test_files
 from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
-from rov_fmu.tank.log import Channel, Log
+from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.parsers import open_table
@@ -100,9 +100,12 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
 
 def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:
     """Return what a log contains; `unread` has the columns that are not recognised."""
-    channels = tuple(_channel(channel) for channel in log.channels if not channel.unused)
-    unread = {**unread, **dict(log.unread)}
-    return Inspection(path, log.file, tuple(_commands(log)), channels, unread, log.findings, columns)
+    channels = tuple(
+        _row(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
+        for channel in log.channels
+        if not channel.unused
+    )
+    return Inspection(path, log.file, tuple(_commands(log)), channels, {**unread, **log.unread}, log.findings, columns)
 
 
 def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection:
@@ -153,10 +156,6 @@ def _commands(log: Log) -> Iterator[Row]:
     rows = log.commands.rows
     for name, values in zip(log.commands.thrusters, log.commands.at(rows).T, strict=True):
         yield _row(name if log.follows_axis else f"thruster {name}", "1", rows, values)
-
-
-def _channel(channel: Channel) -> Row:
-    return _row(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
 
 
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------

@@ -41,8 +41,6 @@ class Content:
     file: str
     pieces: list[Piece]
     findings: list[Finding] = field(default_factory=list)
-    is_damaged: bool = False
-    """True if the parser says so."""
     unread: dict[str, str] = field(default_factory=dict)
     """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()

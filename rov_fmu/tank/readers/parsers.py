@@ -180,7 +180,7 @@ def read_guarded(folder: Path, path: Path, kind: Format, named: Collection[str])
         raise UnreadableFileError(
             f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
         ) from error
-    if printed.getvalue() or content.is_damaged:
+    if printed.getvalue():
         content.findings.append(about(path.name, "damaged log"))
     return content
 

@@ -14,6 +14,7 @@ import numpy as np
 from rov_fmu.tank.catalogue import is_known
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.commands import Parameters
+from rov_fmu.tank.findings import about
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers.content import Content, Piece, described
 
@@ -34,7 +35,9 @@ def read_ulog(path: Path, named: Collection[str]) -> Content:
     known = (topic for topic in topics if is_known(topic.source.kind) or topic.source.topic in named)
     read = [topic for topic in known if len(topic.time)]
     unread = described(topic for topic in topics if topic not in read)
-    content = Content(path.name, [Piece(read, _parameters(log))], is_damaged=log.file_corruption, unread=unread)
+    content = Content(path.name, [Piece(read, _parameters(log))], unread=unread)
+    if log.file_corruption:
+        content.findings.append(about(path.name, "damaged log"))
     if log.dropouts:
         longest = max(dropout.duration for dropout in log.dropouts) / 1000.0
         content.count("dropouts", len(log.dropouts), longest=longest)
