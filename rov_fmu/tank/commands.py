@@ -13,7 +13,6 @@ servo x to a motor only if MOT_PWM_TYPE is 8 (PWMRange) or 9 (PWMAngle), and use
 """
 
 import re
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -123,6 +122,11 @@ class _Outputs:
         ]
 
     @property
+    def messages(self) -> int:
+        """The number of messages of all outputs."""
+        return sum(len(time) for time, _ in self.series.values())
+
+    @property
     def activity(self) -> float:
         """How much the outputs change."""
         return sum(spread(values) for _, values in self.series.values())
@@ -147,12 +151,9 @@ def commands_of(
     candidates = [*_candidates(topics)]
     own = _named(path, "outputs", keys.outputs, candidates, lambda o: o.source.topic)
     own = _named(path, "vehicle", keys.vehicle, own, lambda o: o.source.vehicle)
-    messages = Counter[str]()
-    for outputs in own:
-        messages[outputs.source.vehicle] += sum(len(time) for time, _ in outputs.series.values())
-    if not messages:
+    if not own:
         return Commanded()
-    ((vehicle, _),) = messages.most_common(1)
+    vehicle = max(own, key=lambda outputs: outputs.messages).source.vehicle
     own = [outputs for outputs in own if outputs.source.vehicle == vehicle]
     best = _best(own, len(thrusters), parameters)
     numbers = _motors(best, len(thrusters), parameters)
@@ -259,10 +260,12 @@ def _fractions(
         findings.append(about(path.name, "unknown direction"))
     if not series or not _are_pulses(path, outputs):
         return series, findings
-    turned, without_pulse, ranges = [], 0, []
+    turned, without_pulse = [], 0
     for motor, (name, (time, values)) in enumerate(series.items(), start=1):
         low, neutral, high = _range(numbers[name], time, parameters, keys)
-        ranges.append([f"{end[-1]:g}" for end in (low, neutral, high)])
+        if motor == 1 and (low[-1], neutral[-1], high[-1]) != (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN):
+            ends = {"low": f"{low[-1]:g}", "neutral": f"{neutral[-1]:g}", "high": f"{high[-1]:g}"}
+            findings.append(about(path.name, "range of pulses", **ends))
         is_turned = parameters.at(f"MOT_{motor}_DIRECTION", time, 1.0) < 0.0
         if parameters.last("MOT_PWM_TYPE") in (None, *_BY_SERVO):
             is_turned ^= parameters.at(f"SERVO{numbers[name]}_REVERSED", time) > 0.0
@@ -273,10 +276,6 @@ def _fractions(
         series[name] = time, np.where(is_none, 0.0, (values - neutral) / span)
     if without_pulse:
         findings.append(about(path.name, "no servo pulse", count=without_pulse))
-    if ranges[0] != [f"{end:g}" for end in (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN)]:
-        findings.append(
-            about(path.name, "range of pulses", **dict(zip(("low", "neutral", "high"), ranges[0], strict=True)))
-        )
     if turned:
         findings.append(about(path.name, "reversed motors", thrusters=", ".join(turned)))
     begin = max(time[0] for time, _ in series.values())
@@ -290,7 +289,7 @@ def _changes(path: Path, parameters: Parameters, begin: float) -> Iterator[Findi
         times, told = parameters.told[name]
         for time in times[1:][np.diff(told) != 0.0] - begin:
             changed.setdefault(f"{time:.4g}", []).append(name)
-    yield from (about(path.name, "parameter changed", name=", ".join(names), at=at) for at, names in changed.items())
+    yield from (about(path.name, "parameter changed", name=listed(names), at=at) for at, names in changed.items())
 
 
 def _are_pulses(path: Path, outputs: _Outputs) -> bool:

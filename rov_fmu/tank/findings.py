@@ -136,7 +136,7 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
     ),
     "range of pulses": "{files}: full thrust is {low} and {high} us, and no thrust {neutral} us",
-    "parameter changed": "{files}: {name} changes {at} s after the first command. Each value is used in its time",
+    "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "time of arrival": (
         "{files}: {count:#message} of {topics} without a time in the header: the time of arrival is used"

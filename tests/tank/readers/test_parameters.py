@@ -76,9 +76,7 @@ def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
     )
     assert command(log)[29] == pytest.approx(0.5)
     assert command(log)[31] == pytest.approx(-0.5)
-    assert "MOT_5_DIRECTION, MOT_6_DIRECTION changes 3 s after the first command. Each value is used in its time" in (
-        told(log)
-    )
+    assert "MOT_5_DIRECTION and MOT_6_DIRECTION changed 3 s after the first command. Each value is used" in told(log)
 
 
 def test_parameters_in_a_dataflash_log(tmp_path: Path) -> None:
