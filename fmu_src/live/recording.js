@@ -261,7 +261,7 @@ function columnOf(header, file, vehicle) {
   if (command) {
     const isShort = title !== "command" && title !== folded(command.name);
     const convert = special(unit, vehicle.csv) ?? converter(header, vehicle.csv.fractions, unit, isShort);
-    return convert && { ...none, command, convert };
+    if (convert) return { ...none, command, convert };
   }
   for (const [axis, { quantities }] of axes.entries()) {
     for (const [rank, quantity] of quantities.entries()) {

@@ -15,11 +15,13 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import HEAVE, Thruster
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.model.layout import HEAVE, Axis, Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.tank.clocks import restart_rows
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.columns import Names, columns_of_log
+from rov_fmu.tank.quality import unwrapped
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -1075,6 +1077,58 @@ def test_commands_of_thrusters_are_flown_by_a_vehicle_with_mixed_inputs(
         assert ("The inputs of this vehicle give these commands only to" in page.inner_text("#live-message")) is told
         best = np.linalg.lstsq(mix, fractions.T, rcond=None)[0].T
         assert flown == pytest.approx(np.clip(best, -1.0, 1.0) @ mix.T)
+
+
+@pytest.mark.parametrize("kind", ["videoray", "everything"])
+@pytest.mark.parametrize("axis", [None, HEAVE], ids=["dive", "log of heave"])
+def test_every_column_that_identify_reads_is_read(
+    kind: str, axis: Axis | None, pages: Callable[[str], str], quiet: Visitor, tmp_path: Path
+) -> None:
+    """Each name of each column of the catalogue, in each of its units, beside a column of another kind."""
+    layout = four_axes(load_vehicle(FILES[kind])).layout
+    known = columns_of_log(layout, axis)
+    command = next(name for name, one in known.items() if one.commands)
+    logs = []
+    for name, one in known.items():
+        beside = f"{command} [%]" if not one.commands else "depth [m]"
+        for title in (name, *one.column.also):
+            for unit in (
+                *one.column.units,
+                *(f"{unit} 2000" for unit in one.column.conversions if unit[0] == "N"),
+                "us",
+            ):
+                header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if one.commands else ",voltage [V]")
+                rows = [f"{n},{n},{1000 + n}{'' if one.commands else ',12'}" for n in range(30)]
+                logs.append("\n".join([header, *rows]))
+    path = tmp_path / ("log_heave.csv" if axis else "dive.csv")
+    page = flying(quiet, pages(kind)).page
+    flown = page.evaluate(
+        """([texts, name]) => texts.map((text) => {
+            try { return readRecording(text, name, live.vehicle); } catch (error) { return error.message; }
+        })""",
+        [logs, path.name],
+    )
+    read_by_both = 0
+    for text, recording in zip(logs, flown, strict=True):
+        path.write_text(text, encoding="utf-8")
+        try:
+            (log,) = read_logs(path, layout, Names(), axis)
+        except DataFileError:
+            continue
+        axes = [form.axis for form in layout.axes]
+        used = {
+            (c.quantity.axis, not c.quantity.is_velocity): c for c in log.channels if c.quantity.axis and not c.unused
+        }
+        used = {key: channel for key, channel in used.items() if key[0] in axes}
+        if not used or not log.commands:
+            continue
+        assert isinstance(recording, dict), f"{text[:80]}: {recording}"
+        for signal in recording["signals"]:
+            channel = used[axes[signal["axis"]], signal["isPosition"]]
+            assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel)), abs=1e-6), text[:80]
+        assert {axes[signal["axis"]] for signal in recording["signals"]} == {one for one, _ in used}
+        read_by_both += 1
+    assert read_by_both > 20
 
 
 HULL = {
