@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import Field
 
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
 from rov_fmu.io.messages import listed, shown
@@ -34,7 +34,6 @@ from rov_fmu.vehicle.quantity import Finite
 
 PULSE_RANGE = 800.0, 2200.0
 """The range of pulses that speed controllers get, µs."""
-_LONGEST_PULSE = 1e4
 _MOST_MOTORS = 12
 """The largest number of motors that an autopilot drives."""
 _BY_SERVO = 8.0, 9.0
@@ -43,13 +42,7 @@ _ARDUPILOT_MOTOR, _PX4_MOTOR = 32, 100
 """The function of output x that drives motor n is n more than this."""
 
 
-def _check_pulse(value: float | None) -> float | None:
-    if value is not None and not 0.0 < value <= _LONGEST_PULSE:
-        raise ValueError(f"must be the width of a pulse in us, above 0 and at most {_LONGEST_PULSE:g}")
-    return value
-
-
-_Pulse = Annotated[Finite | None, AfterValidator(_check_pulse)]
+_Pulse = Annotated[Finite, Field(gt=0.0, le=1e4)] | None
 
 
 class LogKeys(Strict):
