@@ -141,8 +141,8 @@ class LogColumn:
 def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, LogColumn]:
     """Return the columns that a log of the axis, or of several, may have.
 
-    In a log of one axis, the name of a quantity need not tell the axis. If each input drives one thruster, its column
-    may also have the thruster's name.
+    In a log of one axis, the name of a quantity need not tell the axis. The name of a thruster alone is enough for the
+    column of its command.
     """
     command = logged_command(keys)
     columns = {"time": LogColumn(TIME)}
