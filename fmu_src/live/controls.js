@@ -375,7 +375,10 @@ class Live {
       this.span = 30;
       this.paused = false;
       this.say(
-        `${file.name}: ${shown(recording.times[recording.times.length - 1], 0)} s, flown with its commands. The ghost is what was measured.`,
+        [
+          `${file.name}: ${shown(recording.times[recording.times.length - 1], 0)} s, flown with its commands. The ghost is what was measured.`,
+          ...recording.notes,
+        ].join(" "),
       );
       this.show();
     } catch (error) {

@@ -10,16 +10,24 @@
  */
 /**
  * A quantity of rov_fmu/tank/catalogue.py: the names of its column, that in a recording of one axis, and those that need a known unit;
- * how many of each unit make one SI unit; what is subtracted then; and the largest number.
- * @typedef {{name: string, short: string, also: string[], units: Record<string, number>, offset: number, isPosition: boolean, largest: number}} Quantity
+ * how many of each unit make one SI unit; and the largest number.
+ * @typedef {{name: string, short: string, also: string[], units: Record<string, number>, isPressure: boolean, isPosition: boolean, wraps: boolean,
+ *   largest: number}} Quantity
+ */
+/**
+ * A column of commands of a recording: its name, others that need a known unit, and its kind, of which a recording has one. `gains` are
+ * those of the vehicle's commands in it. `shares` are the commands that give it best.
+ * @typedef {{name: string, also: string[], kind: string, gains: Record<string, number>, shares: Record<string, number>}} CommandColumn
  */
 /**
  * The rules by which tables are read, from rov_fmu/tank/readers/tables.py: the pattern of a number; the units of times and commands, and
  * how many of each make 1 s or full command; the pulses; other names of headers; units of commands with the largest number that shows a
- * slip and what is wrong then; the largest share of rows out of order; and what shows that a clock began anew.
+ * slip and what is wrong then; the largest share of rows out of order; what shows that a clock began anew; the samples that a preferred
+ * quantity has at least; and the pressures, in Pa, by which a barometer inside the hull and another unit are recognised.
  * @typedef {{number: string, times: Record<string, number>, fractions: Record<string, number>,
  *   pulses: {units: string[], neutral: number, span: number, none: number[]}, renamed: Record<string, string>,
- *   slips: [string[], number, string][], mostUnordered: number, leastAfter: number, again: number}} Rules
+ *   slips: [string[], number, string][], mostUnordered: number, leastAfter: number, again: number, leastSamples: number,
+ *   pressures: {atmosphere: number, gradient: number, hull: [number, number], least: number}}} Rules
  */
 /**
  * A thruster: the variable of its force, its label, its place and direction in the body frame, its strongest force in N.
@@ -32,8 +40,8 @@
 /**
  * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
  * Commands are fractions in the page; `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
- * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
- *   csv: Rules, pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
+ * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[],
+ *   columns: CommandColumn[], csv: Rules, pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
  *   tunable: string[], tests: StepTest[], size: number}} Vehicle
  */
 /**

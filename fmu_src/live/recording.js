@@ -14,8 +14,9 @@ class Unreadable extends Error {}
  * @typedef {{axis: number, isPosition: boolean, values: number[]}} Signal
  */
 /**
- * A recording: times in s, commands by row and name, signals, and the number of rows that were left out.
- * @typedef {{name: string, times: number[], commands: Record<string, number>[], signals: Signal[], left: number}} Recording
+ * A recording: times in s, commands by row and name, signals, sentences about what is not as in the file, and the number of rows that were
+ * left out.
+ * @typedef {{name: string, times: number[], commands: Record<string, number>[], signals: Signal[], notes: string[], left: number}} Recording
  */
 
 /** Reads a recording. @param {string} text @param {string} name The file's name. @param {Vehicle} vehicle @returns {Recording} */
@@ -38,21 +39,20 @@ function readRecording(text, name, vehicle) {
     return pattern.test(plain) ? Number(plain) : Number.NaN;
   };
   const columns = headers.map((header) => columnOf(header, name, vehicle));
-  const time = columns.findIndex((column) => column?.what === "time");
+  const time = columns.findIndex((column) => column?.isTime);
   if (time < 0) throw new Unreadable(`it has no column “time [s]”; ${RENAMING}`);
-  const commanding = columns.flatMap((column, n) => (column?.what === "command" ? [n] : []));
+  const commanding = columns.flatMap((column, place) => (column?.command ? [{ place, ...column.command }] : []));
   if (commanding.length === 0) {
     throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”; ${RENAMING}`);
   }
-  const measuring = columns.flatMap((column, n) => (column?.what === "signal" ? [n] : []));
   const below = lines
     .slice(1)
     .map((line) => cellsOf(line, separator))
     .filter((cells) => cells.slice(headers.length).every((cell) => cell === ""));
   for (const [units, most, mistake] of rules.slips) {
-    const own = commanding.filter((n) => units.map(folded).includes(columns[n]?.unit ?? ""));
+    const own = commanding.filter(({ place }) => units.map(folded).includes(columns[place]?.unit ?? ""));
     const largest = below.reduce((sum, cells) => {
-      const sizes = own.map((n) => Math.abs(number(cells[n] ?? "")));
+      const sizes = own.map(({ place }) => Math.abs(number(cells[place] ?? "")));
       return Math.max(sum, ...sizes.filter(Number.isFinite));
     }, 0);
     if (largest > 0 && largest <= most) throw new Unreadable(mistake);
@@ -61,7 +61,7 @@ function readRecording(text, name, vehicle) {
     .map((cells) =>
       columns.map((column, n) => (column ? inUnits(column, number(cells[n] ?? ""), cells[n]) : Number.NaN)),
     )
-    .filter((row) => Number.isFinite(row[time]) && commanding.every((n) => Number.isFinite(row[n])));
+    .filter((row) => Number.isFinite(row[time]) && commanding.every(({ place }) => Number.isFinite(row[place])));
   if (usable.length < 2) throw new Unreadable("no two of its rows have a time and a command");
   const { starts, back } = restarts(
     usable.map((row) => row[time]),
@@ -74,43 +74,102 @@ function readRecording(text, name, vehicle) {
   rows.sort((one, other) => one[time] - other[time]);
   const start = rows[0][time];
   if (rows[rows.length - 1][time] - start > 1e5) throw new Unreadable("it lasts longer than a day");
-  const signals = measuring.map((n) => {
-    const { axis, isPosition, largest, rank } = /** @type {Column} */ (columns[n]);
-    const values = rows.map((row) => row[n]);
-    if (values.some((value) => Math.abs(value) > largest)) {
-      throw new Unreadable(`“${headers[n].slice(0, 40)}” has numbers that no vehicle reaches`);
-    }
-    return {
-      axis,
-      isPosition,
-      rank,
-      values: vehicle.axes[axis].position === "psi" && isPosition ? unwrapped(values) : values,
-    };
-  });
-  const known = signals.filter(({ values }) => values.some(Number.isFinite));
-  const used = known.filter(({ axis, rank }) => !known.some((other) => other.axis === axis && other.rank < rank));
-  if (used.length === 0) {
-    throw new Unreadable(
-      `it has no motion of an axis of this vehicle, such as “${vehicle.axes[0].name} velocity [${vehicle.axes[0].unit}]”; ${RENAMING}`,
-    );
+  if (commanding.some(({ kind }) => kind !== commanding[0].kind)) {
+    throw new Unreadable("it must have the commands of inputs, of thrusters or of an axis, but only one kind of these");
   }
-  const twice = used.find(({ axis }, n) => used.findIndex((other) => other.axis === axis) < n);
-  if (twice) throw new Unreadable(`two of its columns tell the same of ${vehicle.axes[twice.axis].name}`);
-  const none = Object.fromEntries(vehicle.commands.map((command) => [command, 0]));
+  if (new Set(commanding.map((column) => column.name)).size < commanding.length) {
+    throw new Unreadable("it has a command twice");
+  }
+  const commands = rows.map((row) => given(commanding, row, vehicle));
+  const off = rows.reduce((most, row, n) => Math.max(most, difference(commanding, row, commands[n], vehicle)), 0);
+  const { used, reason } = measured(columns, rows, headers, vehicle);
+  if (used.length === 0) {
+    const example = `such as “${vehicle.axes[0].name} velocity [${vehicle.axes[0].unit}]”`;
+    throw new Unreadable(reason || `it has no motion of an axis of this vehicle, ${example}; ${RENAMING}`);
+  }
   return {
     name,
     times: rows.map((row) => row[time] - start),
-    commands: rows.map((row) => {
-      const commands = { ...none };
-      for (const n of commanding) {
-        const { drives } = /** @type {Column} */ (columns[n]);
-        for (const [command, sign] of Object.entries(drives)) commands[command] = saturated(sign * row[n]);
-      }
-      return commands;
-    }),
+    commands,
     signals: used,
+    notes: [...(reason ? [`The pressure is not used: ${reason}.`] : []), ...nearness(off)],
     left: lines.length - 1 - rows.length,
   };
+}
+
+/** @typedef {CommandColumn & {place: number}} Commanding A column of commands, and its place in a row. */
+
+/** Returns the commands of the vehicle by which a row's commands are given best. @param {Commanding[]} commanding @param {number[]} row
+ * @param {Vehicle} vehicle @returns {Record<string, number>} */
+function given(commanding, row, vehicle) {
+  const sum = (/** @type {string} */ name) =>
+    commanding.reduce((total, { shares, place }) => total + (shares[name] ?? 0) * saturated(row[place]), 0);
+  return Object.fromEntries(vehicle.commands.map((name) => [name, saturated(sum(name))]));
+}
+
+/** Returns the largest difference between the commands in a row, 0 for one that is missing, and those that the vehicle's commands give.
+ * @param {Commanding[]} commanding @param {number[]} row @param {Record<string, number>} commands @param {Vehicle} vehicle */
+function difference(commanding, row, commands, vehicle) {
+  const differences = vehicle.columns
+    .filter(({ kind }) => kind === commanding[0].kind)
+    .map(({ name, gains }) => {
+      const actual = Object.entries(gains).reduce((total, [command, gain]) => total + gain * commands[command], 0);
+      const column = commanding.find((one) => one.name === name);
+      return Math.abs(saturated(actual) - (column ? saturated(row[column.place]) : 0));
+    });
+  return Math.max(0, ...differences);
+}
+
+/** Returns the sentence about commands that those of the vehicle do not give exactly. @param {number} off The largest difference. */
+function nearness(off) {
+  return off > 0.005 ? [`The inputs of this vehicle give these commands only to ${Math.ceil(100 * off)} %.`] : [];
+}
+
+/** Returns the signals that are compared, the best one of each axis, and why a pressure is not used, if one is not.
+ * @param {(Column | null)[]} columns @param {number[][]} rows @param {string[]} headers @param {Vehicle} vehicle */
+function measured(columns, rows, headers, vehicle) {
+  let reason = "";
+  const signals = columns.flatMap((column, n) => {
+    if (!column?.quantity) return [];
+    const { axis, rank, quantity } = column;
+    const values = rows.map((row) => row[n]);
+    const known = values.filter(Number.isFinite);
+    if (known.some((value) => Math.abs(value) > quantity.largest)) {
+      throw new Unreadable(`“${headers[n].slice(0, 40)}” has numbers that no vehicle reaches`);
+    }
+    const against = quantity.isPressure ? reasonAgainst(known, vehicle.csv) : "";
+    reason ||= against;
+    if (known.length === 0 || against) return [];
+    const isWeak = known.length < vehicle.csv.leastSamples || known.every((value) => value === known[0]);
+    const depths = quantity.isPressure ? values.map((value) => depthOf(value, vehicle.csv)) : values;
+    return { axis, isPosition: quantity.isPosition, rank, isWeak, values: quantity.wraps ? unwrapped(depths) : depths };
+  });
+  const twice = signals.find((one, n) =>
+    signals.slice(0, n).some(({ axis, rank }) => axis === one.axis && rank === one.rank),
+  );
+  if (twice) throw new Unreadable(`two of its columns tell the same of ${vehicle.axes[twice.axis].name}`);
+  const used = signals.filter(
+    (one) =>
+      !signals.some((other) => other.axis === one.axis && (+other.isWeak - +one.isWeak || other.rank - one.rank) < 0),
+  );
+  return { used, reason };
+}
+
+/** Returns the depth in fresh water that a pressure tells, m. @param {number} pressure In Pa. @param {Rules} rules */
+function depthOf(pressure, { pressures: { atmosphere, gradient } }) {
+  return (pressure - atmosphere) / gradient;
+}
+
+/** Returns why no depth follows from pressures in Pa, or an empty text. It must equal `_reason_against_pressure` of
+ * rov_fmu/tank/channels.py. @param {number[]} known @param {Rules} rules */
+function reasonAgainst(known, { pressures: { atmosphere, gradient, hull, least } }) {
+  const [low, high] = known.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
+  if (known.length > 0 && high < least)
+    return "its pressures are below 1 % of an atmosphere, so their unit is another one";
+  const isOfHull = (high - low) / gradient < hull[0] && Math.abs(high / atmosphere - 1) < hull[1];
+  return isOfHull
+    ? "its pressure hardly changes and is that of the air, so the barometer seems to be inside the hull"
+    : "";
 }
 
 /** @param {string} text @param {string} mark */
@@ -133,7 +192,7 @@ function cellsOf(line, separator) {
 /** Returns a number in SI units, from the number or the text of a cell. Only times may be texts. @param {Column} column @param {number} number
  * @param {string} cell */
 function inUnits(column, number, cell) {
-  return Number.isNaN(number) && column.what === "time" ? seconds(cell ?? "") : column.convert(number);
+  return Number.isNaN(number) && column.isTime ? seconds(cell ?? "") : column.convert(number);
 }
 
 /** Returns the time since 1970 of a text by ISO 8601, s, or NaN; UTC if it names no offset. @param {string} text */
@@ -173,8 +232,9 @@ function restarts(times, rules) {
   return { starts, back };
 }
 
-/** @typedef {{what: "time" | "command" | "signal", unit: string, axis: number, isPosition: boolean, rank: number, largest: number,
- *   drives: Record<string, number>, convert: (x: number) => number}} Column */
+/** A column that is read: the time, a command, or a quantity of an axis, with its rank among those of this axis.
+ * @typedef {{unit: string, isTime: boolean, command: CommandColumn | null, quantity: Quantity | null, axis: number, rank: number,
+ *   convert: (x: number) => number}} Column */
 
 /** Returns the kind of a column by its header, or null for a column that is not used.
  * @param {string} header @param {string} file @param {Vehicle} vehicle @returns {Column | null} */
@@ -187,38 +247,38 @@ function columnOf(header, file, vehicle) {
   const parts = /^(.*?)\s*\[(.*)\]$/.exec(plain);
   if (!parts) return null;
   const [title, unit] = [parts[1].trim().toLowerCase().replace(/\s+/g, " "), folded(parts[2].trim())];
-  const none = { unit: unit.split(/\s/)[0], axis: -1, isPosition: false, rank: 0, largest: Infinity, drives: {} };
+  const none = { unit: unit.split(/\s/)[0], isTime: false, command: null, quantity: null, axis: -1, rank: 0 };
   if (title === "time") {
     const convert = converter(header, vehicle.csv.times, unit, false);
-    return convert && { ...none, what: "time", convert };
+    return convert && { ...none, isTime: true, convert };
   }
-  const { axes, commands } = vehicle;
+  const { axes } = vehicle;
   const ofFile = axes.findIndex(({ name }) => new RegExp(`^log_${name}`, "i").test(file));
   const alone = ofFile < 0 && axes.length === 1 ? 0 : ofFile;
-  const isOf = (/** @type {string} */ name) => [name, vehicle.mixed ? name : name.replace("u_", "")].includes(title);
-  const command = commands.find((name) => isOf(name.toLowerCase()));
-  if (command !== undefined || title === "command") {
-    if (command === undefined && alone < 0) {
-      const example = `log_${axes[0].name}.csv`;
-      throw new Unreadable(
-        `the name of the file does not tell whose axis its command is: call it ${example} or the like`,
-      );
-    }
-    const drives = command === undefined ? axes[alone].signs : { [command]: 1 };
-    const isShort = command !== undefined && title !== command.toLowerCase();
+  const command =
+    vehicle.columns.find(({ name, also }) => [name, ...also].some((one) => folded(one) === title)) ??
+    (title === "command" ? ofAxis(axes, alone) : null);
+  if (command) {
+    const isShort = title !== "command" && title !== folded(command.name);
     const convert = special(unit, vehicle.csv) ?? converter(header, vehicle.csv.fractions, unit, isShort);
-    return convert && { ...none, what: "command", drives, convert };
+    if (convert) return { ...none, command, convert };
   }
   for (const [axis, { quantities }] of axes.entries()) {
-    for (const [rank, { name, short, also, units, offset, isPosition, largest }] of quantities.entries()) {
-      const isFull = title === name || (axis === alone && title === short);
-      if (!isFull && !also.includes(title)) continue;
-      const convert = converter(header, units, unit, !isFull);
-      if (convert)
-        return { ...none, what: "signal", axis, isPosition, rank, largest, convert: (x) => convert(x) - offset };
+    for (const [rank, quantity] of quantities.entries()) {
+      const isFull = title === quantity.name || (axis === alone && title === quantity.short);
+      if (!isFull && !quantity.also.includes(title)) continue;
+      const convert = converter(header, quantity.units, unit, !isFull);
+      if (convert) return { ...none, quantity, axis, rank, convert };
     }
   }
   return null;
+}
+
+/** Returns the column of the command of an axis. @param {Axis[]} axes @param {number} alone The axis, or -1. @returns {CommandColumn} */
+function ofAxis(axes, alone) {
+  if (alone >= 0) return { name: "command", also: [], kind: "axis", gains: {}, shares: axes[alone].signs };
+  const example = `log_${axes[0].name}.csv`;
+  throw new Unreadable(`the name of the file does not tell whose axis its command is: call it ${example} or the like`);
 }
 
 /** Returns a unit without differences of case, and with one of the two letters mu. @param {string} unit */

@@ -299,7 +299,7 @@ def _with_voltage(rov: Rov, base: Mapping[str, float], tests: Tests) -> Rov:
     is_exact = tests.given.description.tables.priors.get("voltage") == 0.0
     for curve in rov.layout.curves:
         if len(curve.tables) < 2:
-            measured_at = requests.measured_at.get(curve.name, mean)
+            measured_at = tests.given.description.measured_at.get(curve.name, mean)
             more[coefficient_name("V_0", curve.name)] = base.get(coefficient_name("V_0", curve.name), measured_at)
             more[coefficient_name("n_V", curve.name)] = USUAL_EXPONENT if is_exact else 0.0
     powered = Rov(replace(rov.layout, voltage=round(mean, 3)), rov.coefficients)

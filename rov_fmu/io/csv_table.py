@@ -82,8 +82,8 @@ class Columns:
     """The numbers by column."""
     lines: "array[int]"
     """The line of the file on which each row is."""
-    unread: Mapping[str, int]
-    """The number of cells by column that are neither numbers nor blank. A loose reading makes them NaN."""
+    unread: Mapping[str, "array[int]"]
+    """The rows by column whose cells are neither numbers nor blank. A loose reading makes these NaN."""
     torn: int
     """The number of rows with more cells than the header. A loose reading leaves them out."""
     rows: Callable[[], Iterator[Mapping[str, str]]]
@@ -95,8 +95,8 @@ class Columns:
             yield tuple("" if isnan(value) else cells[column] for column, value in zip(columns, values, strict=True))
 
     def error(self, row: int, column: str, reason: str) -> DataFileError:
-        """Return the error about a number that is wrong."""
-        (text,) = next(islice(self.texts(column), row, None))
+        """Return the error about a cell that is wrong."""
+        text = next(islice(self.rows(), row, None))[column]
         place = f"line {self.lines[row]}, column {shown(self.headers[column])}"
         return DataFileError(f"{self.path}, {place} = {brief(text)}: {reason}")
 
@@ -156,7 +156,7 @@ def read_columns(
 
     values = {name: array("d") for name in names}
     row_lines = array("L")
-    unread = dict.fromkeys(names, 0)
+    unread = {name: array("L") for name in names}
     torn, wrong = _Mistakes(), _Mistakes()
     for line, cells in lines:
         if len(cells) > len(header):
@@ -173,7 +173,8 @@ def read_columns(
                 wrong.add(f"{path}, line {line}, column {shown(header[place])}{content}: {error}")
                 continue
             values[column.name].append(value)
-            unread[column.name] += isnan(value) and not _is_blank(cell)
+            if isnan(value) and not _is_blank(cell):
+                unread[column.name].append(len(row_lines) - 1)
     if torn.count > len(row_lines):
         wrong.add(torn.first[0])
     if wrong.count:

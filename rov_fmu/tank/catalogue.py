@@ -24,6 +24,11 @@ PRESSURES = {"Pa": 1.0, "hPa": 0.01, "mbar": 0.01, "kPa": 1e-3, "bar": 1e-5}
 """The units that a file may use, and how many of each make one SI unit."""
 ATMOSPHERE, PRESSURE_GRADIENT = 101325.0, 1000.0 * 9.80665
 """The pressure above the water, Pa, and its gradient in fresh water, Pa/m."""
+HULL = 0.02, 0.05
+"""A barometer is inside the hull if the depth that follows from it changes by less than the first number, m, and if its
+pressure differs from that of the atmosphere by less than the second share."""
+LEAST_PRESSURE = 0.01
+"""The least share of an atmosphere that a barometer under water shows; less is in another unit."""
 
 
 @dataclass(frozen=True)
@@ -226,19 +231,19 @@ def words_of(name: str) -> set[str]:
 def as_json(axis: Axis) -> list[dict[str, Any]]:
     """Return the quantities of an axis for the page that flies, those that are preferred first.
 
-    In a log of one axis, the short name is enough. `units` and `offset` make positions and velocities of the numbers.
+    In a log of one axis, the short name is enough.
     """
     quantities = [quantity for quantity in QUANTITIES.values() if quantity.axis == axis]
     quantities[1:1] = [QUANTITIES["pressure"]] if axis == HEAVE else []
-    scales = {"pressure": PRESSURE_GRADIENT}
     return [
         {
             "name": quantity.name,
             "short": "velocity" if quantity.is_velocity else axis.position if quantity.axis else quantity.name,
-            "also": list(quantity.also),
-            "units": {unit: per * scales.get(quantity.name, 1.0) for unit, per in quantity.units.items()},
-            "offset": 0.0 if quantity.axis else ATMOSPHERE / PRESSURE_GRADIENT,
+            "also": quantity.also,
+            "units": quantity.units,
+            "isPressure": not quantity.axis,
             "isPosition": not quantity.is_velocity,
+            "wraps": quantity.wraps,
             "largest": quantity.maximum,
         }
         for quantity in quantities

@@ -23,6 +23,8 @@ from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
     EULER,
+    HULL,
+    LEAST_PRESSURE,
     MESSAGES,
     NED,
     NOT_MEASURED,
@@ -36,20 +38,20 @@ from rov_fmu.tank.catalogue import (
     Quantity,
     words_of,
 )
+from rov_fmu.tank.clocks import ascending
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Source
 
 _ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Turns east, north, up into north, east, down."""
 _FLU = np.diag([1.0, -1.0, -1.0])
 """Turns forward, left, up into forward, starboard, down."""
+_LARGEST = 1e12
+"""The size of a time or of a value that no clock and no sensor shows."""
 _COMPARED, _LEAST_COMPARED = 1.0, 8
 """The time over which the changes of a position are compared with a velocity, s, and the least number of changes."""
 _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
 """A velocity contradicts the positions if the root mean square of the difference is more than the first share of the
 motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
-_HULL = 0.02, 0.05
-"""A barometer is inside the hull if the depth that follows from it changes by less than the first number, m, and if its
-pressure differs from that of the atmosphere by less than the second share."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
 """Words in the names of frames that are fixed to the earth."""
 
@@ -66,6 +68,17 @@ class Topic:
     where the sender marks them as unknown."""
     unused: str = ""
     """Why the reader says that it must not be used; empty if it may be."""
+
+    @classmethod
+    def of_messages(cls, source: Source, time: Array, fields: Mapping[str, Array]) -> "Topic":
+        """Return the topic of messages in any order. Of messages with the same time, the last number counts.
+
+        Times that no clock shows are left out, and values that no sensor shows become NaN.
+        """
+        timed = np.abs(time) < _LARGEST
+        known = (np.where(np.abs(values[timed]) < _LARGEST, values[timed], np.nan) for values in fields.values())
+        ordered, *columns = ascending(time[timed], *known)
+        return cls(source, ordered, dict(zip(fields, columns, strict=True)))
 
     def full_fields(self) -> Iterator[tuple[str, Array]]:
         """Yield the fields with the name of the topic, as rov.toml names them."""
@@ -289,13 +302,13 @@ def _reason_against_pressure(values: Array) -> str:
     if not len(known):
         return ""
     low, high = float(known.min()), float(known.max())
-    if high < 0.01 * ATMOSPHERE:
+    if high < LEAST_PRESSURE * ATMOSPHERE:
         return (
             f"its pressures of {low:.4g} ... {high:.4g} are below 1 % of an atmosphere, so they are not in Pa. Name "
             'their unit in rov.toml, such as "pressure [kPa]"'
         )
     change, from_air = (high - low) / PRESSURE_GRADIENT, abs(high / ATMOSPHERE - 1.0)
-    if change < _HULL[0] and from_air < _HULL[1]:
+    if change < HULL[0] and from_air < HULL[1]:
         return (
             f"its pressure changes by only {1000.0 * change:.2g} mm of water and is that of the air, so the barometer "
             "seems to be inside the hull"

@@ -107,24 +107,71 @@ def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
             raise DataFileError(f"{table.path}, column {titles}: {mistake}")
 
 
-# ---- Names of rov.toml -----------------------------------------------------------------------------------------------
+# ---- Columns of logs -------------------------------------------------------------------------------------------------
 
 WELL_KNOWN = {"%time": "time [ns]"}
 """The headers of programs, by what they stand for: `rostopic echo -p`."""
-_OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kind).items() if name != COMMAND}
-"""The columns of tables."""
+INPUTS, THRUSTERS, AXIS = "inputs", "thrusters", "axis"
+"""What the commands of a log are of: inputs that drive several thrusters, thrusters, or an axis."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """The meaning of a header or a field: the command of an input or a thruster, or a quantity."""
+    """The meaning of a header or a field: a command, or a quantity."""
 
     name: str
-    """The name of the column that a CSV file would have."""
-    quantity: Quantity | None
+    """The name of the quantity, the input or the thruster; `command` for that of an axis."""
+    quantity: Quantity | None = None
     """None for a command."""
     convert: Conversion | None = None
     """The conversion of the numbers; None where they have the unit of the column already."""
+
+
+@dataclass(frozen=True)
+class LogColumn:
+    """A column that a log may have."""
+
+    column: Column
+    entry: Entry | None = None
+    """The meaning; None for the time."""
+    commands: str = ""
+    """What the command is of. A log has commands of one kind. Empty for another column."""
+
+
+def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, LogColumn]:
+    """Return the columns that a log of the axis, or of several, may have.
+
+    In a log of one axis, the name of a quantity need not tell the axis. The name of a thruster alone is enough for the
+    column of its command.
+    """
+    command = logged_command(keys)
+    columns = {"time": LogColumn(TIME)}
+    if axis:
+        columns[COMMAND] = LogColumn(command, Entry(COMMAND), AXIS)
+    for name in (thruster.name for thruster in layout.thrusters):
+        title = f"thruster {name}" if layout.mix else f"u_{name}"
+        columns[title] = LogColumn(replace(command, also=(name,)), Entry(name), THRUSTERS)
+    for name in layout.commands if layout.mix else ():
+        columns[name] = LogColumn(command, Entry(name), INPUTS)
+    for name, quantity in QUANTITIES.items():
+        short = name
+        if axis and quantity.axis == axis:
+            short = "velocity" if quantity.is_velocity else axis.position
+        also = (name,) if short != name else ()
+        column = replace(quantity.column, also=(*quantity.also, *also))
+        columns.setdefault(short, LogColumn(column, Entry(name, quantity)))  # the distance along the axis comes first
+    return columns
+
+
+def known_columns(columns: Mapping[str, LogColumn]) -> dict[str, Column]:
+    """Return the columns without their meaning."""
+    return {name: one.column for name, one in columns.items()}
+
+
+# ---- Names of rov.toml -----------------------------------------------------------------------------------------------
+
+_OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kind).items() if name != COMMAND}
+"""The columns of tables."""
 
 
 @dataclass(frozen=True)
@@ -139,80 +186,45 @@ class Names:
     """What the logs do not tell."""
 
 
-def motion_columns(axis: Axis | None) -> dict[str, Quantity]:
-    """Return the quantities by the name of their column. In a log of one axis, the name need not tell the axis."""
-    found = dict(QUANTITIES)
-    for quantity in QUANTITIES.values():
-        if axis and quantity.axis == axis:
-            short = "velocity" if quantity.is_velocity else axis.position
-            also = (*quantity.also, *((quantity.name,) if short != quantity.name else ()))
-            found.pop(quantity.name)
-            found[short] = replace(quantity, also=also)
-    return found
-
-
-def command_columns(layout: Layout, axis: Axis | None = None, keys: LogKeys = NO_KEYS) -> list[dict[str, Column]]:
-    """Return the columns of commands that a log may have, of which it has one kind: those of inputs, those of thrusters
-    if inputs drive several, or that of the axis.
-
-    If each input drives one thruster, its column may also have the thruster's name.
-    """
-    command = logged_command(keys)
-    inputs = [dict.fromkeys(layout.commands, command)] if layout.mix else []
-    thrusters = {column: replace(command, also=(name,)) for column, name in thrusters_of(layout).items()}
-    return [*inputs, thrusters, *([{COMMAND: command}] if axis else [])]
-
-
-def thrusters_of(layout: Layout) -> dict[str, str]:
-    """Return the names of the thrusters by the column of their command."""
-    return {f"{'thruster ' if layout.mix else 'u_'}{t.name}": t.name for t in layout.thrusters}
-
-
-def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, Column]:
-    """Return the columns that a log of the axis, or of several, may have."""
-    columns = {"time": TIME}
-    for kind in reversed(command_columns(layout, axis, keys)):  # a header of the axis is not that of an input
-        columns |= kind
-    return columns | {name: quantity.column for name, quantity in motion_columns(axis).items()}
-
-
 def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]]:
     """Return the names of rov.toml, and a line for every value that is no column of a log, or of a table in a CSV file.
 
     Without a layout, a value that is not known may be the command of a thruster.
     """
-    known_layout, layout = layout is not None, layout or Layout((), (), ())
-    known = columns_of_log(layout, None, tables.logs)
+    of_logs = columns_of_log(layout or Layout((), (), ()), None, tables.logs)
+    known = known_columns(of_logs)
     of_csv = {**known, COMMAND: logged_command(tables.logs), **_OF_TABLES}
     del known["time"]
-    thrusters = thrusters_of(layout)
     entries, mistakes = {}, []
     for table, allowed, targets in (("columns", of_csv, tables.columns), ("topics", known, tables.topics)):
         columns = KnownColumns(allowed)
         for source, title in targets.items():
             try:
-                found = columns.find(title, others=not known_layout)
+                found = columns.find(title, others=layout is None)
             except ValueError as error:
                 mistakes.append(key_line(f"{table}.{source}", str(error), title))
                 continue
-            if found and table == "topics":
-                name = thrusters.get(found.name, found.name)
-                entries[source] = Entry(name, QUANTITIES.get(found.name), found.convert)
+            if found and table == "topics" and (entry := of_logs[found.name].entry):
+                entries[source] = replace(entry, convert=found.convert)
     return Names({**WELL_KNOWN, **tables.columns}, entries, tables.logs), mistakes
+
+
+def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:
+    """Return True for the names of inputs that drive several thrusters; False for those of thrusters or of an axis."""
+    return bool(layout.mix) and {*names} <= {*layout.commands}
 
 
 def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list[str], Array]:
     """Return the names of the thrusters, and n x thrusters commands within ±1, from n commands of inputs or thrusters.
 
-    An input or a thruster without a command has the command 0.
+    An input or a thruster without a command has the command 0. The command of an axis, and those of a vehicle whose
+    thrusters are not known, keep their names.
     """
-    count = len(next(iter(values.values())))
-    still = np.zeros(count)
-    if layout.mix and values.keys() <= {*layout.commands}:
-        mixed = {
-            t: sum((g * values.get(u, still) for u, g in gains.items()), still) for t, gains in layout.gains.items()
-        }
-    else:
-        mixed = {t.name: values.get(t.name, still) for t in layout.thrusters}
-    fractions = np.column_stack([*mixed.values()])
-    return [*mixed], np.clip(fractions, -1.0, 1.0, out=fractions)
+    named = [] if COMMAND in values else [thruster.name for thruster in layout.thrusters]
+    gains = layout.gains if is_of_inputs(layout, values) else {}
+    still = np.zeros(len(next(iter(values.values()))))
+    mixed = {
+        name: sum((gain * values.get(one, still) for one, gain in gains.get(name, {name: 1.0}).items()), still)
+        for name in named or values
+    }
+    return [*mixed], np.clip(np.column_stack([*mixed.values()]), -1.0, 1.0)

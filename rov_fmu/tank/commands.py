@@ -13,14 +13,13 @@ servo x to a motor only if MOT_PWM_TYPE is 8 (PWMRange) or 9 (PWMAngle), and use
 """
 
 import re
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import Field
 
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
 from rov_fmu.io.messages import listed, shown
@@ -29,13 +28,12 @@ from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import NOT_COMMANDED, OUTPUTS, Output, words_of
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import ascending, held
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
 from rov_fmu.vehicle.quantity import Finite
 
 PULSE_RANGE = 800.0, 2200.0
 """The range of pulses that speed controllers get, µs."""
-_LONGEST_PULSE = 1e4
 _MOST_MOTORS = 12
 """The largest number of motors that an autopilot drives."""
 _BY_SERVO = 8.0, 9.0
@@ -44,13 +42,7 @@ _ARDUPILOT_MOTOR, _PX4_MOTOR = 32, 100
 """The function of output x that drives motor n is n more than this."""
 
 
-def _check_pulse(value: float | None) -> float | None:
-    if value is not None and not 0.0 < value <= _LONGEST_PULSE:
-        raise ValueError(f"must be the width of a pulse in us, above 0 and at most {_LONGEST_PULSE:g}")
-    return value
-
-
-_Pulse = Annotated[Finite | None, AfterValidator(_check_pulse)]
+_Pulse = Annotated[Finite, Field(gt=0.0, le=1e4)] | None
 
 
 class LogKeys(Strict):
@@ -122,6 +114,16 @@ class _Outputs:
             n for n, (_, values) in self.series.items() if (np.isfinite(values) & ~np.isin(values, NO_OUTPUT)).any()
         ]
 
+    @property
+    def messages(self) -> int:
+        """The number of messages of all outputs."""
+        return sum(len(time) for time, _ in self.series.values())
+
+    @property
+    def activity(self) -> float:
+        """How much the outputs change."""
+        return sum(spread(values) for _, values in self.series.values())
+
 
 @dataclass(frozen=True, eq=False)
 class Commanded:
@@ -142,12 +144,9 @@ def commands_of(
     candidates = [*_candidates(topics)]
     own = _named(path, "outputs", keys.outputs, candidates, lambda o: o.source.topic)
     own = _named(path, "vehicle", keys.vehicle, own, lambda o: o.source.vehicle)
-    messages = Counter[str]()
-    for outputs in own:
-        messages[outputs.source.vehicle] += sum(len(time) for time, _ in outputs.series.values())
-    if not messages:
+    if not own:
         return Commanded()
-    ((vehicle, _),) = messages.most_common(1)
+    vehicle = max(own, key=lambda outputs: outputs.messages).source.vehicle
     own = [outputs for outputs in own if outputs.source.vehicle == vehicle]
     best = _best(own, len(thrusters), parameters)
     numbers = _motors(best, len(thrusters), parameters)
@@ -164,15 +163,11 @@ def commands_of(
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
     """Yield findings about the outputs and the vehicle that are used, if there are others."""
     if len(vehicles) > 1:
-        yield _finding(path, "several vehicles", vehicles=listed(vehicles), vehicle=best.source.vehicle)
+        yield about(path.name, "several vehicles", vehicles=listed(vehicles), vehicle=best.source.vehicle)
     others = [str(outputs.source) for outputs in own if outputs is not best]
     if others or best.source.topic != best.source.kind:  # a message of an autopilot without rivals explains itself
         left = f"; not used: {listed(dict.fromkeys(others))}" if others else ""
-        yield _finding(path, "source of commands", source=str(best.source), others=left)
-
-
-def _finding(path: Path, kind: str, **names: str) -> Finding:
-    return Finding(kind, file=path.name, names=names)
+        yield about(path.name, "source of commands", source=str(best.source), others=left)
 
 
 # ---- Which outputs ---------------------------------------------------------------------------------------------------
@@ -215,12 +210,7 @@ def _best(candidates: Sequence[_Outputs], thrusters: int, parameters: Parameters
     """Return the outputs of one vehicle that drive the motors: those that fit best, and change most."""
     same = [outputs for outputs in candidates if outputs.rule is candidates[0].rule]
     module = _motor_module(parameters)
-    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, _activity(o)))
-
-
-def _activity(outputs: _Outputs) -> float:
-    """Return how much the outputs change."""
-    return sum(spread(values) for _, values in outputs.series.values())
+    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, o.activity))
 
 
 def _motor_module(parameters: Parameters) -> str:
@@ -260,13 +250,15 @@ def _fractions(
     series = {name: (outputs.series[n][0], np.nan_to_num(outputs.series[n][1])) for name, n in numbers.items()}
     findings = []
     if outputs.rule.unit != "1" and "MOT_1_DIRECTION" not in parameters.told:
-        findings.append(_finding(path, "unknown direction"))
+        findings.append(about(path.name, "unknown direction"))
     if not series or not _are_pulses(path, outputs):
         return series, findings
-    turned, without_pulse, ranges = [], 0, []
+    turned, without_pulse = [], 0
     for motor, (name, (time, values)) in enumerate(series.items(), start=1):
         low, neutral, high = _range(numbers[name], time, parameters, keys)
-        ranges.append([f"{end[-1]:g}" for end in (low, neutral, high)])
+        if motor == 1 and (low[-1], neutral[-1], high[-1]) != (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN):
+            ends = {"low": f"{low[-1]:g}", "neutral": f"{neutral[-1]:g}", "high": f"{high[-1]:g}"}
+            findings.append(about(path.name, "range of pulses", **ends))
         is_turned = parameters.at(f"MOT_{motor}_DIRECTION", time, 1.0) < 0.0
         if parameters.last("MOT_PWM_TYPE") in (None, *_BY_SERVO):
             is_turned ^= parameters.at(f"SERVO{numbers[name]}_REVERSED", time) > 0.0
@@ -276,13 +268,9 @@ def _fractions(
         span = np.where(values > neutral, high - neutral, neutral - low) * np.where(is_turned, -1.0, 1.0)
         series[name] = time, np.where(is_none, 0.0, (values - neutral) / span)
     if without_pulse:
-        findings.append(Finding("no servo pulse", file=path.name, numbers={"count": without_pulse}))
-    if ranges[0] != [f"{end:g}" for end in (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN)]:
-        findings.append(
-            _finding(path, "range of pulses", **dict(zip(("low", "neutral", "high"), ranges[0], strict=True)))
-        )
+        findings.append(about(path.name, "no servo pulse", count=without_pulse))
     if turned:
-        findings.append(_finding(path, "reversed motors", thrusters=", ".join(turned)))
+        findings.append(about(path.name, "reversed motors", thrusters=", ".join(turned)))
     begin = max(time[0] for time, _ in series.values())
     return series, [*findings, *_changes(path, parameters, begin)]
 
@@ -294,7 +282,7 @@ def _changes(path: Path, parameters: Parameters, begin: float) -> Iterator[Findi
         times, told = parameters.told[name]
         for time in times[1:][np.diff(told) != 0.0] - begin:
             changed.setdefault(f"{time:.4g}", []).append(name)
-    yield from (_finding(path, "parameter changed", name=", ".join(names), at=at) for at, names in changed.items())
+    yield from (about(path.name, "parameter changed", name=listed(names), at=at) for at, names in changed.items())
 
 
 def _are_pulses(path: Path, outputs: _Outputs) -> bool:

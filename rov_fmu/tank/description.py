@@ -7,14 +7,14 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 import os
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, similar
+from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     Strict,
@@ -108,7 +108,7 @@ def _check_curve_names(value: object) -> object:
 _Curves = Annotated[Any, AfterValidator(_check_curve_names)]
 
 
-class _Fit(Strict):
+class Requests(Strict):
     """The table [fit]: what is fitted in addition to thrust, drag and β."""
 
     lag: _Curves = ()
@@ -118,20 +118,6 @@ class _Fit(Strict):
     attitude: bool = False
     """True when the vehicle is simulated at the logged roll and pitch."""
 
-
-@dataclass(frozen=True)
-class Requests:
-    """What is fitted on request."""
-
-    lag: tuple[str, ...] = ()
-    """The curves whose thrusters' lag is fitted."""
-    voltage: bool = False
-    """True when thrust depends on the logged voltage."""
-    attitude: bool = False
-    """True when the vehicle is simulated at the logged roll and pitch."""
-    measured_at: Mapping[str, float] = field(default_factory=dict)
-    """The voltage at which the thrust of a curve was measured, V, where it is given."""
-
     @property
     def quantities(self) -> dict[str, tuple[str, ...]]:
         """The quantities that every log must have, by the key of [fit] that needs them."""
@@ -139,19 +125,34 @@ class Requests:
 
     def of(self, curves: Collection[str]) -> "Requests":
         """Return the requests for some curves."""
-        return replace(self, lag=tuple(name for name in self.lag if name in curves))
+        return self.model_copy(update={"lag": tuple(name for name in self.lag if name in curves)})
+
+
+def _check_files(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+    """Check that a dive has several files, which are in the folder of rov.toml."""
+    if len({*names}) < 2:
+        raise ValueError("must be two or more files: a log of one file needs no table")
+    for name in names:
+        if Path(name).name != name or not (folder_of(info) / name).is_file():
+            raise ValueError(f"there is no such file in this folder: {shown(name)}")
+    return names
+
+
+def _check_clocks(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+    """Check that the files of another clock are files of the dive."""
+    files = info.data.get("files", names)
+    for name in names:
+        if name not in files:
+            raise ValueError(f"must be of its files: {shown(name)} is not{did_you_mean(name, files)}")
+    return names
 
 
 class Dive(Strict):
     """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
 
-    files: Annotated[
-        tuple[str, ...],
-        BeforeValidator(as_tuple),
-        _must_be("two or more files: a log of one file needs no table", lambda files: len({*files}) > 1),
-    ]
+    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_files)]
     """The files, one of which has the commands."""
-    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
+    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_clocks)] = ()
     """The files whose times come from another clock than the times of the commands."""
 
 
@@ -191,7 +192,7 @@ class RovTables(OpenHardware):
     windows: dict[str, _Window] = Field(default={})
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     validity: Validity | None = None
-    fit: _Fit = _Fit()
+    fit: Requests = Requests()
     priors: dict[str, _Deviation] = Field(default={})
     """The deviations of priors by their keys (docs/identify-method.md); 0 means that a number is exact."""
     columns: dict[str, str] = Field(default={})
@@ -237,7 +238,9 @@ class Description:
     thruster_sources: Mapping[str, Mapping[str, str]]
     """The sources of each thruster's direction and position."""
     requests: Requests
-    """What is fitted on request."""
+    """What is fitted on request, with the names of the curves."""
+    measured_at: Mapping[str, float]
+    """The voltage at which the thrust of a curve was measured, V, where it is given and thrust depends on it."""
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base_name: str
@@ -341,6 +344,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
     names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
     layout = _largest_layout(start, axis_keys, {*known_names} - names.keys())
+    curves = tuple(curve.name for curve in layout.curves)
     given = {name: quantity for name, quantity in file.quantities(layout).items() if quantity} | dict(file.known)
     return Description(
         path=path,
@@ -351,18 +355,11 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         named=tuple(dict.fromkeys([*given, *known_names])),
         base_quantities=_quantities(base) if base else {},
         thruster_sources=thruster_sources,
-        requests=_requests(file, layout, names),
+        requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
+        measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=limits,
         base_name=data.get("base", ""),
     )
-
-
-def _requests(file: RovTables, layout: Layout, voltages: Mapping[str, str]) -> Requests:
-    """Return what [fit] asks for; `voltages` has the curves by the names of their V_0."""
-    curves = tuple(curve.name for curve in layout.curves)
-    requests: dict[str, Any] = {key: curves if value is True and key == "lag" else value for key, value in file.fit}
-    measured_at = {voltages[name]: file.known[name].value for name in voltages.keys() & file.known.keys()}
-    return Requests(**requests, measured_at=measured_at)
 
 
 def _start(file: RovTables, base: Vehicle | None) -> tuple[Layout, Mapping[str, Mapping[str, str]], tuple[str, ...]]:

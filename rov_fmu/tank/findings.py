@@ -30,6 +30,13 @@ class Finding:
     """The numbers that the sentence needs. In a sentence about several files they become ranges."""
 
 
+def about(file: str, kind: str, axis: str = "", /, **words: str | float) -> Finding:
+    """Return a finding about a file, with the words and the numbers that its sentence needs."""
+    names = {name: word for name, word in words.items() if isinstance(word, str)}
+    numbers = {name: word for name, word in words.items() if not isinstance(word, str)}
+    return Finding(kind, axis, file=file, names=names, numbers=numbers)
+
+
 def sentences(findings: Iterable[Finding], forms: Mapping[str, SentenceForm]) -> tuple[str, ...]:
     """Return the sentences of the findings; similar findings share one sentence.
 
@@ -129,15 +136,18 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
     ),
     "range of pulses": "{files}: full thrust is {low} and {high} us, and no thrust {neutral} us",
-    "parameter changed": "{files}: {name} changes {at} s after the first command. Each value is used in its time",
+    "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "time of arrival": (
         "{files}: {count:#message} of {topics} without a time in the header: the time of arrival is used"
     ),
-    "other clock": ("{files}: it has another clock than the commands. The fit finds the difference, up to {most:g} s"),
+    "other clock": (
+        "{files}: it has another clock than the commands. Its times are used as they are, as if both clocks agreed. "
+        "Correct them if they do not"
+    ),
     "aligned clock": (
-        "{files}: it has another clock than the commands, and their times do not overlap. Its first "
-        "sample is moved to the first command. The fit finds the remaining difference, up to {most:g} s"
+        "{files}: it has another clock than the commands, and their times do not overlap. Its first sample is moved to "
+        "the first command, as if both had begun at once. Correct its times if they did not"
     ),
     "dropouts": "{files}: the autopilot lost data {count:#time}, for up to {longest:.3g} s",
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",

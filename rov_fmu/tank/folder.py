@@ -27,8 +27,8 @@ from rov_fmu.model.layout import AXES, Layout
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
 from rov_fmu.tank.description import ROV_FILE, Dive, Requests, RovFile, read_description
-from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.log import CLOCK_ERROR, Commands, Log
+from rov_fmu.tank.findings import Finding, about
+from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.parsers import one_parser, open_table
@@ -108,24 +108,17 @@ class Folder:
         with one_parser():
             for path in paths:
                 self.read(path)
-            for name, dive in self.rov_file.tables.dives.items():
-                self.read_dive(name, dive)
+            for dive in self.rov_file.tables.dives.values():
+                self.read_dive(dive)
         if self.mistakes or not (self.logs or self.rows):
             self.mistakes += self.unreadable
         self.logs = [checked(log) for log in self.logs]
         self.findings += [finding for log in self.logs for finding in log.findings]
 
-    def read_dive(self, name: str, dive: Dive) -> None:
+    def read_dive(self, dive: Dive) -> None:
         """Read the files of a dive together."""
         try:
-            for other in dive.other_clock:
-                if other not in dive.files:
-                    reason = f"must be one of its files{did_you_mean(other, dive.files)}"
-                    raise self._error(f"dives.{name}.other_clock", reason, other)
             paths = [self.path / part for part in dive.files]
-            for part, path in zip(dive.files, paths, strict=True):
-                if path.name != part or not path.is_file():
-                    raise self._error(f"dives.{name}.files", "there is no such file in this folder", part)
             digests = dict(zip(dive.files, map(file_hash, paths), strict=True))
             if self._is_copy(join_names(dive.files), ("dive", *sorted(digests.values()))):
                 return
@@ -136,16 +129,13 @@ class Folder:
         except FileError as error:
             self.mistakes += str(error).splitlines()
 
-    def _error(self, key: str, reason: str, value: str) -> DataFileError:
-        return DataFileError(f"{self.path / ROV_FILE}: {key_line(key, reason, value)}")
-
     def _is_copy(self, name: str, content: tuple[str, ...]) -> bool:
         """Return True, and add a finding, if an earlier file has the same content. The same data must not count
         twice."""
         if content not in self.originals:
             self.originals[content] = name
             return False
-        self.findings.append(Finding("copy", file=name, names={"original": self.originals[content]}))
+        self.findings.append(about(name, "copy", original=self.originals[content]))
         return True
 
     def _add(self, logs: Sequence[Log]) -> None:
@@ -245,7 +235,7 @@ def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = l
 def unreadable(path: Path, error: FileError) -> Finding:
     """Return the finding about a file that cannot be read, with the first reason."""
     first, *_ = str(error).splitlines()
-    return Finding("unreadable file", file=path.name, names={"reason": first.removeprefix(f"{path}: ")})
+    return about(path.name, "unreadable file", reason=first.removeprefix(f"{path}: "))
 
 
 def test_files(folder: Path) -> list[Path]:
@@ -279,8 +269,7 @@ def _read_description(folder: Path) -> RovFile:
 def _together(path: Path, logs: Sequence[Log], other_clock: Collection[str]) -> Log:
     """Return the log of a dive of several files, of which one has the commands. Raises DataFileError.
 
-    A file with another clock than the commands is one of the log's `other_clocks`. If its times do not overlap with
-    those of the commands, its first sample is moved to the first command.
+    If the times of a file do not overlap with those of the commands, its first sample is moved to the first command.
     """
     commanding = [log for log in logs if log.commands]
     if len(commanding) != 1:
@@ -301,14 +290,13 @@ def _joined(first: Log, parts: Sequence[Log]) -> Log:
         channels=tuple(replace(channel, file=log.file) for log in parts for channel in log.channels),
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
-        unread=tuple(item for log in parts for item in log.unread),
-        other_clocks=frozenset().union(*(log.other_clocks for log in parts)),
+        unread={name: what for log in parts for name, what in log.unread.items()},
     )
 
 
 def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
     """Return a file of a dive on the clock of the commands, with a finding if it has another clock."""
-    times = [channel.time[channel.there] for channel in log.channels if channel.count]
+    times = [channel.samples[0] for channel in log.channels if channel.count]
     if not times:
         return log
     start, end = min(time[0] for time in times), max(time[-1] for time in times)
@@ -320,8 +308,7 @@ def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
     return replace(
         log,
         channels=tuple(replace(channel, time=channel.time + moved) for channel in log.channels),
-        findings=(*log.findings, Finding(kind, file=log.file, numbers={"most": CLOCK_ERROR})),
-        other_clocks=frozenset([log.file]),
+        findings=(*log.findings, about(log.file, kind)),
     )
 
 

@@ -4,7 +4,7 @@ Nothing in a log is resampled or copied onto the times of something else. Every 
 identification, `--inspect`, the flight page and `simulate` use it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,8 +18,6 @@ from rov_fmu.tank.findings import Finding
 
 LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
-CLOCK_ERROR = 5.0
-"""The largest error of times that were aligned with those of another clock, s."""
 
 
 @dataclass(frozen=True, order=True)
@@ -67,6 +65,11 @@ class Channel:
     def there(self) -> Flags:
         """n: True where there is a measurement."""
         return np.isfinite(self.values)
+
+    @property
+    def samples(self) -> tuple[Array, Array]:
+        """The times and the values of the measurements that there are."""
+        return self.time[self.there], self.values[self.there]
 
     @property
     def count(self) -> int:
@@ -131,12 +134,10 @@ class Log:
     """The only axis that the log is a test of; None for a dive."""
     follows_axis: bool = False
     """True if the log has one command, which all thrusters of its axis follow."""
-    other_clocks: frozenset[str] = frozenset()
-    """The files whose times are those of another clock than that of the commands."""
     findings: tuple[Finding, ...] = ()
     """What was left out, taken or doubted."""
-    unread: tuple[tuple[str, str], ...] = ()
-    """The name and a description of everything that is not recognised."""
+    unread: Mapping[str, str] = field(default_factory=dict)
+    """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()
     """The keys that the tables [columns] and [topics] of rov.toml may have for this log."""
 

@@ -9,16 +9,15 @@ import numpy as np
 from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 
 _MOST_SOURCES = 4
 """The largest number of sources that are not used and told."""
 _LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
 """A gap is longer than this time, s, and than this many usual intervals."""
-_ROUNDING = 0.01
-_TURN = 2.0 * pi + 2.0 * _ROUNDING
-"""What rounding may add to the bounds of a wrapped angle, and the width of these bounds, rad."""
+_TURN = 2.0 * pi + 0.3
+"""The largest range of a wrapped angle, rad: noise and filters exceed a turn a little where the angle wraps."""
 _APART = 2.0
 """The time over which changes of a position are compared with a velocity, s."""
 _SAME_SCALE, _CLEAR = 0.01, 4.0
@@ -44,7 +43,7 @@ def checked(log: Log) -> Log:
     findings = [*log.findings, *frozen]
     used = [channel for channel in channels if not channel.unused]
     if any(channel.derived_from == "pressure" for channel in used):
-        findings.append(Finding("depth by pressure", file=log.file))
+        findings.append(about(log.file, "depth by pressure"))
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
     for channel in used:
         if not channel.quantity.is_velocity:
@@ -65,16 +64,14 @@ def sources(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
     used = {channel.quantity.name for channel in channels if not channel.unused}
     groups: dict[tuple[str, str, str], list[Channel]] = {}
     for channel in channels:
-        others = "" if channel.unused else "".join(_others(channel, channels))
+        others = "" if channel.unused else _others(channel, channels)
         if not channel.unused and (channel.source.kind or others):
             groups.setdefault(("source", str(channel.source), others), []).append(channel)
         elif channel.quantity.name not in used:
             groups.setdefault(("channel left out", str(channel.source), channel.unused), []).append(channel)
     for (kind, source, words), own in sorted(groups.items(), key=lambda group: group[0][0]):
         quantities = listed(dict.fromkeys(channel.quantity.name for channel in own))
-        names = {"quantities": quantities, "source": source, "words": words}
-        numbers = {"rate": rate(own[0].time[own[0].there])} if kind == "source" else {}
-        yield Finding(kind, file=file, names=names, numbers=numbers)
+        yield about(file, kind, quantities=quantities, source=source, words=words, rate=rate(own[0].samples[0]))
 
 
 def rate(time: Array) -> float:
@@ -83,17 +80,15 @@ def rate(time: Array) -> float:
     return 1.0 / float(np.median(intervals)) if len(intervals) else 0.0
 
 
-def _others(channel: Channel, channels: Sequence[Channel]) -> Iterator[str]:
-    """Yield the words about the sources of the same quantity that are not used."""
-    unused = [other for other in channels if other.unused and other.quantity == channel.quantity]
-    rivals = f"{channel.source} is used"
-    told = [
+def _others(channel: Channel, channels: Sequence[Channel]) -> str:
+    """Return words about the other sources of the same quantity, which are not used, or an empty text."""
+    own, rivals = str(channel.source), f"{channel.source} is used"
+    told = dict.fromkeys(
         f"{other.source}{'' if other.unused == rivals else f' ({other.unused})'}"
-        for other in unused
-        if str(other.source) != str(channel.source)
-    ]
-    if told:
-        yield f"; also in {', '.join(first_of([*dict.fromkeys(told)], _MOST_SOURCES))}, not used"
+        for other in channels
+        if other.unused and other.quantity == channel.quantity and str(other.source) != own
+    )
+    return f"; also in {', '.join(first_of([*told], _MOST_SOURCES))}, not used" if told else ""
 
 
 # ---- Gaps, angles and jumps ------------------------------------------------------------------------------------------
@@ -115,16 +110,14 @@ def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
 def unwrapped(channel: Channel) -> Array:
     """Return the values without jumps of a full turn, if they are angles; NaN stays NaN.
 
-    An angle is already continuous if it is not within -180° ... 180° or 0° ... 360°, or if it never jumps by more than
-    half a turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is
-    assumed.
+    An angle is already continuous if it ranges over clearly more than a turn, or if it never jumps by more than half a
+    turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is assumed.
     """
     found, there = channel.values.copy(), channel.there
     values = found[there]
     jumps = np.abs(np.diff(values)) > pi
     jumps[np.isin(channel.time[there][:-1], [start for start, _ in gaps(channel.time, found)])] = False
-    in_one_turn = any(((low <= values) & (values <= low + _TURN)).all() for low in (-pi - _ROUNDING, -_ROUNDING))
-    if channel.quantity.wraps and jumps.any() and in_one_turn:
+    if channel.quantity.wraps and jumps.any() and spread(values) < _TURN:
         found[there] = np.unwrap(values)
     return found
 
@@ -133,8 +126,8 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
     from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
 
-    axis, unit, there = channel.quantity.axis, channel.quantity.unit, channel.there
-    time, values = channel.time[there], unwrapped(channel)[there]
+    axis, unit = channel.quantity.axis, channel.quantity.unit
+    time, values = replace(channel, values=unwrapped(channel)).samples
     steps = np.diff(values)
     if unit not in ("m", "rad") or len(values) < LEAST_SAMPLES or not steps.any():
         return None
@@ -148,8 +141,9 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
         return None
     factor, shown_unit = in_degrees(unit)
     told = [f"{factor * steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in places]
-    names = {"quantity": channel.quantity.name, "jumps": ", ".join(first_of(told, MOST))}
-    return Finding("jumps", axis.name if axis else "", file=file, names=names, numbers={"count": len(places)})
+    jumps = ", ".join(first_of(told, MOST))
+    name = axis.name if axis else ""
+    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=jumps, count=len(places))
 
 
 def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> list[Finding]:
@@ -166,8 +160,8 @@ def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> 
     tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
     if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
         return []
-    time, values = position.time[position.there], unwrapped(position)[position.there]
-    at, speeds = velocity.time[velocity.there], velocity.values[velocity.there]
+    time, values = replace(position, values=unwrapped(position)).samples
+    at, speeds = velocity.samples
     ends = np.arange(max(time[0], at[0]), min(time[-1], at[-1]), _APART)
     rows = np.unique(np.searchsorted(time, ends))
     travelled = np.interp(time[rows], at, cumulative_trapezoid(speeds, at, initial=0.0))
@@ -177,8 +171,7 @@ def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> 
     (scale, _), covariance = np.polyfit(implied, actual, 1, cov=True)
     if abs(scale - 1.0) < max(_SAME_SCALE, _CLEAR * np.sqrt(covariance[0, 0])):
         return []
-    names = {"quantity": position.quantity.name}
-    return [Finding("scales differ", axis.name, file=file, names=names, numbers={"factor": float(scale)})]
+    return [about(file, "scales differ", axis.name, quantity=position.quantity.name, factor=float(scale))]
 
 
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------
@@ -199,13 +192,14 @@ def _without_frozen(file: str, channels: Sequence[Channel]) -> tuple[list[Channe
     if len({*names}) < 2:
         return [*channels], []
     kept = [replace(c, values=np.where(c.time < together.get(c, np.inf), c.values, np.nan)) for c in channels]
-    numbers = {"start": min(together.values()) - first, "end": last - first}
-    return kept, [Finding("frozen sensors", file=file, names={"sensors": listed(names)}, numbers=numbers)]
+    start = min(together.values()) - first
+    return kept, [about(file, "frozen sensors", sensors=listed(names), start=start, end=last - first)]
 
 
 def _frozen_from(channel: Channel, duration: float) -> float | None:
     """Return the time after which a sensor with visible noise keeps its last value exactly, or None."""
-    time, steps = channel.time[channel.there], np.diff(channel.values[channel.there])
+    time, values = channel.samples
+    steps = np.diff(values)
     start = int(np.max(np.flatnonzero(steps), initial=-1)) + 1
     if start < LEAST_SAMPLES or time[-1] - time[start] <= max(_LEAST_TIME, _LEAST_SHARE * duration):
         return None

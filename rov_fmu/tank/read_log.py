@@ -12,9 +12,18 @@ import numpy as np
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import in_rows
-from rov_fmu.tank.columns import COMMAND, Entry, Names, thruster_commands, thrusters_of
+from rov_fmu.tank.columns import (
+    COMMAND,
+    INPUTS,
+    THRUSTERS,
+    Entry,
+    Names,
+    columns_of_log,
+    is_of_inputs,
+    thruster_commands,
+)
 from rov_fmu.tank.commands import LogKeys, Series, commands_of
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
@@ -38,9 +47,7 @@ def read_logs(
         content, entries = read_table(path, layout, axis, names, kind.open(path), is_part=is_part)
     else:
         content = read_parsed(path, kind, {name.partition(".")[0] for name in entries})
-    content.findings += [
-        Finding("clock restarts", file=path.name, names={"at": f"{piece.since:.4g}"}) for piece in content.pieces[1:]
-    ]
+    content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
     return [_log(path, content, piece, layout, entries, names.keys, axis) for piece in content.pieces]
 
 
@@ -56,32 +63,35 @@ def _log(
     """Return the log of a piece: what `entries` say of its fields, and what is recognised besides."""
     is_first = piece is content.pieces[0]
     file = path.name if is_first else f"{path.name} (from {piece.since:.4g} s)"
-    named, told, labels = _meant(piece, entries, content.headers)
+    named, told, labels = _meant(piece, entries)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
     commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
-    source = commanded.sender or Source.of_several([content.headers.get(field, field) for field in labels.values()])
+    source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
     findings = [*content.findings * is_first, *commanded.findings, *_findings(file, layout, series, labels)]
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
     used = {channel.source.topic for channel in channels} | {source.topic}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}
+    commands = None
+    if series:
+        rows, values = in_rows(series)
+        thrusters, fractions = thruster_commands(layout, values)
+        commands = Commands.of_rows(thrusters, rows, fractions, source)
     unread = content.unread | described(topic for topic in piece.topics if topic.source.topic not in used)
     return Log(
         file,
-        _commands(layout, series, source) if series else None,
+        commands,
         tuple(channels),
         axis,
         follows_axis=COMMAND in series,
         findings=tuple(findings),
-        unread=tuple(unread.items()),
+        unread=unread,
         names=content.names or frozenset(piece.fields),
     )
 
 
-def _meant(
-    piece: Piece, entries: Mapping[str, Entry], headers: Mapping[str, str]
-) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
+def _meant(piece: Piece, entries: Mapping[str, Entry]) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
     """Return the channels and the commands that `entries` say that fields are, and the fields of the commands."""
     channels: list[Channel] = []
     commands: dict[str, Series] = {}
@@ -91,21 +101,12 @@ def _meant(
             if entry := entries.get(field):
                 converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
                 if entry.quantity:
-                    source = replace(topic.source, topic=headers.get(field, field))
+                    source = replace(topic.source, topic=field)
                     channels += of_scalar(entry.quantity, source, topic.time, converted)
                 else:
                     labels[entry.name] = field
                     commands[entry.name] = topic.time, np.nan_to_num(converted)
     return channels, commands, labels
-
-
-def _commands(layout: Layout, series: Mapping[str, Series], source: Source) -> Commands:
-    """Return the commands of thrusters, from those of an axis, of inputs or of thrusters."""
-    rows, values = in_rows(series)
-    if COMMAND in series or not layout.thrusters:
-        return Commands.of_rows([*values], rows, np.clip(np.column_stack([*values.values()]), -1.0, 1.0), source)
-    thrusters, fractions = thruster_commands(layout, values)
-    return Commands.of_rows(thrusters, rows, fractions, source)
 
 
 def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str]) -> Iterator[Finding]:
@@ -115,11 +116,9 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
     """
     for name, (_, values) in series.items():
         if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
-            names = {"column": labels.get(name, f"thruster {name}")}
-            yield Finding("beyond full thrust", file=file, names=names, numbers={"count": count})
-    columns = thrusters_of(layout)
-    if layout.mix and series.keys() <= {*layout.commands}:
-        columns = {name: name for name in layout.commands}
-    for column, name in columns.items():
-        if series and not {name, COMMAND} & series.keys():
-            yield Finding("missing column", file=file, names={"column": column})
+            yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
+    expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
+    for title, column in columns_of_log(layout, None).items():
+        is_expected = column.commands == expected and column.entry and column.entry.name not in series
+        if is_expected and series and COMMAND not in series:
+            yield about(file, "missing column", column=title)

@@ -15,11 +15,13 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import HEAVE, Thruster
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.model.layout import HEAVE, Axis, Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.tank.clocks import restart_rows
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.columns import Names, columns_of_log
+from rov_fmu.tank.quality import unwrapped
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -1049,6 +1051,116 @@ def test_the_units_and_names_are_those_that_identify_reads(page: Any, vehicle: V
     assert recording["left"] == 12
 
 
+def test_commands_of_thrusters_are_flown_by_a_vehicle_with_mixed_inputs(
+    pages: Callable[[str], str], quiet: Visitor, tmp_path: Path
+) -> None:
+    """The inputs give the commands in the first log, but not those in the second, which has one thruster alone."""
+    vehicle = four_axes(load_vehicle(FILES["everything"]))
+    layout, rng = vehicle.layout, np.random.default_rng(3)
+    mix = np.array([[layout.gains[t.name].get(name, 0.0) for name in layout.commands] for t in layout.thrusters])
+    inputs = rng.uniform(-0.3, 0.3, (30, len(layout.commands)))
+    titles = [f"thruster {t.name} [%]" if n % 2 else f"{t.name.upper()} [1]" for n, t in enumerate(layout.thrusters)]
+    page, log = flying(quiet, pages("everything")).page, tmp_path / "pool.csv"
+    for fractions, told in ((inputs @ mix.T, False), (np.eye(len(titles))[np.zeros(30, int)], True)):
+        cells = fractions * [100.0 if "%" in title else 1.0 for title in titles]
+        rows = [",".join(map(repr, [n / 10, *row, n / 100])) for n, row in enumerate(cells.tolist())]
+        log.write_text("\n".join([",".join(["time [s]", *titles, "depth [m]"]), *rows]), encoding="utf-8")
+        page.evaluate("live.flight.playback = null")
+        drop(page, log.name, log.read_bytes())
+        until(page, "live.flight.playback !== null")
+        recording = page.evaluate("live.flight.playback.recording")
+        (read,) = read_logs(log, layout, Names())
+        assert read.commands is not None
+        assert read.commands.at(read.commands.rows) == pytest.approx(fractions)
+        flown = np.array([[row[name] for name in layout.commands] for row in recording["commands"]]) @ mix.T
+        assert bool(np.abs(flown - fractions).max() > 0.1) is told
+        assert ("The inputs of this vehicle give these commands only to" in page.inner_text("#live-message")) is told
+        best = np.linalg.lstsq(mix, fractions.T, rcond=None)[0].T
+        assert flown == pytest.approx(np.clip(best, -1.0, 1.0) @ mix.T)
+
+
+@pytest.mark.parametrize("kind", ["videoray", "everything"])
+@pytest.mark.parametrize("axis", [None, HEAVE], ids=["dive", "log of heave"])
+def test_every_column_that_identify_reads_is_read(
+    kind: str, axis: Axis | None, pages: Callable[[str], str], quiet: Visitor, tmp_path: Path
+) -> None:
+    """Each name of each column of the catalogue, in each of its units, beside a column of another kind."""
+    layout = four_axes(load_vehicle(FILES[kind])).layout
+    known = columns_of_log(layout, axis)
+    command = next(name for name, one in known.items() if one.commands)
+    logs = []
+    for name, one in known.items():
+        beside = f"{command} [%]" if not one.commands else "depth [m]"
+        for title in (name, *one.column.also):
+            for unit in (
+                *one.column.units,
+                *(f"{unit} 2000" for unit in one.column.conversions if unit[0] == "N"),
+                "us",
+            ):
+                header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if one.commands else ",voltage [V]")
+                rows = [f"{n},{n},{1000 + n}{'' if one.commands else ',12'}" for n in range(30)]
+                logs.append("\n".join([header, *rows]))
+    path = tmp_path / ("log_heave.csv" if axis else "dive.csv")
+    page = flying(quiet, pages(kind)).page
+    flown = page.evaluate(
+        """([texts, name]) => texts.map((text) => {
+            try { return readRecording(text, name, live.vehicle); } catch (error) { return error.message; }
+        })""",
+        [logs, path.name],
+    )
+    read_by_both = 0
+    for text, recording in zip(logs, flown, strict=True):
+        path.write_text(text, encoding="utf-8")
+        try:
+            (log,) = read_logs(path, layout, Names(), axis)
+        except DataFileError:
+            continue
+        axes = [form.axis for form in layout.axes]
+        used = {
+            (c.quantity.axis, not c.quantity.is_velocity): c for c in log.channels if c.quantity.axis and not c.unused
+        }
+        used = {key: channel for key, channel in used.items() if key[0] in axes}
+        if not used or not log.commands:
+            continue
+        assert isinstance(recording, dict), f"{text[:80]}: {recording}"
+        for signal in recording["signals"]:
+            channel = used[axes[signal["axis"]], signal["isPosition"]]
+            assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel)), abs=1e-6), text[:80]
+        assert {axes[signal["axis"]] for signal in recording["signals"]} == {one for one, _ in used}
+        read_by_both += 1
+    assert read_by_both > 20
+
+
+HULL = {
+    "in the water": (
+        "pressure [kPa],surge velocity [m/s]",
+        lambda n: f"{101.3 + 0.1 * n},{0.01 * n}",
+        ["heave", "surge"],
+    ),
+    "in the hull": ("pressure [kPa],surge velocity [m/s]", lambda n: f"{101.3 + 0.001 * n},{0.01 * n}", ["surge"]),
+    "of another unit": ("pressure [Pa],surge velocity [m/s]", lambda n: f"{101.3 + 0.1 * n},{0.01 * n}", ["surge"]),
+    "beside a depth that froze": ("depth [m],pressure [kPa]", lambda n: f"1,{101.3 + 0.1 * n}", ["heave"]),
+}
+
+
+@pytest.mark.parametrize("name", HULL)
+def test_a_barometer_is_used_as_identify_uses_it(name: str, page: Any, vehicle: Vehicle, tmp_path: Path) -> None:
+    titles, cells, axes = HULL[name]
+    log = tmp_path / "pool.csv"
+    rows = [f"{n},{n},{cells(n)}" for n in range(40)]
+    log.write_text("\n".join([f"time [s],u_t [%],{titles}", *rows]), encoding="utf-8")
+    drop(page, log.name, log.read_bytes())
+    until(page, "live.flight.playback !== null")
+    signals = page.evaluate("live.flight.playback.recording.signals")
+    (read,) = read_logs(log, vehicle.layout, Names())
+    used = {c.quantity.axis.name: c.values for c in read.channels if c.quantity.axis and not c.unused}
+    flown = {vehicle.layout.axes[s["axis"]].axis.name: s["values"] for s in signals}
+    assert sorted(flown) == sorted(used) == axes
+    for axis, values in flown.items():
+        assert values == pytest.approx(used[axis])
+    assert ("The pressure is not used" in page.inner_text("#live-message")) is ("heave" not in axes)
+
+
 def test_a_log_of_one_axis_is_known_by_its_name(page: Any) -> None:
     rows = [f"{n / 5:g};{0 if n < 5 else 40};{0.01 * n:g}".replace(".", ",") for n in range(100)]
     drop(page, "log_heave_2.csv", "\n".join(["time [s];command [%];depth [cm]", *rows]).encode())
@@ -1092,6 +1204,7 @@ BAD = {
     "dates": (b"time [s],u_l [%],depth [m]\n2026-13-01 00:00,9,0\n1.2.2026,9,0\n", "no two of its rows"),
     "two logs": (b"time [s],u_l [%],depth [m]\n" + b"0,9,0\n1,9,0\n2,9,0\n" * 2, "its time goes back, and stays back"),
     "far": (b"time [s],u_l [%],depth [m]\n0,9,0\n1,9,1e308\n", "numbers that no vehicle reaches"),
+    "hull": (b"time [s],u_t [%],pressure [Pa]\n0,9,101000\n1,9,101002\n", "the barometer seems to be inside the hull"),
     "twice": (b"time [s],u_l [%],depth [m],z [m]\n0,9,0,0\n1,9,1,1\n", "two of its columns tell the same of heave"),
     "long": (b"time [s],u_l [%],depth [m]\n0,9,0\n1e9,9,0\n", "longer than a day"),
 }

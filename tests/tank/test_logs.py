@@ -52,7 +52,7 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
         ("unread cells", 1),
     ]
     assert {finding.file for finding in log.findings} == {"log.csv"}
-    assert log.findings[-1].names == {"column": "depth"}
+    assert log.findings[-1].names == {"column": "depth [cm]"}
     depth = used(log.log, "depth")
     assert depth.time[depth.there] == pytest.approx(0.1 * np.arange(N))
     expected = 0.01 * np.arange(N)
@@ -118,7 +118,14 @@ def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
     ("rows", "told"),
     [
         ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
-        ([f"12.5.2026,30,{n}" for n in range(N)], r"both a time and a command: '12.5.2026' is no time in time \[s\]"),
+        (
+            [f"12.5.2026,30,{n}" for n in range(N)],
+            r"line 2, column 'time \[s\]' = 12.5.2026: is no time, and no row",
+        ),
+        (
+            ["0,,1", "1,none,1"],
+            r"line 3, column 'command \[%\]' = none: is no number, and no row has both a time and",
+        ),
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
         ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
     ],
@@ -218,7 +225,7 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
     assert commanded(log.log, "t")[[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
     for kind in ("no pulse", "beyond full thrust"):
-        assert Finding(kind, file="log.csv", names={"column": "u_t"}, numbers={"count": 2}) in log.findings
+        assert Finding(kind, file="log.csv", names={"column": "u_t [us]"}, numbers={"count": 2}) in log.findings
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------
@@ -248,7 +255,7 @@ REFUSED = {
     "two kinds": (
         "time [s],command [%],u_t [%],depth [m]",
         "0,0,0,0",
-        "columns 'u_t [%]', 'command [%]'",
+        "columns 'command [%]', 'u_t [%]'",
     ),
     "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "this column occurs twice"),
     "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),

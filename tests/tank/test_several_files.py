@@ -58,7 +58,7 @@ def mistakes(folder: Path) -> list[str]:
 
 def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
     _, log = read(folder)
-    assert not log.other_clocks
+    assert not [finding for finding in log.findings if "clock" in finding.kind]
     files = {"depth": "depth.csv", "heading": "heading.csv", "voltage": "depth.csv"}
     assert {quantity: used(log, quantity).file for quantity in files} == files
     expected = {"depth": (50, 1.0, 0.1), "heading": (40, 2.0, 0.3), "voltage": (50, 16.0, -1.0)}
@@ -90,28 +90,34 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
         other = f'{ROV}[dives.may]\n{FILES}\nother_clock = ["heading.csv"]\n'
         (folder / "rov.toml").write_text(other, encoding="utf-8")
     findings, log = read(folder)
-    assert log.other_clocks == {"heading.csv"}
     late = 2.0 if declared else 0.0
     since = used(log, "heading").time - 1000.0 - late
     assert measured(log, "heading") == pytest.approx(2.0 + 0.3 * since, abs=1e-5)
     (line,) = (line for line in sentences(findings, SENTENCES) if "clock" in line)
     assert line == (
-        "heading.csv: it has another clock than the commands. The fit finds the difference, up to 5 s"
+        "heading.csv: it has another clock than the commands. Its times are used as they are, as if both clocks "
+        "agreed. Correct them if they do not"
         if declared
         else "heading.csv: it has another clock than the commands, and their times do not overlap. Its first sample is "
-        "moved to the first command. The fit finds the remaining difference, up to 5 s"
+        "moved to the first command, as if both had begun at once. Correct its times if they did not"
     )
 
 
 @pytest.mark.parametrize(
     ("dive", "line"),
     [
-        ('files = ["commands.csv", "dept.csv"]', "rov.toml: dives.may.files = 'dept.csv': there is no such file"),
+        (
+            'files = ["commands.csv", "dept.csv"]',
+            "rov.toml: dives.may.files = ['commands.csv', 'dept.csv']: there is no such file in this folder: 'dept.c",
+        ),
         (
             'files = ["heading.csv", "depth.csv"]',
             "heading.csv: exactly one file of the dive must have the commands. The files with commands are: none",
         ),
-        (f'{FILES}\nother_clock = ["depht.csv"]', "rov.toml: dives.may.other_clock = 'depht.csv': must be one of"),
+        (
+            f'{FILES}\nother_clock = ["depht.csv"]',
+            "rov.toml: dives.may.other_clock = ['depht.csv']: must be of its files: 'depht.csv' is not; did you mean",
+        ),
         ('files = ["commands.csv"]', "rov.toml: dives.may.files = ['commands.csv']: must be two or more files"),
         (f"{FILES}\nclocks = 2", "rov.toml: dives.may.clocks: there is no such key"),
     ],

@@ -38,6 +38,16 @@ def test_a_wrapped_heading_is_unwrapped_and_keeps_its_blanks() -> None:
     np.testing.assert_allclose(unwrapped(channel("heading", STEPS, values % (2.0 * pi))), found)
 
 
+def test_noise_beyond_the_end_of_the_range_is_no_second_turn() -> None:
+    heading = 5.8 + 0.7 * STEPS
+    values = heading % (2.0 * pi)
+    values[np.abs(values - pi) > 3.0] += np.radians(2.0) * np.sign(values - pi)[np.abs(values - pi) > 3.0]
+    assert values.min() < 0.0
+    assert values.max() > 2.0 * pi
+    found = unwrapped(channel("heading", STEPS, values))
+    assert found == pytest.approx(heading, abs=np.radians(2.1))
+
+
 @pytest.mark.parametrize("turns", [0.05, 3.0], ids=["within a turn", "several turns"])
 def test_a_continuous_heading_stays_as_it_is_over_a_gap(turns: float) -> None:
     """The vehicle turns by more than half a turn in the gap, which looks like a jump."""

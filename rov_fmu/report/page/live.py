@@ -21,6 +21,7 @@ from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
+from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, Entry, LogColumn, columns_of_log
 from rov_fmu.tank.readers.tables import rules_of_page
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -126,7 +127,7 @@ def _data(flown: Flown) -> dict[str, Any]:
         "inputs": len(layout.inputs),
         "states": len(layout.state),
         "commands": list(layout.commands),
-        "mixed": bool(layout.mix),
+        "columns": list(_columns(layout)),
         "csv": rules_of_page(),
         "axes": [_axis(rov, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
         "thrusters": [
@@ -137,6 +138,28 @@ def _data(flown: Flown) -> dict[str, Any]:
         "tests": list(_tests(vehicle)),
         "size": size_of(rov),
     }
+
+
+def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
+    """Yield the columns of commands that a recording may have.
+
+    `gains` are those of the vehicle's commands in the command of the column. `shares` are the commands that give this
+    command best, while those of the other columns of its `kind` are 0.
+    """
+    columns = {name: one for name, one in columns_of_log(layout, None).items() if one.commands}
+    fins = {name: LogColumn(FRACTION, Entry(name), INPUTS if layout.mix else THRUSTERS) for name in layout.commands}
+    for kind in (INPUTS, THRUSTERS):
+        own = {name: one for name, one in (fins | columns).items() if one.commands == kind}
+        gains = [
+            {name: 1.0} if name in layout.commands else layout.gains[one.entry.name]
+            for name, one in own.items()
+            if one.entry
+        ]
+        matrix = np.array([[row.get(command, 0.0) for command in layout.commands] for row in gains])
+        shares = np.linalg.pinv(matrix, rcond=1e-9).T if gains else ()
+        for (name, one), row, share in zip(own.items(), gains, shares, strict=True):
+            by_command = dict(zip(layout.commands, map(float, share), strict=True))
+            yield {"name": name, "also": one.column.also, "kind": kind, "gains": row, "shares": by_command}
 
 
 def _keys(layout: Layout) -> list[str]:

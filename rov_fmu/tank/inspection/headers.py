@@ -14,7 +14,7 @@ from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, Know
 from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import COMMANDS, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES
-from rov_fmu.tank.columns import columns_of, columns_of_log
+from rov_fmu.tank.columns import columns_of, columns_of_log, known_columns
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
 
@@ -87,7 +87,7 @@ def guessed(
     names = _names(commanding)
     layout = fitting(names, layouts) or layout_of(names)
     known = [thruster.name for thruster in layout.thrusters]
-    is_column = KnownColumns(columns_of_log(layout, axis)).has
+    is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
     columns: dict[str, str] = {}
     if not all(map(is_column, commanding)):
         for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):

@@ -14,12 +14,12 @@ from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, read_colum
 from rov_fmu.io.messages import shown
 from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.columns import COMMAND, TIME, columns_of, columns_of_log, has_column, names_of
+from rov_fmu.tank.columns import COMMAND, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import kind_of_table, test_files
 from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
-from rov_fmu.tank.log import Channel, Log
+from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.parsers import open_table
@@ -86,7 +86,7 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
         if not description:
             layout, columns = guessed(titles, numbers, axis, layouts)
         names, _ = names_of(layout, RovTables(columns=columns, logs=tables.logs))
-        is_column = KnownColumns(columns_of_log(layout, axis)).has
+        is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {title: ranges[title] for title in titles if not is_column(meant[title])}
         if len(unread) > len(titles) - 2 or not has_column(meant.values(), {"time": TIME}):
@@ -100,9 +100,12 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
 
 def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:
     """Return what a log contains; `unread` has the columns that are not recognised."""
-    channels = tuple(_channel(channel) for channel in log.channels if not channel.unused)
-    unread = {**unread, **dict(log.unread)}
-    return Inspection(path, log.file, tuple(_commands(log)), channels, unread, log.findings, columns)
+    channels = tuple(
+        _row(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
+        for channel in log.channels
+        if not channel.unused
+    )
+    return Inspection(path, log.file, tuple(_commands(log)), channels, {**unread, **log.unread}, log.findings, columns)
 
 
 def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection:
@@ -120,8 +123,9 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
         return Inspection(path, path.name, (), (), ranges, (), columns)
     rows, _ = read_rows(path, kind, axis, columns)
     numbers = zip(*((row.command, row.value) for row in rows), strict=True)
+    no_times = np.full(len(rows), nan)
     channels = (
-        Row(name, next(iter(column.units)) if name != COMMAND else "1", nan, nan, len(own), nan, min(own), max(own), ())
+        _row(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
         for (name, column), own in zip(of_table.items(), numbers, strict=True)
     )
     return Inspection(path, path.name, (), tuple(channels), unread, (), columns)
@@ -154,10 +158,6 @@ def _commands(log: Log) -> Iterator[Row]:
         yield _row(name if log.follows_axis else f"thruster {name}", "1", rows, values)
 
 
-def _channel(channel: Channel) -> Row:
-    return _row(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
-
-
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------
 
 
@@ -177,5 +177,5 @@ def _numbers(
     for title, place in places.items():
         values = np.frombuffer(table.values[place])
         numbers[title] = found = values[np.isfinite(values)]
-        ranges[title] = "text" if table.unread[place] > len(found) else range_in_words(found)
+        ranges[title] = "text" if len(table.unread[place]) > len(found) else range_in_words(found)
     return numbers, ranges

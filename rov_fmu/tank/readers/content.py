@@ -9,9 +9,9 @@ import numpy as np
 
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import ascending, restarts, usual_delay
+from rov_fmu.tank.clocks import restarts, usual_delay
 from rov_fmu.tank.commands import Parameters
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
 
 Messages = dict[Source, list[tuple[float, float, Mapping[str, float]]]]
@@ -41,19 +41,15 @@ class Content:
     file: str
     pieces: list[Piece]
     findings: list[Finding] = field(default_factory=list)
-    is_damaged: bool = False
-    """True if the parser says so."""
     unread: dict[str, str] = field(default_factory=dict)
     """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()
     """All headers of a table."""
-    headers: Mapping[str, str] = field(default_factory=dict)
-    """The headers of the columns of a table that are read, by their field."""
 
-    def count(self, kind: str, count: int, **names: str) -> None:
+    def count(self, kind: str, count: int, **words: str | float) -> None:
         """Add a finding about something that was counted, if there is any."""
         if count:
-            self.findings.append(Finding(kind, file=self.file, names=names, numbers={"count": count}))
+            self.findings.append(about(self.file, kind, count=count, **words))
 
 
 def content_of(
@@ -81,6 +77,7 @@ def content_of(
                 numbers = [messages[source][row][2] for row in np.flatnonzero(there)]
                 topics.append(topic_of(source, np.where(np.isnan(stamp), arrival - delay, stamp), numbers))
                 late[source.topic] += len(stamp) if np.isnan(stamp).any() else 0
+        topics = [topic for topic in topics if len(topic.time)]
         content.pieces.append(Piece(topics, Parameters.of_pairs(parameters, delay), first - begin))
     content.count("time of arrival", late.total(), topics=", ".join(+late))
     content.count("damaged pieces", damaged)
@@ -90,8 +87,7 @@ def content_of(
 def topic_of(source: Source, time: Array, numbers: Sequence[Mapping[str, float]]) -> Topic:
     """Return the topic of messages with these times, s, and numbers."""
     keys = dict.fromkeys(key for row in numbers for key in row)
-    ordered, *columns = ascending(time, *(np.array([row.get(key, np.nan) for row in numbers]) for key in keys))
-    return Topic(source, ordered, dict(zip(keys, columns, strict=True)))
+    return Topic.of_messages(source, time, {key: np.array([row.get(key, np.nan) for row in numbers]) for key in keys})
 
 
 def described(topics: Iterable[Topic], messages: Mapping[str, int] = MappingProxyType({})) -> dict[str, str]:

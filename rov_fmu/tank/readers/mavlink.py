@@ -17,7 +17,7 @@ import numpy as np
 from rov_fmu.tank.arrays import Flags
 from rov_fmu.tank.catalogue import is_known
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import ascending, held
+from rov_fmu.tank.clocks import held
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers.content import Content, Messages, content_of
 
@@ -190,8 +190,7 @@ def _primary(state: Topic, cores: Mapping[str, Topic]) -> Iterator[Topic]:
     words, first = " and ".join(used), cores[used[0]]
     valid = [_while_valid(topic, state, primary == float(core), topic.fields) for core, topic in cores.items()]
     columns = {name: np.concatenate([topic.fields[name] for topic in valid]) for name in first.fields}
-    time, *ordered = ascending(np.concatenate([topic.time for topic in valid]), *columns.values())
     source = replace(first.source, part=f"core {words}, the primary one")
-    yield Topic(source, time, dict(zip(columns, ordered, strict=True)))
+    yield Topic.of_messages(source, np.concatenate([topic.time for topic in valid]), columns)
     others = (topic for core, topic in cores.items() if [core] != used)
     yield from (replace(topic, unused=f"the autopilot used core {words}") for topic in others)

@@ -23,17 +23,12 @@ from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitE
 from rov_fmu.io.csv_table import LARGEST, DataFileError, UnreadableFileError
 from rov_fmu.io.messages import NO_FILE, brief, listed
 from rov_fmu.io.reading import read_lines
-from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import ascending
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import read_bag, read_mcap
 from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_telemetry
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.tank.readers.ulog import read_ulog
-
-_LARGEST = 1e12
-"""The size of a time or of a value that no clock and no sensor shows."""
 
 
 @dataclass(frozen=True)
@@ -177,8 +172,6 @@ def read_guarded(folder: Path, path: Path, kind: Format, named: Collection[str])
         ):
             warnings.simplefilter("ignore")
             content = _read(folder / path, kind, named)
-            for piece in content.pieces:
-                piece.topics = [*filter(None, map(_usable, piece.topics))]
     except ImportError:
         raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
     except Exception as error:  # a parser may raise anything on damaged bytes, and return anything
@@ -187,8 +180,8 @@ def read_guarded(folder: Path, path: Path, kind: Format, named: Collection[str])
         raise UnreadableFileError(
             f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
         ) from error
-    if printed.getvalue() or content.is_damaged:
-        content.findings.append(Finding("damaged log", file=path.name))
+    if printed.getvalue():
+        content.findings.append(about(path.name, "damaged log"))
     return content
 
 
@@ -206,14 +199,3 @@ def _read(path: Path, kind: Format, named: Collection[str]) -> Content:
         content = kind.read(link, named)
     findings = [replace(finding, file=path.name) for finding in content.findings]
     return replace(content, file=path.name, findings=findings)
-
-
-def _usable(topic: Topic) -> Topic | None:
-    """Return a topic without times that no clock shows or that repeat, and with NaN for values that no sensor shows;
-    None if no time is left."""
-    timed = np.abs(topic.time) < _LARGEST
-    if not timed.any():
-        return None
-    time, *columns = ascending(topic.time[timed], *(values[timed] for values in topic.fields.values()))
-    known = (np.where(np.abs(values) < _LARGEST, values, np.nan) for values in columns)
-    return replace(topic, time=time, fields=dict(zip(topic.fields, known, strict=True)))

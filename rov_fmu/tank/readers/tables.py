@@ -6,7 +6,7 @@ that cannot be used are left out and counted.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -20,7 +20,6 @@ from rov_fmu.io.csv_table import (
     NUMBER,
     PULSES,
     SPAN,
-    Column,
     Columns,
     DataFileError,
     read_columns,
@@ -28,25 +27,27 @@ from rov_fmu.io.csv_table import (
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import QUANTITIES, TIMES
+from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, restart_rows
 from rov_fmu.tank.columns import (
+    AXIS,
     COMMAND,
     FRACTION,
+    INPUTS,
     RENAMING,
     SLIPS,
+    THRUSTERS,
     WELL_KNOWN,
     Entry,
+    LogColumn,
     Names,
     columns_of_log,
-    command_columns,
-    motion_columns,
+    known_columns,
     refuse_slips,
-    thrusters_of,
 )
-from rov_fmu.tank.findings import SENTENCES, Finding, refusals
-from rov_fmu.tank.log import Source
+from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
+from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 
 _MOST_UNORDERED = 0.2
@@ -70,6 +71,13 @@ def rules_of_page() -> dict[str, Any]:
         "mostUnordered": _MOST_UNORDERED,
         "leastAfter": LEAST_AFTER,
         "again": AGAIN,
+        "leastSamples": LEAST_SAMPLES,
+        "pressures": {
+            "atmosphere": ATMOSPHERE,
+            "gradient": PRESSURE_GRADIENT,
+            "hull": HULL,
+            "least": LEAST_PRESSURE * ATMOSPHERE,
+        },
     }
 
 
@@ -86,12 +94,11 @@ def read_table(
 
     `open_stream` opens its lines. A part of a dive may have only commands or only motion.
     """
-    quantities = motion_columns(axis)
-    kinds = command_columns(layout, axis)
-    check = partial(_wrong_columns, path=path, layout=layout, axis=axis, kinds=kinds, is_part=is_part)
+    known = columns_of_log(layout, axis, names.keys)
+    check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
         path,
-        columns_of_log(layout, axis, names.keys),
+        known_columns(known),
         others=True,
         loose=True,
         renamed=names.columns,
@@ -99,28 +106,21 @@ def read_table(
         check_header=check,
         open_stream=open_stream,
     )
-    commanding = next(_commanding(table.values, kinds), [])
+    commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
     values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
-    content = Content(path.name, [], names=frozenset(table.header), headers=table.headers)
+    content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, commanding)
     if unlikely:
         content.findings.append(unlikely)
-    thrusters = thrusters_of(layout)
-    entries = {name: Entry(thrusters.get(name, name), None) for name in commanding}
-    return content, entries | {name: Entry(name, QUANTITIES[quantity.name]) for name, quantity in quantities.items()}
+    return content, {header: entry for name, header in table.headers.items() if (entry := known[name].entry)}
 
 
 # ---- Columns ---------------------------------------------------------------------------------------------------------
-
-
-def _commanding(names: Collection[str], kinds: Iterable[Mapping[str, Column]]) -> Iterator[list[str]]:
-    """Yield the columns of commands among the names, those of each kind."""
-    return filter(None, ([name for name in columns if name in names] for columns in kinds))
 
 
 def _wrong_columns(
@@ -129,17 +129,14 @@ def _wrong_columns(
     path: Path,
     layout: Layout,
     axis: Axis | None,
-    kinds: Sequence[Mapping[str, Column]],
+    known: Mapping[str, LogColumn],
     is_part: bool,
 ) -> Iterator[str]:
     """Yield a line for every mistake in the columns of a log, from the headers that are read and the others."""
-    found = [*_commanding(headers, kinds)]
+    found = {known[name].commands: shown(title) for name, title in headers.items() if known[name].commands}
     if len(found) > 1:
-        titles = ", ".join(shown(headers[names[0]]) for names in found)
-        yield (
-            f"columns {titles}: a log must have the commands of the axis, of the inputs or of the thrusters, "
-            "but only one of these"
-        )
+        reason = "a log must have the commands of the axis, of the inputs or of the thrusters, but only one of these"
+        yield f"columns {', '.join(found.values())}: {reason}"
     if is_part and headers.keys() != {"time"}:
         return
     unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
@@ -149,26 +146,29 @@ def _wrong_columns(
         yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
         return
     if not found:
-        yield _no_commands(kinds, unread, others, renaming)
-    yield from _no_motion(headers, layout, axis, renaming)
+        yield _no_commands(known, unread, others, renaming)
+    yield from _no_motion(headers, layout, axis, known, renaming)
 
 
-def _no_motion(headers: Mapping[str, str], layout: Layout, axis: Axis | None, renaming: str) -> Iterator[str]:
+def _no_motion(
+    headers: Mapping[str, str], layout: Layout, axis: Axis | None, known: Mapping[str, LogColumn], renaming: str
+) -> Iterator[str]:
     """Yield the line about a log without a column of the motion along an axis, nor one of the pressure."""
     axes = [axis] if axis else [form.axis for form in layout.axes]
-    wanted = {name: quantity for name, quantity in motion_columns(axis).items() if quantity.axis in axes}
+    quantities = {name: one.entry.quantity for name, one in known.items() if one.entry and one.entry.quantity}
+    wanted = {name: quantity.unit for name, quantity in quantities.items() if quantity.axis in axes}
     if not headers.keys() & {*wanted, "pressure"}:
-        titles = " or ".join(f"'{name} [{quantity.unit}]'" for name, quantity in wanted.items())
+        titles = " or ".join(f"'{name} [{unit}]'" for name, unit in wanted.items())
         yield f"column {titles} is missing{renaming}"
 
 
 def _no_commands(
-    kinds: Sequence[Mapping[str, Column]], unread: Mapping[str, str], others: Sequence[str], renaming: str
+    known: Mapping[str, LogColumn], unread: Mapping[str, str], others: Sequence[str], renaming: str
 ) -> str:
     """Return the line about a log without a column of commands, with the headers that may be meant."""
+    kinds = [[name for name, one in known.items() if one.commands == kind] for kind in (INPUTS, THRUSTERS, AXIS)]
     wanted = " or ".join(", ".join(columns) for columns in kinds if columns)
-    known = [name for columns in kinds for name in columns]
-    near = dict.fromkeys(unread[name] for column in known for name in similar(column, unread))
+    near = dict.fromkeys(unread[name] for columns in kinds for column in columns for name in similar(column, unread))
     near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
     hint = f"; is it the column {' or '.join(near)}?" if near else ""
     hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
@@ -194,18 +194,19 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
     timed = np.isfinite(columns["time"])
     rows = np.flatnonzero(np.all([np.isfinite(columns[name]) for name in ("time", *commanding)], axis=0))
     if not rows.size:
-        unread = (text["time"] for text in table.rows()) if table.unread["time"] else ()
-        quoted = next((f": {shown(text)} is no time in {table.headers['time']}" for text in unread if text), "")
         what = "both a time and a command" if commanding else "a time"
-        raise DataFileError(f"{table.path}: no row has {what}{quoted}")
+        for name in (name for name in ("time", *commanding) if table.unread[name]):
+            reason = f"is no {'time' if name == 'time' else 'number'}, and no row has {what}"
+            raise table.error(table.unread[name][0], name, reason)
+        raise DataFileError(f"{table.path}: no row has {what}")
     late: list[int] = []
     merged, since = rows.size, 0.0
     for own in np.split(rows, restart_rows(columns["time"][rows])):
         times = columns["time"][own]
         late += own[times < np.maximum.accumulate(times)].tolist()
         # One column after the other, because a log may be as large as the memory allows.
-        fields = {name: ascending(times, values[own])[1] for name, values in columns.items()}
-        time = fields.pop("time")
+        fields = {table.headers[name]: ascending(times, values[own])[1] for name, values in columns.items()}
+        time = fields.pop(table.headers["time"])
         content.pieces.append(Piece([Topic(Source(""), time, fields)], since=since))
         merged -= len(time)
         since += float(time[-1] - time[0])
@@ -221,12 +222,12 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
 def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> None:
     """Add what the cells tell: too many in a row, no numbers, and no pulses."""
     content.count("torn rows", table.torn)
-    for name, count in table.unread.items():
+    for name, rows in table.unread.items():
         if name not in ("time", *commanding):
-            content.count("unread cells", count, column=name)
+            content.count("unread cells", len(rows), column=table.headers[name])
     for name in (name for name in commanding if table.units[name] in PULSES):
         count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
-        content.count("no pulse", count, column=name)
+        content.count("no pulse", count, column=table.headers[name])
 
 
 def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
@@ -235,8 +236,7 @@ def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
     usual = float(np.median(intervals)) if len(intervals) else 0.0
     if usual <= 1.0 / _SLOW and (usual == 0.0 or usual >= _SHORTEST):
         return None
-    names = {"column": table.headers["time"], "rate": f"{1.0 / usual:.3g}"}
-    return Finding("unlikely rate", file=table.path.name, names=names)
+    return about(table.path.name, "unlikely rate", column=table.headers["time"], rate=f"{1.0 / usual:.3g}")
 
 
 # ---- Variables of MATLAB ---------------------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ def open_matlab(path: Path) -> Callable[[], TextIO]:
     from scipy.io import loadmat
 
     try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
+        content = loadmat(path, simplify_cells=True)
     except NotImplementedError:
         reason = "is a .mat file of version 7.3 (HDF5), which SciPy does not read: save it with -v7"
         raise DataFileError(f"{path}: {reason}") from None
@@ -278,8 +278,7 @@ def _vectors(place: str, value: Any) -> Iterator[tuple[str, Array]]:
         elif value.ndim == 2 and value.size:
             columns = value.T if value.shape[0] >= value.shape[1] else value
             yield from ((f"{place}({n})", column.astype(float)) for n, column in enumerate(columns, start=1))
-        return
-    fields = value if isinstance(value, dict) else {n: getattr(value, n) for n in getattr(value, "_fieldnames", ())}
-    for name, inner in fields.items():
-        if not name.startswith("__"):
-            yield from _vectors(f"{place}.{name}" if place else name, inner)
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            if not name.startswith("__"):
+                yield from _vectors(f"{place}.{name}" if place else name, inner)

@@ -13,9 +13,8 @@ import numpy as np
 
 from rov_fmu.tank.catalogue import is_known
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import ascending
 from rov_fmu.tank.commands import Parameters
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import about
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers.content import Content, Piece, described
 
@@ -33,12 +32,15 @@ def read_ulog(path: Path, named: Collection[str]) -> Content:
         log = ULog(file)
     names = Counter(data.name for data in log.data_list)
     topics = [_topic(data, names[data.name] > 1) for data in log.data_list if "timestamp" in data.data]
-    read = [topic for topic in topics if is_known(topic.source.kind) or topic.source.topic in named]
+    known = (topic for topic in topics if is_known(topic.source.kind) or topic.source.topic in named)
+    read = [topic for topic in known if len(topic.time)]
     unread = described(topic for topic in topics if topic not in read)
-    content = Content(path.name, [Piece(read, _parameters(log))], is_damaged=log.file_corruption, unread=unread)
+    content = Content(path.name, [Piece(read, _parameters(log))], unread=unread)
+    if log.file_corruption:
+        content.findings.append(about(path.name, "damaged log"))
     if log.dropouts:
-        numbers = {"count": len(log.dropouts), "longest": max(dropout.duration for dropout in log.dropouts) / 1000.0}
-        content.findings.append(Finding("dropouts", file=path.name, numbers=numbers))
+        longest = max(dropout.duration for dropout in log.dropouts) / 1000.0
+        content.count("dropouts", len(log.dropouts), longest=longest)
     return content
 
 
@@ -54,9 +56,7 @@ def _topic(data: Any, several: bool) -> Topic:
     columns = {key: values.astype(float) for key, values in data.data.items()}
     sampled = columns.get("timestamp_sample", columns["timestamp"])
     stamp = np.where(sampled > 0.0, sampled, columns["timestamp"]) * 1e-6
-    names = [key for key in columns if not key.startswith("timestamp")]
-    time, *ordered = ascending(stamp, *(columns[key] for key in names))
-    fields = dict(zip(names, ordered, strict=True))
+    fields = {key: values for key, values in columns.items() if not key.startswith("timestamp")}
     fields |= {
         key: np.where(fields[flag] > 0.0, fields[key], np.nan)
         for key, flag in _VALID.items()
@@ -67,4 +67,4 @@ def _topic(data: Any, several: bool) -> Topic:
         fields = {key: values for key, values in fields.items() if not key.startswith("velocity")}
     name = f"{data.name}_{data.multi_id}" if data.multi_id else data.name
     part = f"instance {data.multi_id}" if several else ""
-    return Topic(Source(name, data.name, part=part, frames=frames), time, fields)
+    return Topic.of_messages(Source(name, data.name, part=part, frames=frames), stamp, fields)

@@ -76,9 +76,7 @@ def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
     )
     assert command(log)[29] == pytest.approx(0.5)
     assert command(log)[31] == pytest.approx(-0.5)
-    assert "MOT_5_DIRECTION, MOT_6_DIRECTION changes 3 s after the first command. Each value is used in its time" in (
-        told(log)
-    )
+    assert "MOT_5_DIRECTION and MOT_6_DIRECTION changed 3 s after the first command. Each value is used" in told(log)
 
 
 def test_parameters_in_a_dataflash_log(tmp_path: Path) -> None:
@@ -114,7 +112,7 @@ def test_clipping_is_told_in_every_format(tmp_path: Path) -> None:
     assert command(log)[-1] == 1.0
     assert sentence.format("thruster 5") in told(log)
     pulses = np.where(np.arange(N) > 9, 1964, 1500)
-    assert sentence.format("u_5") in told(one(csv(tmp_path, "us", pulses)))
+    assert sentence.format("u_5 [us]") in told(one(csv(tmp_path, "us", pulses)))
     percent = ROS.write(tmp_path / "p", [*numbers("/out", 120.0 * (TIME > 4.95)), *numbers("/depth", motion.DEPTH)])
     assert sentence.format("/out.data") in told(one(percent, topics={"/out.data": "u_5 [%]"}))
 
