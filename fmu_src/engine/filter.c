@@ -108,6 +108,7 @@ typedef struct {
     int listed[N_X], count;
     belief now, ahead; /* after all samples so far, and the prediction */
     ptrdiff_t row, reset, tilt;
+    bool beside[MOST_SENSORS];     /* if the last sample of a sensor was far beside its prediction */
     double phi, theta, theta_rate; /* the measured roll and pitch at the time of the step or sample, and the rate of the pitch */
 } filter;
 
@@ -565,7 +566,7 @@ static void correct(const filter *f, belief *b, const double gain[N_X], double o
 }
 
 /* Take one sample into the belief, and write its innovation, its variance and its gain. */
-static void take(const filter *f, belief *b, ptrdiff_t k, int repeats, double *off, double *variance, double gain[N_X])
+static void take(filter *f, belief *b, ptrdiff_t k, int repeats, double *off, double *variance, double gain[N_X])
 {
     const int sensor = f->log->sensor[k];
     *off = innovation(f, b, k);
@@ -575,7 +576,10 @@ static void take(const filter *f, belief *b, ptrdiff_t k, int repeats, double *o
     }
     double PH[N_X];
     *variance = project(f, b, sensor, PH);
-    const double size = fabs(*off) / sqrt(*variance), weight = size > OUTLYING ? OUTLYING / size : 1.0;
+    const double size = fabs(*off) / sqrt(*variance);
+    const bool is_beside = size > OUTLYING;
+    const double weight = is_beside && !f->beside[sensor] ? OUTLYING / size : 1.0;
+    f->beside[sensor] = is_beside;
     memset(gain, 0, N_X * sizeof gain[0]);
     for (int a = 0; a < f->count; a++) {
         const double share = weight * PH[a] / *variance;

@@ -46,7 +46,8 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     fit = fit_all(tests, known, logs, rows, on_progress)
     on_progress("predicting what was left out", 0.85)
     predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior)]
-    slow = [*disturbances(fit.objective, fit.best, fit.posterior)]
+    unexplained = disturbances(fit.objective, fit.best, fit.posterior)
+    slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
     vehicle = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.rov.coefficients, f"thrust_{curve.name}*.csv"), None):

@@ -1131,7 +1131,7 @@ def test_every_column_that_identify_reads_is_read(
     assert read_by_both > 20
 
 
-HULL = {
+HULL: dict[str, tuple[str, Callable[[int], str], list[str]]] = {
     "in the water": (
         "pressure [kPa],surge velocity [m/s]",
         lambda n: f"{101.3 + 0.1 * n},{0.01 * n}",

@@ -25,6 +25,8 @@ _LENGTH = 0.3
 """The correlation length of the deviations, in commands."""
 _POWER = 1.5
 """Thrust grows about with this power of the command: a deviation of the force is as many times that of the command."""
+_WEAKEST = 0.1
+"""The least of 1 + eta: beyond the dead band there is always some thrust."""
 COUNT = 2 * len(KNOTS)
 
 
@@ -66,8 +68,8 @@ class Shapes:
         if curve in self.exact_astern:
             astern = 0.0 * astern
         band = np.where(is_astern, *reversed(self.dead_bands.get(curve, (0.0, 0.0))))
-        beyond = np.maximum(size - band, 0.0) * np.where(is_astern, astern, ahead)
-        return np.asarray(np.sign(commands) * np.clip(size + beyond, 0.0, 1.0))
+        bent = np.maximum(np.where(is_astern, astern, ahead), _WEAKEST - 1.0) * np.maximum(size - band, 0.0)
+        return np.asarray(np.sign(commands) * np.clip(size + bent, 0.0, 1.0))
 
     def inputs(self, layout: Layout, inputs: Array) -> Array:
         """Return rows of inputs with the commands of the prior curves. The inputs of the layout are its thrusters'."""

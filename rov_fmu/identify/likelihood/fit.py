@@ -79,7 +79,7 @@ def fit_all(
 
     best = minimise(full, _scaled(known, full, ends[0].z), on_step=show_full)
     scaled = _scaled(known, full, best.z)
-    if full.prior(scaled) < full.prior(best.z) - ENOUGH:
+    if scaled is not best.z:
         best = minimise(full, scaled, on_step=show_full, most=2)
     posterior = Posterior.of(table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
@@ -94,21 +94,22 @@ def fit_all(
 def _scaled(known: Beginning, objective: Objective, z: Array) -> Array:
     """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
 
-    The data do not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
+    Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
+    The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
     """
-    kinds = ("thrust scale", "inertia", "quadratic drag", "linear drag")
-    curves = {t.curve for axis in known.fitted for t in known.layout.drivers(axis)}
-    everything = [*(("thrust scale", name) for name in curves), *((k, a.name) for k in kinds[1:] for a in known.fitted)]
-    is_measured = any(row.quantity == "force" for row in objective.rows)
-    if is_measured or any(objective.table.place(kind, of) is None for kind, of in everything):
-        return z
     direction = np.zeros(len(z))
     for n, p in enumerate(objective.table.parameters):
-        if p.kind in kinds:
+        if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
             direction[n] = 1.0
         elif p.kind == "load":
             axis = next(axis for axis in known.fitted if axis.name == p.of)
             direction[n] = z[n] + known.coefficients[axis.coefficient("F_0")] / known.full[p.of]
     weight = direction / objective.deviation**2
+    if not direction.any():
+        return z
     moved = z - direction * float(weight @ (z - objective.mean)) / float(weight @ direction)
-    return np.clip(moved, objective.low, objective.high)
+    moved = np.clip(moved, objective.low, objective.high)
+    if objective.prior(moved) > objective.prior(z) - ENOUGH:
+        return z
+    before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
+    return moved if after < before else z

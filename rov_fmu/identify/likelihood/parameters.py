@@ -360,9 +360,9 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str
             mean, low, high = log(usual), log(least), log(largest)
             yield Parameter(kind, of, mean=mean, deviation=deviation, is_log=True, low=low, high=high, of_motion=False)
 
-    axes = {form.axis.name for one in logs for form in one.layout.axes}
-    for axis in known.fitted:
-        if axis.name in axes:
+    moving = {form.axis.name for one in logs for form in one.layout.axes}
+    for axis in (form.axis for form in known.layout.axes):
+        if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
             yield from size("slow force", axis.name, "force")
     if logs and not known.layout.fins:
         yield from size("slow gain", "", "gain")

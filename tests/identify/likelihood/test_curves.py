@@ -80,8 +80,8 @@ def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
 def test_thrust_begins_at_the_dead_band_whatever_the_shape() -> None:
     k = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"c_0_t200": 0.07})
     (curve,) = k.layout.curves
-    for seed in range(3):
-        deviation = 0.1 * np.random.default_rng(seed).standard_normal(COUNT)
+    for seed, size in ((0, 0.1), (1, 0.1), (2, 10.0)):
+        deviation = size * np.random.default_rng(seed).standard_normal(COUNT)
         shape = Shapes({curve.name: deviation}, {curve.name: (0.07, 0.07)})
         assert [shape.force(k, curve, c) for c in (0.0, 0.069, -0.069)] == [0.0, 0.0, 0.0]
         assert shape.force(k, curve, 0.071) > 0.0 > shape.force(k, curve, -0.071)
