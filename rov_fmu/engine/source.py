@@ -1,6 +1,7 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 
@@ -8,7 +9,7 @@ from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
-from rov_fmu.model.formula import CHANGE, names, tangent, to_c
+from rov_fmu.model.expression import PYTHON, Expression, Name, Number, change_of, tangent, to_c, total, written
 from rov_fmu.model.layout import Layout
 
 
@@ -31,17 +32,16 @@ class EquationSource:
         found |= {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
         return found | {name: name for name in local}
 
-    def _c(self, formula: str, local: Iterable[str] = ()) -> str:
+    def _c(self, formula: Expression, local: Iterable[str] = ()) -> str:
         """Write a formula in C."""
-        known = self._in_c(local)
-        return to_c(formula, lambda name: known[name])
+        return to_c(formula, self._in_c(local).__getitem__)
 
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
         equation = self.equation
         later = [*equation.forces.values(), *equation.outputs.values()]
         later += [formula for both in equation.lagging.values() for formula in both]
-        used = {name for formula in later for name in names(formula)} | {*self.layout.calculated}
+        used = frozenset(self.layout.calculated).union(*(formula.names for formula in later))
         lasting = [name for name in equation.thrust if name in used]
         return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
 
@@ -59,7 +59,7 @@ class EquationSource:
         lines: list[str] = []
         local: list[str] = []
         held = self.held_names()
-        for name in _needed(self.equation.thrust, held):
+        for name in _needed(self.equation.thrust, map(Name, held)):
             text = self._c(self.equation.thrust[name], local)
             if name in held:
                 lines.append(f"q->{name} = {text};")
@@ -155,7 +155,7 @@ class EquationSource:
     def rotation(self) -> list[str]:
         """Return statements that set the rotation matrix in y to that of the quaternion."""
         entries = [name for name in self.equation.states if name in self.equation.orientation]
-        return self._results({f"y[Y_{name}]": name for name in entries})
+        return self._results({f"y[Y_{name}]": Name(name) for name in entries})
 
     # ---- Rates and terms ----
 
@@ -170,10 +170,10 @@ class EquationSource:
     def _rate(self, terms: Sequence[Term]) -> str:
         return self._by_states(rate_formula(terms))
 
-    def _by_states(self, formula: str) -> str:
+    def _by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
         known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
-        return to_c(formula, lambda name: known[name])
+        return to_c(formula, known.__getitem__)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
@@ -232,18 +232,13 @@ class EquationSource:
 
     def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
-        text = ""
+        parts = []
         for term in self.equation.rows[name]:
-            if not term.factors:
-                continue  # a constant occurs in coefficient 0 only
-            factors = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
-            coefficient = term.coefficient.removeprefix("-")
-            product = factors if coefficient == "1" else f"{self._c(coefficient)} * {factors}"
-            if term.coefficient.startswith("-"):
-                text += f" - {product}" if text else f"-{product}"
-            else:
-                text += f" + {product}" if text else product
-        return text or "0.0"
+            if term.factors:  # a constant occurs in coefficient 0 only
+                state = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
+                parts.append(replace(term, factors=(state,)).formula)
+        known = self._in_c()
+        return to_c(total(parts), lambda name: known.get(name, name))
 
     @cached_property
     def component_of(self) -> dict[str, int]:
@@ -293,10 +288,10 @@ class EquationSource:
         """Return statements that assign the outputs that follow from the states."""
         return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
 
-    def _results(self, formulas: Mapping[str, str]) -> list[str]:
+    def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
         orientation = self.equation.orientation
-        needed = _needed(orientation, {name for formula in formulas.values() for name in names(formula)})
+        needed = _needed(orientation, formulas.values())
         lines = [f"const double {name} = {self._c(orientation[name], orientation)};" for name in needed]
         return lines + [f"{place} = {self._c(formula, orientation)};" for place, formula in formulas.items()]
 
@@ -323,16 +318,16 @@ class EquationSource:
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
-        text = {name: f"at[REF_{name}]" for name in self.layout.initial}
-        text |= {f"{CHANGE}{name}": f"d[REF_{name}]" for name in self.layout.initial}
+        text = _with_changes(self.layout.initial)
         lines: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            change = to_c(tangent(formula, lambda n: f"{CHANGE}{n}") or "0", text.__getitem__)
+            change = to_c(tangent(formula, change_of) or Number(0.0), text.__getitem__)
             if name in self.layout.state:
                 lines.append(f"d[REF_{name}] += {change};")
             else:
-                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {CHANGE}{name} = {change};")
-                text.update({name: name, f"{CHANGE}{name}": f"{CHANGE}{name}"})
+                changed = change_of(name).identifier
+                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {changed} = {change};")
+                text |= {name: name, changed: changed}
         return lines
 
     def tangent_lines(self) -> list[str]:
@@ -342,39 +337,43 @@ class EquationSource:
         """
         equation = self.equation
         given = self.variables - {*self.layout.calculated}
-        text = {name: f"at[REF_{name}]" for name in given}
-        text |= {f"{CHANGE}{name}": f"d[REF_{name}]" for name in given}
-        steps: dict[str, str] = {}
-
-        def change_of(name: str) -> str | None:
-            return f"{CHANGE}{name}" if name in given or f"{CHANGE}{name}" in steps else None
-
+        changes = {name: change_of(name) for name in given}
+        steps: dict[str, Expression] = {}
         for name, formula in {**equation.program, **equation.outputs}.items():
             steps[name] = formula
-            if change := tangent(formula, change_of):
-                steps[f"{CHANGE}{name}"] = change
-        results = {f"d[REF_{name}]": f"{CHANGE}{name}" for name in self.layout.calculated if f"{CHANGE}{name}" in steps}
+            if change := tangent(formula, changes.get):
+                changes[name] = change_of(name)
+                steps[changes[name].identifier] = change
+        calculated = [name for name in self.layout.calculated if name in changes]
+        results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
-            results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
-        needed = _needed(steps, {name for formula in results.values() for name in names(formula)})
-        text |= {name: name for name in steps}
-        lines = [f"const double {name} = {to_c(steps[name], lambda n: text[n])};" for name in needed]
-        return lines + [f"{place} = {to_c(formula, lambda n: text[n])};" for place, formula in results.items()]
+            change = tangent(equation.rates[name], changes.get)
+            results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
+        text = _with_changes(given) | {name: name for name in steps}
+        needed = {name: steps[name] for name in _needed(steps, results.values())}
+        lines = [f"const double {name} = {to_c(formula, text.__getitem__)};" for name, formula in needed.items()]
+        return lines + [f"{place} = {to_c(formula, text.__getitem__)};" for place, formula in results.items()]
 
 
-def _needed(formulas: Mapping[str, str], wanted: Iterable[str]) -> list[str]:
-    """Return the names of the formulas that the wanted ones need, themselves included, in the order of the formulas."""
-    needed = set(wanted)
+def _with_changes(variables: Iterable[str]) -> dict[str, str]:
+    """Return the C expressions of variables and of their changes, by their names."""
+    found = {name: f"at[REF_{name}]" for name in variables}
+    return found | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
+
+
+def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> list[str]:
+    """Return the names of the formulas that some expressions need, in the order of the formulas."""
+    needed = set().union(*(formula.names for formula in wanted))
     for name in reversed(list(formulas)):
         if name in needed:
-            needed |= {*names(formulas[name])}
+            needed |= formulas[name].names
     return [name for name in formulas if name in needed]
 
 
 def generated_sources(layout: Layout) -> dict[str, str]:
     """Return the generated files of a vehicle, model.h and equation.h, by their names."""
     source = EquationSource(layout)
-    formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
+    formulas = {name: written(rate_formula(terms), PYTHON) for name, terms in source.equation.rows.items()}
     sizes = {
         "inputs": len(layout.inputs),
         "states": len(layout.state),

@@ -7,6 +7,7 @@ from math import atan2, copysign, cos, prod, sin, sqrt
 import pytest
 from lxml import html
 
+from rov_fmu.model.expression import Name, where
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
@@ -216,4 +217,4 @@ def test_mathml_says_what_the_text_says(kind: str) -> None:
 
 def test_a_form_that_cannot_be_shown_is_an_error() -> None:
     with pytest.raises(ValueError, match=r"2\.0 if x > 3\.0 else y: there is no way to show this"):
-        Reader({}).read("2 if x > 3 else y")
+        Reader({}).read(where(Name("x") > 3.0, 2.0, Name("y")))

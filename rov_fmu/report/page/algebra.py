@@ -4,12 +4,11 @@
 of commands, which the text beside the equations mentions.
 """
 
-import ast
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from rov_fmu.model.formula import parsed
+from rov_fmu.model.expression import FUNCTIONS, PYTHON, Expression, Name, Number, Operation, written
 
 
 @dataclass(frozen=True)
@@ -68,60 +67,35 @@ class Reader:
     The names in `inlined` are replaced by their formulas.
     """
 
-    def __init__(self, inlined: Mapping[str, str]) -> None:
+    def __init__(self, inlined: Mapping[str, Expression]) -> None:
         self._inlined = inlined
 
-    def read(self, formula: str) -> Sum:
+    def read(self, x: Expression) -> Sum:
         """Return a formula as a sum. Raises ValueError if there is no way to show it."""
-        return self._read(parsed(formula))
-
-    def _read(self, node: ast.expr) -> Sum:  # noqa: PLR0911 (one case for each kind of syntax)
-        match node:
-            case ast.Constant(value=float() | int() as value):
-                return _number(float(value))
-            case ast.Name(id=name) if name in self._inlined:
-                return self._read(parsed(self._inlined[name]))
-            case ast.Name(id=name):
-                return (Product(1, (name,)),)
-            case ast.UnaryOp(op=ast.USub()):
-                return negative(self._read(node.operand))
-            case ast.BinOp(op=ast.Add()):
-                return self._read(node.left) + self._read(node.right)
-            case ast.BinOp(op=ast.Sub()):
-                return self._read(node.left) + negative(self._read(node.right))
-            case ast.BinOp(op=ast.Mult()):
-                return times(self._read(node.left), self._read(node.right))
-            case ast.BinOp(op=ast.Div()):
-                return times(self._read(node.left), inverse(self._read(node.right)))
-            case ast.Call(func=ast.Name(id=function), args=arguments):
-                return (Product(1, (Call(function, *map(self._read, arguments)),)),)
-            case ast.IfExp():
-                return self._choice(node)
-        raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
-
-    def _choice(self, node: ast.IfExp) -> Sum:
-        """Read a conditional: a saturated command, a value for each direction, or a dead band."""
-        test, body, otherwise = ast.unparse(node.test), node.body, node.orelse
-        name, _, condition = test.partition(" ")
-        if condition == "> 1.0" and ast.unparse(otherwise) == f"-1.0 if {name} < -1.0 else {name}":
-            return self._read(parsed(name))
-        if condition == "< 0.0":
-            (subject,) = self._read(parsed(name))
-            return _directed(subject, self._read(otherwise), self._read(body))
-        if condition.startswith(f"< 0.0 or ({name} == 0.0 and ") and ast.unparse(body) == "0.0":
-            return (Product(1, (Cases(name, (), self._read(otherwise)),)),)
-        raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
+        match x:
+            case Number(value):
+                return _number(value)
+            case Name(identifier):
+                inlined = self._inlined.get(identifier)
+                return (Product(1, (identifier,)),) if inlined is None else self.read(inlined)
+            case Operation("directed", (subject, forward, reverse)):
+                (name,) = self.read(subject)
+                return _directed(name, self.read(forward), self.read(reverse))
+            case Operation("dead band", (Name(identifier), _, force)):
+                return (Product(1, (Cases(identifier, (), self.read(force)),)),)
+            case Operation(op, args) if op in _ALGEBRA:
+                return _ALGEBRA[op](*map(self.read, args))
+            case Operation(op, args) if op in FUNCTIONS:
+                return (Product(1, (Call(op, *map(self.read, args)),)),)
+        raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
 
 
 # ---- Sums and products -----------------------------------------------------------------------------------------------
 
 
 def _number(value: float) -> Sum:
-    """Return a number as a sum of one product with its sign and its size, or as an empty sum."""
-    if value == 0.0:
-        return ()
-    size = abs(value)
-    return (Product(1 if value > 0.0 else -1, () if size == 1.0 else (size,)),)
+    """Return a number as a sum of one product, or as an empty sum."""
+    return (Product(1, () if value == 1.0 else (value,)),) if value else ()
 
 
 def negative(terms: Sum) -> Sum:
@@ -180,6 +154,17 @@ def _replaced(product: Product, old: Factor, new: Factor) -> Product | None:
         return None
     place = len(product.above) - 1 - product.above[::-1].index(old)
     return replace(product, above=(*product.above[:place], new, *product.above[place + 1 :]))
+
+
+_ALGEBRA: Mapping[str, Callable[..., Sum]] = {
+    "neg": negative,
+    "+": lambda left, right: left + right,
+    "-": lambda left, right: left + negative(right),
+    "*": times,
+    "/": lambda left, right: times(left, inverse(right)),
+    "saturated": lambda x: x,
+}
+"""What operations make of the sums that they are applied to."""
 
 
 def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:

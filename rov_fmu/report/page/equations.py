@@ -8,6 +8,7 @@ from markupsafe import escape
 
 from rov_fmu.model.attitude import rotation_formulas
 from rov_fmu.model.equation import Equation, equation_of
+from rov_fmu.model.expression import Expression, Name, Number
 from rov_fmu.model.layout import (
     AXIS,
     BODY,
@@ -22,6 +23,7 @@ from rov_fmu.model.layout import (
     VehicleAxis,
     cross_name,
 )
+from rov_fmu.model.thrust import steady_name
 from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Product, Reader, Sum, arranged, inverse
 from rov_fmu.report.templates import RAISED, number
 
@@ -94,14 +96,20 @@ class Equations:
 def of(layout: Layout) -> Equations:
     """Return the equations of a vehicle."""
     equation = equation_of(layout)
-    inlined = _inlined(layout, equation)
-    rotation = [name for name in equation.orientation if name.startswith("R_")]
-    reader = Reader(inlined)
+    names = equation.names
+    rotation = _rotation(layout, equation)
+    reader = Reader(_inlined(layout, equation))
+    plain = Reader({})
 
-    def line(name: str, formula: str, reference: str = "") -> Line:
+    def line(name: str, formula: Expression, reference: str = "") -> Line:
         return Line((), name, False, arranged(reader.read(formula)), reference)
 
-    def rate(name: str, formula: str, reference: str = "") -> Line:
+    def thrust(name: Name, reference: str = "") -> list[Line]:
+        """Return the equation of a quantity that follows from the commands, if the vehicle has it."""
+        formula = equation.thrust.get(name.identifier)
+        return [line(name.identifier, formula, reference)] if formula is not None else []
+
+    def rate(name: str, formula: Expression, reference: str = "") -> Line:
         """Return the equation of a time derivative, multiplied by the divisors that all its terms share."""
         right = reader.read(formula)
         below = [factor for factor in right[0].below if all(factor in p.below for p in right)]
@@ -122,72 +130,84 @@ def of(layout: Layout) -> Equations:
     inertia = []
     if _has_effective_inertia(layout, equation):
         for v in layout.by_velocity:
-            inertia.append(Line((), f"M_{v}", False, inverse(Reader({}).read(equation.parameters[f"gain_{v}"]))))
+            gain = plain.read(equation.parameters[names("gain", v).identifier])
+            inertia.append(Line((), f"M_{v}", False, inverse(gain)))
         for (a, b), name in entries.items():
-            inertia.append(Line((), name, False, arranged(Reader({}).read(equation.parameters[f"mass_{a}{b}"]))))
+            mass = plain.read(equation.parameters[names("mass", a + b).identifier])
+            inertia.append(Line((), name, False, arranged(mass)))
     curves = []
     for curve in layout.curves:
         thrusters = [t for t in layout.thrusters if t.curve == curve.name]
         first = thrusters[0].name
-        name = f"steady_{first}" if curve.has_lag else f"F_{first}"
-        thrust = [line(name, equation.thrust[name], curve.equation)]
-        if f"beyond_{first}" in equation.thrust and f"beyond_{first}" not in inlined:
-            thrust.append(line(f"beyond_{first}", equation.thrust[f"beyond_{first}"]))
-        loss = f"loss_{first}"
-        advance = [line(loss, equation.thrust[loss])] if loss in equation.thrust else []
+        force = thrust(steady_name(first, curve, names), curve.equation)
+        if "c_0" in curve.keys:
+            force += thrust(names("beyond", first))
         lag = [rate(f"F_{first}", equation.lagging[f"F_{first}"][0])] if curve.has_lag else []
         by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
         tau = f"tau_{curve.name}"
         torque = [line(tau, equation.forces[tau], "(4)" if by_arm else "")] if tau in equation.forces else []
-        curves.append(CurveLines(curve, thrusters, thrust, advance, lag, torque))
-    mixed = [t.name for t in layout.thrusters if f"mixed_{t.name}" in equation.thrust]
+        curves.append(CurveLines(curve, thrusters, force, thrust(names("loss", first)), lag, torque))
+    mixed = [(t.name, equation.thrust.get(names("mixed", t.name).identifier)) for t in layout.thrusters]
     return Equations(
         [motion(form) for form in layout.axes],
         inertia,
         [
-            *(line(f"command_{name}", f"mixed_{name}") for name in mixed),
-            *(line(f"angle_{fin.name}", equation.thrust[f"angle_{fin.name}"]) for fin in layout.fins),
+            *(line(names("command", name).identifier, formula) for name, formula in mixed if formula is not None),
+            *(one for fin in layout.fins for one in thrust(names("angle", fin.name))),
         ],
         curves,
         [rate(name, equation.rates[name]) for name in layout.pose],
-        [line(name, equation.orientation[name]) for name in rotation],
+        [line(name, formula) for name, formula in rotation.items()],
         [line(name, formula) for name, formula in equation.outputs.items()],
     )
 
 
 def coupled(layout: Layout) -> list[str]:
     """Return the names of the axes with Coriolis and Munk terms."""
-    coefficients = " ".join(equation_of(layout).parameters)
-    return [form.axis.name for form in layout.axes if f"coupling_{form.axis.velocity}" in coefficients]
+    rows = equation_of(layout).rows
+    axes = (form.axis for form in layout.axes)
+    return [axis.name for axis in axes if any(term.effect == "coupling" for term in rows[axis.velocity])]
+
+
+def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
+    """Return the formulas of the entries of the rotation matrix, if the vehicle rolls or pitches."""
+    found = equation.orientation if layout.has_attitude else {}
+    return {name: formula for name, formula in found.items() if name in equation.rows}
 
 
 def _mass_entries(equation: Equation) -> dict[tuple[str, str], str]:
     """Return the entries of the mass matrix off the diagonal: by two velocities, the name on the page."""
-    pairs = [(name[-2], name[-1]) for name in equation.parameters if name.startswith("mass_")]
+    entries = {name.identifier: name.owners[0] for name in equation.names.of_kind("mass")}
+    pairs = [tuple(entries[name]) for name in equation.parameters if name in entries]
     return {(a, b): f"m_{a}{b}" for a, b in pairs if a != b}
 
 
-def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
+_SHOWN = ("steady", "loss", "table", "angle", "battery", "fraction")
+"""The kinds of quantities that have their own equations, or are described in words."""
+
+
+def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     """Return the formulas that replace their names. A name stays if it has its own equation."""
-    found = {
-        name: formula
-        for name, formula in equation.program.items()
-        if not name.startswith(("F_", "tau_", "steady_", "loss_", "R_", "table_", "angle_", "battery", "fraction_"))
-    }
-    if layout.has_attitude:
-        found["square_length"] = "1"
+    names = equation.names
+    kept = {name.identifier for kind in _SHOWN for name in names.of_kind(kind)} | layout.places.keys()
+    kept |= _rotation(layout, equation).keys()
     for thruster in layout.thrusters:
-        if f"mixed_{thruster.name}" in equation.thrust:
-            del found[f"command_{thruster.name}"]
+        if names("mixed", thruster.name).identifier in equation.thrust:
+            kept.add(names("command", thruster.name).identifier)
         if "c_0" in layout.curve_of[thruster.name].keys:
-            del found[f"beyond_{thruster.name}"]
-    if _has_effective_inertia(layout, equation):
-        found |= {f"gain_{v}": f"1 / M_{v}" for v in layout.by_velocity}
-    found |= {f"mass_{v}{v}": f"M_{v}" for v in layout.by_velocity}
-    found |= {f"mass_{a}{b}": name for (a, b), name in _mass_entries(equation).items()}
-    for name in equation.parameters:  # the page multiplies by the mass matrix instead of its inverse
-        if name.startswith("inverse_"):
-            found[name] = "1" if name[-1] == name[-2] else "0"
+            kept.add(names("beyond", thruster.name).identifier)
+    found = {name: formula for name, formula in equation.program.items() if name not in kept}
+    if layout.has_attitude:
+        found["square_length"] = Number(1.0)
+    for v in layout.by_velocity:
+        if _has_effective_inertia(layout, equation):
+            found[names("gain", v).identifier] = 1.0 / Name(f"M_{v}")
+        found[names("mass", v + v).identifier] = Name(f"M_{v}")
+    for (a, b), name in _mass_entries(equation).items():
+        found[names("mass", a + b).identifier] = Name(name)
+    for inverse_mass in names.of_kind("inverse"):  # the page multiplies by the mass matrix instead of its inverse
+        row, column = tuple(inverse_mass.owners[0])
+        found[inverse_mass.identifier] = Number(float(row == column))
     return found
 
 
@@ -217,6 +237,7 @@ def _choices(terms: Sum) -> Iterator[Choice]:
 
 def symbols(layout: Layout) -> dict[str, Symbol]:
     """Return the symbol of every name in the equations of a vehicle."""
+    names = equation_of(layout).names
     found = {name: Symbol(name) for name in (*layout.velocities, *layout.pose)}
     found |= {"phi": Symbol("φ"), "theta": Symbol("θ"), "psi": Symbol("ψ"), "eta": Symbol("η")}
     found |= {f"epsilon_{n}": Symbol("ε", f"{n}") for n in (1, 2, 3)}
@@ -228,17 +249,19 @@ def symbols(layout: Layout) -> dict[str, Symbol]:
         found[name] = Symbol(letter, *rest.split("_"))
     found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
     mark = "d" if layout.has_dead_time else ""
-    found |= {f"fraction_{name}": Symbol("u", name.removeprefix("u_"), mark) for name in layout.commands}
-    found |= {"battery": Symbol("U"), "T_d": Symbol("T", "d")}
+    found |= {
+        names("fraction", name).identifier: Symbol("u", name.removeprefix("u_"), mark) for name in layout.commands
+    }
+    found |= {names("battery").identifier: Symbol("U"), "T_d": Symbol("T", "d")}
     for fin in layout.fins:
-        found[f"angle_{fin.name}"] = Symbol("δ", fin.name)
+        found[names("angle", fin.name).identifier] = Symbol("δ", fin.name)
         found |= {fin.coefficient(key): Symbol(letter, fin.name) for key, letter in (("lift", "l"), ("drag", "d"))}
         found[fin.coefficient("angle_max")] = Symbol("δ", "max", fin.name)
     for t in layout.thrusters:
-        found[f"table_{t.name}"] = Symbol("f", t.curve)
-        letters = {"F": "F", "command": "c", "beyond": "m", "loss": "k"}
-        found |= {f"{word}_{t.name}": Symbol(letter, t.name) for word, letter in letters.items()}
-        found[f"steady_{t.name}"] = Symbol("F", t.name, mark="*")
+        letters = {"command": "c", "beyond": "m", "loss": "k"}
+        found |= {names(kind, t.name).identifier: Symbol(letter, t.name) for kind, letter in letters.items()}
+        found |= {names("table", t.name).identifier: Symbol("f", t.curve), f"F_{t.name}": Symbol("F", t.name)}
+        found[names("steady", t.name).identifier] = Symbol("F", t.name, mark="*")
     for curve in layout.curves:
         found[f"tau_{curve.name}"] = Symbol("τ", curve.name)
         found |= {curve.coefficient(key): _coefficient(key, curve.name) for key in CURVE if key in curve.keys}

@@ -21,6 +21,7 @@ from rov_fmu.engine.simulation import simulate
 from rov_fmu.engine.source import sources
 from rov_fmu.io.paths import FMU_SRC
 from rov_fmu.model.equation import equation_of
+from rov_fmu.model.expression import PYTHON, written
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
@@ -290,7 +291,7 @@ def test_a_clash_in_a_layout_made_in_python_is_an_error_that_names_both_parts(tm
     def named(**names: str) -> Layout:
         return layout.renamed(lambda kind, name: names.get(name, name) if kind == "curves" else name)
 
-    assert equation_of(named(bow="u")).thrust["table_bow"] == "thrust_0_bow(command_bow)"
+    assert written(equation_of(named(bow="u")).thrust["table_bow"], PYTHON) == "thrust_0_bow(command_bow)"
     with pytest.raises(
         ValueError, match=r"^d_main_reverse: two .* one of curves\.main_reverse and one of curves\.main;"
     ):
