@@ -214,59 +214,16 @@ def rate_formula(terms: Iterable[Term]) -> Expression:
     return total(term.formula for term in terms)
 
 
+@lru_cache(maxsize=100)
 def equation_of(layout: Layout) -> Equation:
     """Return the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics.
 
-    Raises ValueError when the names of parts of the vehicle clash.
+    Raises ValueError when two thrust tables have the same name.
     """
-    for name, reason in name_clashes(layout):
-        raise ValueError(f"{name}: {reason}")
-    return _equation_of(layout)
-
-
-@lru_cache(maxsize=100)
-def name_clashes(layout: Layout) -> tuple[tuple[str, str], ...]:
-    """Return each name that two variables or formulas of a vehicle would have, with the reason.
-
-    The names of variables and formulas are made of the names of the vehicle's parts, and two of them may be equal:
-    angle_max_rudder is the largest angle of the fin rudder and the angle of the fin max_rudder. To know the part behind
-    each name, the equation is made of a layout whose parts have placeholders as names, which are then filled.
-    """
-    parts: list[tuple[str, str]] = []
-
-    def placeholder(kind: str, name: str) -> str:
-        parts.append((kind, name))
-        return f"{{{len(parts) - 1}}}"
-
-    def part_of(name: str) -> int:
-        return max((n for n in range(len(parts)) if f"{{{n}}}" in name), default=-1)
-
-    twin = layout.renamed(placeholder)
-    equation = _equation_of(twin)
-    variables = twin.inputs | twin.state | twin.calculated | twin.delayed | twin.coefficients | twin.initial
-    names = [*variables, *equation.program, *equation.forces, *equation.rows, *equation.ends, *equation.outputs]
-    names += equation.tables  # the names of slopes and changes begin as no other name does
-    origin: dict[str, str] = {}
-    found: list[tuple[tuple[int, int], str, str]] = []
-    for name in dict.fromkeys(names):
-        filled = name.format(*(part for _, part in parts))
-        other = origin.setdefault(filled, name)
-        if other != name:
-            first, last = sorted((name, other), key=part_of)
-            if part_of(first) >= 0:
-                rest = "one of {}.{}".format(*parts[part_of(first)])
-            else:
-                rest = variables[first].description if first in variables else "one of every vehicle with these effects"
-            pair, are_variables = (part_of(last), part_of(first)), {name, other} <= variables.keys()
-            if not are_variables and any(pair == known for known, *_ in found):
-                continue
-            what = "variables of the FMU" if are_variables else "quantities of the equation"
-            part = "{}.{}".format(*parts[part_of(last)])
-            found.append((pair, filled, f"two {what} would have this name, one of {part} and {rest}; rename a part"))
-    return tuple((filled, reason) for _, filled, reason in found)
-
-
-def _equation_of(layout: Layout) -> Equation:
+    measured = [table for curve in layout.curves for table in curve.tables]
+    tables = {table.function: table for table in measured}
+    if len(tables) < len(measured):
+        raise ValueError("two thrust tables have the same name")
     by_attitude = rotation_formulas() | quaternion_formulas() if layout.has_attitude else {}
     names = Names([*layout.places, *by_attitude])
     mass = _mass(layout, names)
@@ -327,7 +284,7 @@ def _equation_of(layout: Layout) -> Equation:
         lags,
         outputs=angle_formulas() if layout.has_attitude else {},
         ends=quaternion_formulas() if layout.has_attitude else {},
-        tables={table.function: table for curve in layout.curves for table in curve.tables},
+        tables=tables,
         names=names,
     )
 
