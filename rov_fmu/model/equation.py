@@ -226,7 +226,7 @@ def equation_of(layout: Layout) -> Equation:
         raise ValueError("two thrust tables have the same name")
     by_attitude = rotation_formulas() | quaternion_formulas() if layout.has_attitude else {}
     names = Names([*layout.places, *by_attitude])
-    mass = _mass(layout, names)
+    mass = mass_matrix(layout, names)
     parameters = _parameters(layout, mass, names)
     by_direction: dict[str, Directed] = {}
     held = _held_forces(layout, mass, names)
@@ -310,7 +310,7 @@ def _accelerations(layout: Layout, mass: MassMatrix, axis: str, names: Names) ->
 _DRAG = ("linear", "quadratic")
 
 
-def _mass(layout: Layout, names: Names) -> MassMatrix:
+def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
     """Return the mass matrix with the tuning of (18)."""
     gains: dict[str, Expression] = {}
     for form in layout.axes:
@@ -373,7 +373,7 @@ def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Ex
     For each curve with a lag, an axis has another formula: the change of acceleration until the thrust is steady.
     """
     found = {f"tau_{curve.name}": total(_thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves}
-    loads = {form.axis.velocity: _load(layout, form, names) for form in layout.axes}
+    loads = {form.axis.velocity: load_along(layout, form, names) for form in layout.axes}
     lagging = [curve for curve in layout.curves if curve.has_lag]
     for form in layout.axes:
         v = form.axis.velocity
@@ -393,7 +393,7 @@ def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Ex
     return found
 
 
-def _load(layout: Layout, form: VehicleAxis, names: Names) -> Expression:
+def load_along(layout: Layout, form: VehicleAxis, names: Names) -> Expression:
     """Return the force along an axis, or the moment about it, that is constant while the inputs are held."""
     axis = form.axis
     if axis is YAW:

@@ -214,6 +214,16 @@ def scaled(weight: float, x: Expression) -> Expression:
     return weight * x
 
 
+def replaced(x: Expression, formulas: Mapping[str, Expression]) -> Expression:
+    """Return an expression in which formulas stand for some names, also for the names in these formulas."""
+    match x:
+        case Name(identifier) if identifier in formulas:
+            return replaced(formulas[identifier], formulas)
+        case Operation(op, args):
+            return Operation(op, tuple(replaced(arg, formulas) for arg in args))
+    return x
+
+
 def plain(x: Expression) -> Expression:
     """Write the outermost operation as choices if it is `saturated`, `directed` or `beyond_dead_band`."""
     match x:

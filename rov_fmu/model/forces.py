@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import chain
 
 from .attitude import entry
-from .expression import Expression, Name, Names, product, scaled, total
+from .expression import Expression, Name, Names, call, directed, product, scaled, total
 from .layout import FAINT, REVERSE, Layout, cross_name, effect_along
 
 
@@ -30,6 +30,14 @@ class Force:
     """True when the force has the other sign for a negative velocity."""
     is_held: bool = False
     """True when the coefficient depends on inputs."""
+
+    @property
+    def formula(self) -> Expression:
+        """The force as a formula, for both directions of the velocity."""
+        both = zip(self.coefficient, self.reverse or self.coefficient, strict=True)
+        coefficient = [directed(Name(self.velocity), *pair) for pair in both]
+        first, *others = map(Name, self.factors)
+        return scaled(self.sign, product(*coefficient, call("abs", first) if self.turns else first, *others))
 
     def along(self, inverse: Expression, *, reverse: bool = False) -> Expression:
         """Return the coefficient of an acceleration: `inverse` is the acceleration per load."""

@@ -113,7 +113,7 @@ class MassMatrix:
         """Return the coefficients of products of two velocities in the acceleration of an axis, as formulas."""
         found: dict[tuple[str, str], list[Expression]] = {}
         for other, inverse in self.inverse(axis).items():
-            for pair, entries in self._products(other).items():
+            for pair, entries in self.products(other).items():
                 parts = (scaled(sign, self._term(inverse, entry)) for sign, entry in entries)
                 found.setdefault(pair, []).extend(parts)
         return {pair: total(parts) for pair, parts in sorted(found.items(), key=lambda item: _places(item[0]))}
@@ -123,7 +123,7 @@ class MassMatrix:
         is_alone = a == b and self._is_alone(a)
         return inverse / self.names("gain", a) if is_alone else inverse * self._name("mass", a, b)
 
-    def _products(self, axis: str) -> dict[tuple[str, str], list[tuple[int, tuple[str, str]]]]:
+    def products(self, axis: str) -> dict[tuple[str, str], list[tuple[int, tuple[str, str]]]]:
         """Return the right side of Kirchhoff's equations for an axis.
 
         For each product of two velocities, it has entries of the mass matrix with their signs.
@@ -140,7 +140,8 @@ class MassMatrix:
                         signed.remove((-sign, entry))
                     else:
                         signed.append((sign, entry))
-        return {pair: entries for pair, entries in found.items() if entries}
+        ordered = sorted(found.items(), key=lambda item: _places(item[0]))
+        return {pair: entries for pair, entries in ordered if entries}
 
 
 def _sorted(a: str, b: str) -> tuple[str, str]:
