@@ -10,7 +10,7 @@ from typing import Any
 
 from rov_fmu.model.equation import Equation, equation_of
 from rov_fmu.model.expression import ARRAYS, Expression, Name, compiled
-from rov_fmu.model.layout import Layout, ThrustTable, delayed_name
+from rov_fmu.model.layout import Layout, ThrustTable, cubic, delayed_name
 
 Functions = Mapping[str, Callable[..., Any]]
 """The functions of a library that formulas may call: sin, cos, sqrt, pow, where, both, either; and `interval`.
@@ -83,7 +83,6 @@ def _table_force(table: ThrustTable, interval: Callable[..., Any]) -> Callable[[
     def force(command: Any) -> Any:
         low, f, slope, high, g, slope_after = interval(command, table.commands, columns)
         h = high - low
-        t, a, b = (command - low) / h, h * slope, h * slope_after
-        return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+        return cubic(f, g, h * slope, h * slope_after, (command - low) / h)
 
     return force

@@ -23,18 +23,14 @@ class EquationSource:
 
     # ---- Names ----
 
-    def _in_c(self, local: Iterable[str] = ()) -> dict[str, str]:
-        """Return the C expression for every name that a formula may contain. `local` are names of local constants."""
+    @cached_property
+    def _in_c(self) -> dict[str, str]:
+        """The C expression for every name that a formula may contain."""
         equation = self.equation
         found = {name: f"at[REF_{name}]" for name in self.variables}
         found |= {name: f"n->{name}" for name in equation.parameters}
         found |= {name: f"q->{name}" for name in self.held_names()}
-        found |= {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
-        return found | {name: name for name in local}
-
-    def _c(self, formula: Expression, local: Iterable[str] = ()) -> str:
-        """Write a formula in C."""
-        return to_c(formula, self._in_c(local).__getitem__)
+        return found | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
 
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
@@ -49,28 +45,19 @@ class EquationSource:
 
     def parameters(self) -> list[str]:
         """Return statements that compute the numbers that follow from the coefficients alone."""
-        lines = [f"n->{name} = {self._c(formula)};" for name, formula in self.equation.parameters.items()]
-        for name, directed in self.equation.directed.items():
-            lines += [f"n->{name}[0] = {self._c(directed.forward)};", f"n->{name}[1] = {self._c(directed.reverse)};"]
-        return lines
+        both = {name: (d.forward, d.reverse) for name, d in self.equation.directed.items()}
+        sides = {f"{name}[{n}]": formula for name, pair in both.items() for n, formula in enumerate(pair)}
+        formulas = {**self.equation.parameters, **sides}
+        return _statements(formulas, {name: f"n->{name}" for name in formulas}, self._in_c)
 
     def thrust(self) -> list[str]:
         """Return statements that compute the steady thrust."""
-        lines: list[str] = []
-        local: list[str] = []
-        held = self.held_names()
-        for name in _needed(self.equation.thrust, map(Name, held)):
-            text = self._c(self.equation.thrust[name], local)
-            if name in held:
-                lines.append(f"q->{name} = {text};")
-            else:
-                local.append(name)
-                lines.append(f"const double {name} = {text};")
-        return lines
+        held = {name: f"q->{name}" for name in self.held_names()}
+        return _statements(_needed(self.equation.thrust, map(Name, held)), held, self._in_c)
 
     def forces(self) -> list[str]:
         """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
-        return [f"q->{name} = {self._c(formula)};" for name, formula in self.equation.forces.items()]
+        return _statements(self.equation.forces, self._in_c, self._in_c)
 
     def directions(self) -> list[tuple[str, int]]:
         """Return each coefficient that depends on a direction, with the index of its velocity in `monitored`."""
@@ -79,11 +66,9 @@ class EquationSource:
     def starts(self) -> list[str]:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
-        local = [name for name in starts if name not in states]
-        lines = [f"const double {name} = {self._c(starts[name], local)};" for name in local]
-        for name in states:
-            lines.append(f"y[Y_{name}] = {self._c(starts[name], local) if name in starts else '0.0'};")
-        return lines
+        local = {name: formula for name, formula in starts.items() if name not in states}
+        first = {name: starts.get(name, Number(0.0)) for name in states}
+        return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
 
     def lagging_curves(self) -> list[tuple[str, list[str]]]:
         """Return each curve with lag, and the names of its thrusters."""
@@ -147,10 +132,10 @@ class EquationSource:
 
     def attitude(self) -> list[str]:
         """Return statements that set the quaternion to that of the rotation matrix in y."""
-        ends, place = self.equation.ends, {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
-        known = place | {name: name for name in ends} | {entry: f"y[Y_{entry}]" for entry in self.equation.orientation}
-        lines = [f"const double {name} = {to_c(formula, known.__getitem__)};" for name, formula in ends.items()]
-        return [*lines, *(f"{place[name]} = next_{name};" for name in QUATERNION)]
+        places = {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
+        known = places | {entry: f"y[Y_{entry}]" for entry in self.equation.orientation}
+        after: dict[str, Expression] = {name: Name(f"next_{name}") for name in QUATERNION}
+        return _statements({**self.equation.ends, **after}, places, known)
 
     def rotation(self) -> list[str]:
         """Return statements that set the rotation matrix in y to that of the quaternion."""
@@ -172,7 +157,7 @@ class EquationSource:
 
     def _by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
-        known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
+        known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, known.__getitem__)
 
     @cached_property
@@ -237,7 +222,7 @@ class EquationSource:
             if term.factors:  # a constant occurs in coefficient 0 only
                 state = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
                 parts.append(replace(term, factors=(state,)).formula)
-        known = self._in_c()
+        known = self._in_c
         return to_c(total(parts), lambda name: known.get(name, name))
 
     @cached_property
@@ -290,10 +275,8 @@ class EquationSource:
 
     def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
-        orientation = self.equation.orientation
-        needed = _needed(orientation, formulas.values())
-        lines = [f"const double {name} = {self._c(orientation[name], orientation)};" for name in needed]
-        return lines + [f"{place} = {self._c(formula, orientation)};" for place, formula in formulas.items()]
+        orientation = _needed(self.equation.orientation, formulas.values())
+        return _statements({**orientation, **formulas}, {place: place for place in formulas}, self._in_c)
 
     def beginning(self) -> list[str]:
         """Return statements for the start.
@@ -301,15 +284,8 @@ class EquationSource:
         They set the delayed commands to their start values, and compute the attitude from its parameters.
         """
         lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
-        local: list[str] = []
-        for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            text = self._c(formula, local)
-            if name in self.layout.state:
-                lines.append(f"at[REF_{name}] = {text};")
-            else:
-                local.append(name)
-                lines.append(f"const double {name} = {text};")
-        return lines
+        formulas = start_formulas() if self.layout.has_attitude else {}
+        return lines + _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
 
     def has_direction(self) -> str:
         """Write the condition that the quaternion is not 0."""
@@ -349,10 +325,18 @@ class EquationSource:
         for name in self.layout.state:
             change = tangent(equation.rates[name], changes.get)
             results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
-        text = _with_changes(given) | {name: name for name in steps}
-        needed = {name: steps[name] for name in _needed(steps, results.values())}
-        lines = [f"const double {name} = {to_c(formula, text.__getitem__)};" for name, formula in needed.items()]
-        return lines + [f"{place} = {to_c(formula, text.__getitem__)};" for place, formula in results.items()]
+        formulas = {**_needed(steps, results.values()), **results}
+        return _statements(formulas, {place: place for place in results}, _with_changes(given))
+
+
+def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], known: Mapping[str, str]) -> list[str]:
+    """Return statements in C. Formulas with a place are assigned to it, and the others are local constants.
+
+    `known` has the C expressions of the names that the formulas contain, besides the local constants.
+    """
+    in_c = {**known, **{name: name for name in formulas if name not in places}}
+    left = {name: places.get(name, f"const double {name}") for name in formulas}
+    return [f"{left[name]} = {to_c(formula, in_c.__getitem__)};" for name, formula in formulas.items()]
 
 
 def _with_changes(variables: Iterable[str]) -> dict[str, str]:
@@ -361,13 +345,13 @@ def _with_changes(variables: Iterable[str]) -> dict[str, str]:
     return found | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
 
 
-def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> list[str]:
-    """Return the names of the formulas that some expressions need, in the order of the formulas."""
+def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> dict[str, Expression]:
+    """Return the formulas that some expressions need, in their order."""
     needed = set().union(*(formula.names for formula in wanted))
     for name in reversed(list(formulas)):
         if name in needed:
             needed |= formulas[name].names
-    return [name for name in formulas if name in needed]
+    return {name: formula for name, formula in formulas.items() if name in needed}
 
 
 def generated_sources(layout: Layout) -> dict[str, str]:

@@ -20,44 +20,25 @@ from typing import Any, TypeAlias
 Real: TypeAlias = "Expression | float"
 
 
+def _operator(op: str) -> "Callable[[Expression, Real], Operation]":
+    return lambda self, other: Operation(op, (self, of(other)))
+
+
+def _from_right(op: str) -> "Callable[[Expression, Real], Operation]":
+    return lambda self, other: Operation(op, (of(other), self))
+
+
 class Expression:
     """A number, a name or an operation. Two expressions are equal if they are built alike."""
 
-    def __add__(self, other: Real) -> "Operation":
-        return Operation("+", (self, of(other)))
-
-    def __radd__(self, other: Real) -> "Operation":
-        return of(other) + self
-
-    def __sub__(self, other: Real) -> "Operation":
-        return Operation("-", (self, of(other)))
-
-    def __rsub__(self, other: Real) -> "Operation":
-        return of(other) - self
-
-    def __mul__(self, other: Real) -> "Operation":
-        return Operation("*", (self, of(other)))
-
-    def __rmul__(self, other: Real) -> "Operation":
-        return of(other) * self
-
-    def __truediv__(self, other: Real) -> "Operation":
-        return Operation("/", (self, of(other)))
-
-    def __rtruediv__(self, other: Real) -> "Operation":
-        return of(other) / self
+    __add__, __radd__ = _operator("+"), _from_right("+")
+    __sub__, __rsub__ = _operator("-"), _from_right("-")
+    __mul__, __rmul__ = _operator("*"), _from_right("*")
+    __truediv__, __rtruediv__ = _operator("/"), _from_right("/")
+    __lt__, __gt__, __ge__ = _operator("<"), _operator(">"), _operator(">=")
 
     def __neg__(self) -> "Operation":
         return Operation("neg", (self,))
-
-    def __lt__(self, other: Real) -> "Operation":
-        return Operation("<", (self, of(other)))
-
-    def __gt__(self, other: Real) -> "Operation":
-        return Operation(">", (self, of(other)))
-
-    def __ge__(self, other: Real) -> "Operation":
-        return Operation(">=", (self, of(other)))
 
     @cached_property
     def names(self) -> frozenset[str]:

@@ -93,7 +93,7 @@ def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
-        loss = _by_direction(command, curve, "d") * call("abs", command)
+        loss = by_direction(command, curve, "d") * call("abs", command)
         found[names("loss", name).identifier] = loss if share == 1.0 else loss * share
     if curve.tables and share != 1.0:
         force = force * share
@@ -101,7 +101,7 @@ def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     return found | {steady_name(name, curve, names).identifier: force + 0.0}
 
 
-def _by_direction(command: Name, curve: Curve, key: str) -> Expression:
+def by_direction(command: Name, curve: Curve, key: str) -> Expression:
     """Return the coefficient of a curve for the direction of a thruster's command."""
     return directed(command, Name(curve.coefficient(key)), Name(curve.coefficient(key + REVERSE)))
 
@@ -129,7 +129,7 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     m is the part of the command beyond the dead band.
     """
     command, beyond, size = (names(kind, name) for kind in ("command", "beyond", "magnitude"))
-    a_t, b_t, c_0 = (_by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
+    a_t, b_t, c_0 = (by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
     has_dead_band = "c_0" in curve.keys
     magnitude = (a_t * beyond + b_t) * beyond
     force = directed(command, size, minus(size))

@@ -6,11 +6,10 @@ factor stands before a bracket. The page leaves out only the saturation of comma
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import groupby, permutations
+from itertools import groupby
 
 from markupsafe import escape
 
-from rov_fmu.model.attitude import rotation_formulas
 from rov_fmu.model.equation import ONE, Equation, equation_of, load_along, mass_matrix
 from rov_fmu.model.expression import (
     FUNCTIONS,
@@ -21,7 +20,6 @@ from rov_fmu.model.expression import (
     Operation,
     beyond_dead_band,
     call,
-    directed,
     product,
     replaced,
     scaled,
@@ -30,20 +28,14 @@ from rov_fmu.model.expression import (
 )
 from rov_fmu.model.forces import forces_of
 from rov_fmu.model.layout import (
-    AXIS,
-    BODY,
-    CURVE,
-    RESTORING,
     REVERSE,
-    TUNING,
     YAW,
     Curve,
     Layout,
     Thruster,
     VehicleAxis,
-    cross_name,
 )
-from rov_fmu.model.thrust import steady_name
+from rov_fmu.model.thrust import by_direction, steady_name
 from rov_fmu.report.templates import RAISED, number
 
 
@@ -184,8 +176,7 @@ def _steady(thruster: str, curve: Curve, equation: Equation) -> Expression:
     """Return the steady thrust of a thruster as one writes it: with |c| c in place of a choice by the sign of c."""
     names = equation.names
     c, m = names("command", thruster), names("beyond", thruster)
-    keys = [(curve.coefficient(key), curve.coefficient(key + REVERSE)) for key in ("a_t", "b_t", "c_0")]
-    a_t, b_t, c_0 = (directed(c, Name(ahead), Name(astern)) for ahead, astern in keys)
+    a_t, b_t, c_0 = (by_direction(c, curve, key) for key in ("a_t", "b_t", "c_0"))
     if curve.tables:
         force: Expression = Name(curve.coefficient("k_t")) * names("table", thruster)
     elif "c_0" in curve.keys:
@@ -318,27 +309,28 @@ def _product(x: Expression) -> Product:  # noqa: PLR0911 - a case for each opera
 # ---- Written ---------------------------------------------------------------------------------------------------------
 
 
+_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"}
+
+
+def symbol_of(identifier: str) -> Symbol:
+    """Return the symbol of a name without the name of a part: a letter and its indices, as in m_a_u or alpha_u."""
+    letter, *indices = identifier.removesuffix(REVERSE).split("_")
+    index, upper = (*indices, "", "")[:2]
+    return Symbol(_GREEK.get(letter, letter), index, upper, "−" if identifier.endswith(REVERSE) else "")
+
+
 def symbols(layout: Layout) -> dict[str, Symbol]:
-    """Return the symbol of every name in the equations of a vehicle."""
+    """Return the symbol of every name in the equations of a vehicle that contains the name of a part."""
     names = equation_of(layout).names
-    found = {name: Symbol(name) for name in (*layout.velocities, *layout.pose)}
-    found |= {"phi": Symbol("φ"), "theta": Symbol("θ"), "psi": Symbol("ψ"), "eta": Symbol("η")}
-    found |= {f"epsilon_{n}": Symbol("ε", f"{n}") for n in (1, 2, 3)}
-    found |= {name: Symbol(*name.split("_", 1)) for name in (*layout.inputs, *BODY, *RESTORING, *rotation_formulas())}
-    found |= {"R": Symbol("R"), "gamma": Symbol("γ")}
-    for key, *velocities in layout.cross:
-        name = cross_name(key, *velocities)
-        letter, _, rest = name.partition("_")
-        found[name] = Symbol(letter, *rest.split("_"))
-    found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
+    found = {names("battery").identifier: Symbol("U")}
     mark = "d" if layout.has_dead_time else ""
-    found |= {
-        names("fraction", name).identifier: Symbol("u", name.removeprefix("u_"), mark) for name in layout.commands
-    }
-    found |= {names("battery").identifier: Symbol("U"), "T_d": Symbol("T", "d")}
+    for name in layout.commands:
+        own = name.removeprefix("u_")
+        found |= {name: Symbol("u", own), names("fraction", name).identifier: Symbol("u", own, mark)}
+    found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
     for fin in layout.fins:
         found[names("angle", fin.name).identifier] = Symbol("δ", fin.name)
-        found |= {fin.coefficient(key): Symbol(letter, fin.name) for key, letter in (("lift", "l"), ("drag", "d"))}
+        found |= {fin.coefficient(key): Symbol(key[0], fin.name) for key in ("lift", "drag")}
         found[fin.coefficient("angle_max")] = Symbol("δ", "max", fin.name)
     for t in layout.thrusters:
         letters = {"command": "c", "beyond": "m", "loss": "k"}
@@ -347,24 +339,11 @@ def symbols(layout: Layout) -> dict[str, Symbol]:
         found[names("steady", t.name).identifier] = Symbol("F", t.name, mark="*")
     for curve in layout.curves:
         found[f"tau_{curve.name}"] = Symbol("τ", curve.name)
-        found |= {curve.coefficient(key): _coefficient(key, curve.name) for key in CURVE if key in curve.keys}
-    for form in layout.axes:
-        v = form.axis.velocity
-        found |= {form.coefficient(key): _coefficient(key, v) for key in AXIS if key in form.keys}
-        found |= {form.axis.coefficient(key): Symbol({"alpha": "α", "beta": "β"}[key], v) for key in TUNING}
-        found[f"M_{v}"] = Symbol("M", v)
-    found |= {f"m_{a}{b}": Symbol("m", f"{a}{b}") for a, b in permutations("uvwpqr", 2)}
+        for key in curve.keys:  # a_t of the curve rear has the index t below and rear above; T has only rear below
+            symbol = symbol_of(key)
+            above = {"upper": curve.name} if symbol.index else {"index": curve.name}
+            found[curve.coefficient(key)] = replace(symbol, **above)
     return found
-
-
-def _coefficient(key: str, owner: str) -> Symbol:
-    """Return the symbol of a coefficient of a curve or an axis.
-
-    a_t of the curve rear is the letter a with the index t below and rear above; T has only the index below.
-    """
-    letter, _, index = key.removesuffix(REVERSE).partition("_")
-    mark = "−" if key.endswith(REVERSE) else ""
-    return Symbol(letter, index, owner, mark) if index else Symbol(letter, owner, "", mark)
 
 
 class Text:
@@ -434,11 +413,11 @@ class Text:
         """Write a factor. Raises ValueError if there is no way to show it."""
         match x:
             case Name(identifier):
-                return self.symbol(self._symbols[identifier])
+                return self.symbol(self.symbol_of(identifier))
             case Number(value):
                 return self.write("number", number(value, 4))
             case Operation("directed", (_, Name(identifier), _)):
-                return self.symbol(replace(self._symbols[identifier], mark="±"))
+                return self.symbol(replace(self.symbol_of(identifier), mark="±"))
             case Operation("dead band", (beyond, _, force)):
                 return self.write("cases", self.factor(beyond), self.sum(force), self.sum(Number(0.0)))
             case Operation("+" | "-"):
@@ -448,6 +427,10 @@ class Text:
             case Operation(function, (argument,)) if function in FUNCTIONS:
                 return self.write("function", function, self.sum(argument))
         raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
+
+    def symbol_of(self, identifier: str) -> Symbol:
+        """Return the symbol of a name."""
+        return self._symbols.get(identifier) or symbol_of(identifier)
 
     def write(self, form: str, *parts: object) -> str:
         """Fill the parts into one of the forms."""
