@@ -9,8 +9,8 @@ from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
-from rov_fmu.model.expression import PYTHON, Expression, Name, Number, change_of, tangent, to_c, total, written
-from rov_fmu.model.layout import Layout
+from rov_fmu.model.expression import PYTHON, Expression, Name, Number, change_of, scaled, tangent, to_c, total, written
+from rov_fmu.model.layout import HEAVE, Layout
 
 
 class EquationSource:
@@ -159,6 +159,13 @@ class EquationSource:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
         known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, known.__getitem__)
+
+    def alone(self, velocity: str, *effects: str, sign: int = 1) -> str:
+        """Write the sum of the coefficients of some effects that an axis has while only it moves and all is level."""
+        level = [(entry(3, 3),)] if velocity == HEAVE.velocity else []
+        own = [(), (velocity,), (velocity, velocity), *level]
+        terms = [term for term in self.equation.rows[velocity] if term.effect in effects and term.factors in own]
+        return to_c(total(scaled(sign, term.coefficient) for term in terms), self._in_c.__getitem__)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:

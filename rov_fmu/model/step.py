@@ -184,7 +184,7 @@ class Motion:
 
     def rotation(self, y: Sequence[float]) -> dict[str, float]:
         """Return the entries of the rotation matrix by name."""
-        return {name: y[self.table.place[name]] for name in self.table.equation.orientation if name.startswith("R_")}
+        return {name: y[self.table.place[name]] for name in self.table.equation.orientation if name in self.table.place}
 
     # ---- Settled states ----
 
