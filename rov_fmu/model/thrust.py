@@ -12,6 +12,7 @@ from .expression import (
     equal,
     minus,
     of,
+    product,
     saturated,
     scaled,
     total,
@@ -86,19 +87,23 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
 
 def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
-    share = 1.0 / curve.together
-    command = names("command", name)
+    command, share = names("command", name), _share(curve)
     found, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
-        loss = by_direction(command, curve, "d") * call("abs", command)
-        found[names("loss", name).identifier] = loss if share == 1.0 else loss * share
-    if curve.tables and share != 1.0:
-        force = force * share
+        loss = product(by_direction(command, curve, "d"), call("abs", command), *share)
+        found[names("loss", name).identifier] = loss
+    if curve.tables:
+        force = product(force, *share)
     # + 0 makes 0.0 of -0.0
     return found | {steady_name(name, curve, names).identifier: force + 0.0}
+
+
+def _share(curve: Curve) -> tuple[float, ...]:
+    """Return the factor for one of the thrusters that a curve describes together, if there are several."""
+    return (1.0 / curve.together,) if curve.together != 1 else ()
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:
@@ -131,9 +136,8 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     command, beyond, size = (names(kind, name) for kind in ("command", "beyond", "magnitude"))
     a_t, b_t, c_0 = (by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
     has_dead_band = "c_0" in curve.keys
-    magnitude = (a_t * beyond + b_t) * beyond
     force = directed(command, size, minus(size))
     return {
         beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: magnitude if curve.together == 1 else magnitude * (1.0 / curve.together),
+        size.identifier: product(a_t * beyond + b_t, beyond, *_share(curve)),
     }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force
