@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import Any
 
 from rov_fmu.model.equation import Equation, equation_of
-from rov_fmu.model.formula import branchless, compiled, names
-from rov_fmu.model.layout import Layout, ThrustTable, delayed_name
+from rov_fmu.model.expression import ARRAYS, Expression, Name, compiled
+from rov_fmu.model.layout import Layout, ThrustTable, cubic, delayed_name
 
 Functions = Mapping[str, Callable[..., Any]]
 """The functions of a library that formulas may call: sin, cos, sqrt, pow, where, both, either; and `interval`.
@@ -31,9 +31,8 @@ def force_names(layout: Layout) -> tuple[str, ...]:
     commands: the loads from outside (X_ext …) and the current (V_N …).
     """
     equation = equation_of(layout)
-    used = {
-        name for formula in (*_before_rates(equation).values(), *equation.rates.values()) for name in names(formula)
-    }
+    formulas = (*_before_rates(equation).values(), *equation.rates.values())
+    used = frozenset().union(*(formula.names for formula in formulas))
     return tuple(name for name in (*equation.thrust, *layout.inputs) if name in used)
 
 
@@ -59,7 +58,7 @@ _Known = tuple[tuple[str, Callable[..., Any]], ...]
 def _rates(layout: Layout, functions: _Known) -> Callable[[Values], dict[str, Any]]:
     equation = equation_of(layout)
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
-    return compiled(_branchless({**_before_rates(equation), **rates}), dict(functions))
+    return compiled({**_before_rates(equation), **rates}, dict(functions), ARRAYS)
 
 
 @lru_cache(maxsize=_FORMULAS)
@@ -67,17 +66,13 @@ def _thrust(layout: Layout, functions: _Known) -> Callable[[Values], dict[str, A
     known = dict(functions)
     equation = equation_of(layout)
     tables = {name: _table_force(table, known["interval"]) for name, table in equation.tables.items()}
-    delayed = {delayed_name(name): name for name in layout.commands} if layout.has_dead_time else {}
-    return compiled(_branchless({**delayed, **equation.thrust}), {**known, **tables})
+    delayed = {delayed_name(name): Name(name) for name in layout.commands} if layout.has_dead_time else {}
+    return compiled({**delayed, **equation.thrust}, {**known, **tables}, ARRAYS)
 
 
-def _before_rates(equation: Equation) -> dict[str, str]:
+def _before_rates(equation: Equation) -> dict[str, Expression]:
     """Return the formulas from coefficients, states and forces to the numbers in the rates."""
     return {name: formula for name, formula in equation.program.items() if name not in equation.thrust}
-
-
-def _branchless(formulas: Mapping[str, str]) -> dict[str, str]:
-    return {name: branchless(formula) for name, formula in formulas.items()}
 
 
 def _table_force(table: ThrustTable, interval: Callable[..., Any]) -> Callable[[Any], Any]:
@@ -88,7 +83,6 @@ def _table_force(table: ThrustTable, interval: Callable[..., Any]) -> Callable[[
     def force(command: Any) -> Any:
         low, f, slope, high, g, slope_after = interval(command, table.commands, columns)
         h = high - low
-        t, a, b = (command - low) / h, h * slope, h * slope_after
-        return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+        return cubic(f, g, h * slope, h * slope_after, (command - low) / h)
 
     return force

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.equation import Equation, equation_of
-from rov_fmu.model.formula import CHANGE, SLOPE, compiled, tangent
+from rov_fmu.model.expression import Expression, Name, change_of, compiled, slope_name, tangent
 from rov_fmu.model.layout import Layout, delayed_name
 from rov_fmu.model.rov import Rov
 from rov_fmu.model.step import ORDER, Motion, Series, Table, usable_time
@@ -72,19 +72,19 @@ def step_jacobian(
 
 
 class _Formulas:
-    """The compiled derivatives of the formulas of a layout. `CHANGE` begins the names of the changes."""
+    """The compiled derivatives of the formulas of a layout."""
 
     def __init__(self, layout: Layout, coefficients: tuple[str, ...]) -> None:
         equation = equation_of(layout)
         self.layout, self.table, self.coefficients = layout, Table(equation), coefficients
         changing = [*layout.inputs, *layout.state, *layout.delayed, *coefficients]
-        given = {name: f"{CHANGE}{name}" for name in changing}
+        given = {name: change_of(name) for name in changing}
         formulas = {**equation.program, **equation.forces, **self.table.coefficient_formulas}
         self.held_formulas, self.held = _with_tangents(formulas, given, equation)
         lagging = {force: after for force, (_, after) in equation.lagging.items()}
-        progress = {name: f"{CHANGE}{name}" for name in equation.lags}
+        progress = {name: change_of(name) for name in equation.lags}
         self.lag_formulas, _ = _with_tangents(lagging, {**self.held, **given, **progress}, equation)
-        moved = {name: f"{CHANGE}{name}" for name in equation.states}
+        moved = {name: change_of(name) for name in equation.states}
         self.end_formulas, self.finished = _with_tangents(equation.ends, {**given, **moved}, equation)
         pairs = self.table.products
         self.first = np.array([pair[0] for pair in pairs], int)
@@ -102,19 +102,23 @@ class _Formulas:
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
 
 
+def _change(name: str) -> str:
+    return change_of(name).identifier
+
+
 def _with_tangents(
-    formulas: Mapping[str, str], changing: Mapping[str, str], equation: Equation
-) -> tuple[Callable[[Mapping[str, object]], dict[str, object]], dict[str, str]]:
+    formulas: Mapping[str, Expression], changing: Mapping[str, Name], equation: Equation
+) -> tuple[Callable[[Mapping[str, object]], dict[str, object]], dict[str, Name]]:
     """Compile formulas together with their changes. Return also the names of the changes, by name."""
     changes = dict(changing)
-    both: dict[str, str] = {}
+    both: dict[str, Expression] = {}
     for name, formula in formulas.items():
         if change := tangent(formula, changes.get):
-            both[f"{CHANGE}{name}"] = change  # before the formula, which may overwrite a value that the change needs
-            changes[name] = f"{CHANGE}{name}"
+            changes[name] = change_of(name)
+            both[changes[name].identifier] = change  # before the formula, which may overwrite a value that it needs
         both[name] = formula
-    slopes = {f"{SLOPE}{name}": table.slope for name, table in equation.tables.items()}
-    return compiled(both, {**equation.measured, **slopes}), changes  # type: ignore[return-value]
+    slopes = {slope_name(name): table.slope for name, table in equation.tables.items()}
+    return compiled(both, {**equation.measured, **slopes}), changes
 
 
 class _Tangents(Motion):
@@ -132,7 +136,7 @@ class _Tangents(Motion):
         names = [*layout.state, *layout.inputs, *formulas.coefficients]
         unit = dict(zip(names, np.eye(len(names)), strict=True))
         unit |= {name: unit[command] for name, command in zip(delayed, layout.commands, strict=False)}
-        self.changes: dict[str, Array] = {f"{CHANGE}{name}": change for name, change in unit.items()}
+        self.changes: dict[str, Array] = {_change(name): change for name, change in unit.items()}
         self.zero = np.zeros(len(names))
         super().__init__(formulas.table, {**rov.coefficients, **given})
         found = self._at({})
@@ -144,7 +148,7 @@ class _Tangents(Motion):
         return self.formulas.held_formulas({**self.values, **more, **self.changes})
 
     def _change(self, found: Mapping[str, object], name: str) -> Array:
-        return np.asarray(found.get(f"{CHANGE}{name}", self.changes.get(f"{CHANGE}{name}", self.zero)), float)
+        return np.asarray(found.get(_change(name), self.changes.get(_change(name), self.zero)), float)
 
     def hold(self) -> None:
         """Compute the coefficients and their derivatives for both directions of the velocities."""
@@ -210,10 +214,10 @@ class _Tangents(Motion):
         """Update the forces that lag, the coefficients, and the derivatives of both."""
         states = self.table.states
         values = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
-        changes = {f"{CHANGE}{name}": self.d[self.table.place[name]] for name in values}
+        changes = {_change(name): self.d[self.table.place[name]] for name in values}
         steady = self._at({})
         found = self.formulas.lag_formulas({**steady, **values, **changes})
-        self.changes |= {f"{CHANGE}{force}": self._change(found, force) for force in self.table.equation.lagging}
+        self.changes |= {_change(force): self._change(found, force) for force in self.table.equation.lagging}
         for name in values:
             self.d[states.index(name)] = 0.0
         super().arrive()
@@ -222,14 +226,14 @@ class _Tangents(Motion):
         """Return the states of the vehicle by name, and their derivatives."""
         equation, layout = self.table.equation, self.formulas.layout
         place = self.table.place
-        starts = {f"{CHANGE}{name}": row for name, row in zip(layout.state, np.eye(len(self.zero)), strict=False)}
-        rows = {name: self.changes[f"{CHANGE}{name}"] for name in equation.lagging}
+        starts = {_change(name): row for name, row in zip(layout.state, np.eye(len(self.zero)), strict=False)}
+        rows = {name: self.changes[_change(name)] for name in equation.lagging}
         for name, n in place.items():
             if name in layout.state:
-                rows[name] = self.d[n] + (0.0 if name in equation.starts else starts[f"{CHANGE}{name}"])
+                rows[name] = self.d[n] + (0.0 if name in equation.starts else starts[_change(name)])
         if equation.ends:
             moved = {name: self.y[n] for name, n in place.items()} | {
-                f"{CHANGE}{name}": self.d[n] for name, n in place.items()
+                _change(name): self.d[n] for name, n in place.items()
             }
             found = self.formulas.end_formulas({**self.start, **starts, **moved})
             rows |= {name: self._change(found, f"next_{name}") for name in QUATERNION}

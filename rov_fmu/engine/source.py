@@ -1,6 +1,7 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 
@@ -8,8 +9,8 @@ from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
-from rov_fmu.model.formula import CHANGE, names, tangent, to_c
-from rov_fmu.model.layout import Layout
+from rov_fmu.model.expression import PYTHON, Expression, Name, Number, change_of, scaled, tangent, to_c, total, written
+from rov_fmu.model.layout import HEAVE, Layout
 
 
 class EquationSource:
@@ -22,26 +23,21 @@ class EquationSource:
 
     # ---- Names ----
 
-    def _in_c(self, local: Iterable[str] = ()) -> dict[str, str]:
-        """Return the C expression for every name that a formula may contain. `local` are names of local constants."""
+    @cached_property
+    def _in_c(self) -> dict[str, str]:
+        """The C expression for every name that a formula may contain."""
         equation = self.equation
         found = {name: f"at[REF_{name}]" for name in self.variables}
         found |= {name: f"n->{name}" for name in equation.parameters}
         found |= {name: f"q->{name}" for name in self.held_names()}
-        found |= {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
-        return found | {name: name for name in local}
-
-    def _c(self, formula: str, local: Iterable[str] = ()) -> str:
-        """Write a formula in C."""
-        known = self._in_c(local)
-        return to_c(formula, lambda name: known[name])
+        return found | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
 
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
         equation = self.equation
         later = [*equation.forces.values(), *equation.outputs.values()]
         later += [formula for both in equation.lagging.values() for formula in both]
-        used = {name for formula in later for name in names(formula)} | {*self.layout.calculated}
+        used = frozenset(self.layout.calculated).union(*(formula.names for formula in later))
         lasting = [name for name in equation.thrust if name in used]
         return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
 
@@ -49,28 +45,19 @@ class EquationSource:
 
     def parameters(self) -> list[str]:
         """Return statements that compute the numbers that follow from the coefficients alone."""
-        lines = [f"n->{name} = {self._c(formula)};" for name, formula in self.equation.parameters.items()]
-        for name, directed in self.equation.directed.items():
-            lines += [f"n->{name}[0] = {self._c(directed.forward)};", f"n->{name}[1] = {self._c(directed.reverse)};"]
-        return lines
+        both = {name: (d.forward, d.reverse) for name, d in self.equation.directed.items()}
+        sides = {f"{name}[{n}]": formula for name, pair in both.items() for n, formula in enumerate(pair)}
+        formulas = {**self.equation.parameters, **sides}
+        return _statements(formulas, {name: f"n->{name}" for name in formulas}, self._in_c)
 
     def thrust(self) -> list[str]:
         """Return statements that compute the steady thrust."""
-        lines: list[str] = []
-        local: list[str] = []
-        held = self.held_names()
-        for name in _needed(self.equation.thrust, held):
-            text = self._c(self.equation.thrust[name], local)
-            if name in held:
-                lines.append(f"q->{name} = {text};")
-            else:
-                local.append(name)
-                lines.append(f"const double {name} = {text};")
-        return lines
+        held = {name: f"q->{name}" for name in self.held_names()}
+        return _statements(_needed(self.equation.thrust, map(Name, held)), held, self._in_c)
 
     def forces(self) -> list[str]:
         """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
-        return [f"q->{name} = {self._c(formula)};" for name, formula in self.equation.forces.items()]
+        return _statements(self.equation.forces, self._in_c, self._in_c)
 
     def directions(self) -> list[tuple[str, int]]:
         """Return each coefficient that depends on a direction, with the index of its velocity in `monitored`."""
@@ -79,11 +66,9 @@ class EquationSource:
     def starts(self) -> list[str]:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
-        local = [name for name in starts if name not in states]
-        lines = [f"const double {name} = {self._c(starts[name], local)};" for name in local]
-        for name in states:
-            lines.append(f"y[Y_{name}] = {self._c(starts[name], local) if name in starts else '0.0'};")
-        return lines
+        local = {name: formula for name, formula in starts.items() if name not in states}
+        first = {name: starts.get(name, Number(0.0)) for name in states}
+        return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
 
     def lagging_curves(self) -> list[tuple[str, list[str]]]:
         """Return each curve with lag, and the names of its thrusters."""
@@ -147,15 +132,15 @@ class EquationSource:
 
     def attitude(self) -> list[str]:
         """Return statements that set the quaternion to that of the rotation matrix in y."""
-        ends, place = self.equation.ends, {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
-        known = place | {name: name for name in ends} | {entry: f"y[Y_{entry}]" for entry in self.equation.orientation}
-        lines = [f"const double {name} = {to_c(formula, known.__getitem__)};" for name, formula in ends.items()]
-        return [*lines, *(f"{place[name]} = next_{name};" for name in QUATERNION)]
+        places = {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
+        known = places | {entry: f"y[Y_{entry}]" for entry in self.equation.orientation}
+        after: dict[str, Expression] = {name: Name(f"next_{name}") for name in QUATERNION}
+        return _statements({**self.equation.ends, **after}, places, known)
 
     def rotation(self) -> list[str]:
         """Return statements that set the rotation matrix in y to that of the quaternion."""
         entries = [name for name in self.equation.states if name in self.equation.orientation]
-        return self._results({f"y[Y_{name}]": name for name in entries})
+        return self._results({f"y[Y_{name}]": Name(name) for name in entries})
 
     # ---- Rates and terms ----
 
@@ -170,10 +155,17 @@ class EquationSource:
     def _rate(self, terms: Sequence[Term]) -> str:
         return self._by_states(rate_formula(terms))
 
-    def _by_states(self, formula: str) -> str:
+    def _by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
-        known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
-        return to_c(formula, lambda name: known[name])
+        known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
+        return to_c(formula, known.__getitem__)
+
+    def alone(self, velocity: str, *effects: str, sign: int = 1) -> str:
+        """Write the sum of the coefficients of some effects that an axis has while only it moves and all is level."""
+        level = [(entry(3, 3),)] if velocity == HEAVE.velocity else []
+        own = [(), (velocity,), (velocity, velocity), *level]
+        terms = [term for term in self.equation.rows[velocity] if term.effect in effects and term.factors in own]
+        return to_c(total(scaled(sign, term.coefficient) for term in terms), self._in_c.__getitem__)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
@@ -232,18 +224,13 @@ class EquationSource:
 
     def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
-        text = ""
+        parts = []
         for term in self.equation.rows[name]:
-            if not term.factors:
-                continue  # a constant occurs in coefficient 0 only
-            factors = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
-            coefficient = term.coefficient.removeprefix("-")
-            product = factors if coefficient == "1" else f"{self._c(coefficient)} * {factors}"
-            if term.coefficient.startswith("-"):
-                text += f" - {product}" if text else f"-{product}"
-            else:
-                text += f" + {product}" if text else product
-        return text or "0.0"
+            if term.factors:  # a constant occurs in coefficient 0 only
+                state = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
+                parts.append(replace(term, factors=(state,)).formula)
+        known = self._in_c
+        return to_c(total(parts), lambda name: known.get(name, name))
 
     @cached_property
     def component_of(self) -> dict[str, int]:
@@ -293,12 +280,10 @@ class EquationSource:
         """Return statements that assign the outputs that follow from the states."""
         return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
 
-    def _results(self, formulas: Mapping[str, str]) -> list[str]:
+    def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
-        orientation = self.equation.orientation
-        needed = _needed(orientation, {name for formula in formulas.values() for name in names(formula)})
-        lines = [f"const double {name} = {self._c(orientation[name], orientation)};" for name in needed]
-        return lines + [f"{place} = {self._c(formula, orientation)};" for place, formula in formulas.items()]
+        orientation = _needed(self.equation.orientation, formulas.values())
+        return _statements({**orientation, **formulas}, {place: place for place in formulas}, self._in_c)
 
     def beginning(self) -> list[str]:
         """Return statements for the start.
@@ -306,15 +291,8 @@ class EquationSource:
         They set the delayed commands to their start values, and compute the attitude from its parameters.
         """
         lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
-        local: list[str] = []
-        for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            text = self._c(formula, local)
-            if name in self.layout.state:
-                lines.append(f"at[REF_{name}] = {text};")
-            else:
-                local.append(name)
-                lines.append(f"const double {name} = {text};")
-        return lines
+        formulas = start_formulas() if self.layout.has_attitude else {}
+        return lines + _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
 
     def has_direction(self) -> str:
         """Write the condition that the quaternion is not 0."""
@@ -323,16 +301,16 @@ class EquationSource:
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
-        text = {name: f"at[REF_{name}]" for name in self.layout.initial}
-        text |= {f"{CHANGE}{name}": f"d[REF_{name}]" for name in self.layout.initial}
+        text = _with_changes(self.layout.initial)
         lines: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            change = to_c(tangent(formula, lambda n: f"{CHANGE}{n}") or "0", text.__getitem__)
+            change = to_c(tangent(formula, change_of) or Number(0.0), text.__getitem__)
             if name in self.layout.state:
                 lines.append(f"d[REF_{name}] += {change};")
             else:
-                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {CHANGE}{name} = {change};")
-                text.update({name: name, f"{CHANGE}{name}": f"{CHANGE}{name}"})
+                changed = change_of(name).identifier
+                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {changed} = {change};")
+                text |= {name: name, changed: changed}
         return lines
 
     def tangent_lines(self) -> list[str]:
@@ -342,39 +320,51 @@ class EquationSource:
         """
         equation = self.equation
         given = self.variables - {*self.layout.calculated}
-        text = {name: f"at[REF_{name}]" for name in given}
-        text |= {f"{CHANGE}{name}": f"d[REF_{name}]" for name in given}
-        steps: dict[str, str] = {}
-
-        def change_of(name: str) -> str | None:
-            return f"{CHANGE}{name}" if name in given or f"{CHANGE}{name}" in steps else None
-
+        changes = {name: change_of(name) for name in given}
+        steps: dict[str, Expression] = {}
         for name, formula in {**equation.program, **equation.outputs}.items():
             steps[name] = formula
-            if change := tangent(formula, change_of):
-                steps[f"{CHANGE}{name}"] = change
-        results = {f"d[REF_{name}]": f"{CHANGE}{name}" for name in self.layout.calculated if f"{CHANGE}{name}" in steps}
+            if change := tangent(formula, changes.get):
+                changes[name] = change_of(name)
+                steps[changes[name].identifier] = change
+        calculated = [name for name in self.layout.calculated if name in changes]
+        results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
-            results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
-        needed = _needed(steps, {name for formula in results.values() for name in names(formula)})
-        text |= {name: name for name in steps}
-        lines = [f"const double {name} = {to_c(steps[name], lambda n: text[n])};" for name in needed]
-        return lines + [f"{place} = {to_c(formula, lambda n: text[n])};" for place, formula in results.items()]
+            change = tangent(equation.rates[name], changes.get)
+            results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
+        formulas = {**_needed(steps, results.values()), **results}
+        return _statements(formulas, {place: place for place in results}, _with_changes(given))
 
 
-def _needed(formulas: Mapping[str, str], wanted: Iterable[str]) -> list[str]:
-    """Return the names of the formulas that the wanted ones need, themselves included, in the order of the formulas."""
-    needed = set(wanted)
+def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], known: Mapping[str, str]) -> list[str]:
+    """Return statements in C. Formulas with a place are assigned to it, and the others are local constants.
+
+    `known` has the C expressions of the names that the formulas contain, besides the local constants.
+    """
+    in_c = {**known, **{name: name for name in formulas if name not in places}}
+    left = {name: places.get(name, f"const double {name}") for name in formulas}
+    return [f"{left[name]} = {to_c(formula, in_c.__getitem__)};" for name, formula in formulas.items()]
+
+
+def _with_changes(variables: Iterable[str]) -> dict[str, str]:
+    """Return the C expressions of variables and of their changes, by their names."""
+    found = {name: f"at[REF_{name}]" for name in variables}
+    return found | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
+
+
+def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> dict[str, Expression]:
+    """Return the formulas that some expressions need, in their order."""
+    needed = set().union(*(formula.names for formula in wanted))
     for name in reversed(list(formulas)):
         if name in needed:
-            needed |= {*names(formulas[name])}
-    return [name for name in formulas if name in needed]
+            needed |= formulas[name].names
+    return {name: formula for name, formula in formulas.items() if name in needed}
 
 
 def generated_sources(layout: Layout) -> dict[str, str]:
     """Return the generated files of a vehicle, model.h and equation.h, by their names."""
     source = EquationSource(layout)
-    formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
+    formulas = {name: written(rate_formula(terms), PYTHON) for name, terms in source.equation.rows.items()}
     sizes = {
         "inputs": len(layout.inputs),
         "states": len(layout.state),

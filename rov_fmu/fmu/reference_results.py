@@ -5,7 +5,7 @@ published tables if the vehicle has them; and a manoeuvre of all axes. The expec
 Python, and not with the C code that they prove.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 
@@ -13,8 +13,8 @@ from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, start_formulas
 from rov_fmu.model.delay import DelayLine
-from rov_fmu.model.equation import equation_of
-from rov_fmu.model.formula import compiled
+from rov_fmu.model.equation import Term, equation_of
+from rov_fmu.model.expression import Name, compiled
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
@@ -175,7 +175,7 @@ def _horizon(rov: Rov, inputs: Values) -> float:
         if form.axis.is_rotation and isfinite(V):
             rates.append(abs(V))
         if rov.layout.coupled and isfinite(V) and not rov.layout.has_attitude:
-            couplings = (abs(x) for name, x in rov.parameters.items() if name.startswith("coupling_"))
+            couplings = (abs(k) for _, k in _terms(rov, rov.layout.velocities, "coupling"))
             rates.append(_COUPLING_FACTOR * sum(couplings) * abs(V))
     if rov.layout.has_attitude:
         rates.append(_coupling_rate(rov, inputs))
@@ -185,9 +185,16 @@ def _horizon(rov: Rov, inputs: Values) -> float:
 
 def _swings(rov: Rov) -> list[float]:
     """Return the angular frequencies of the oscillations by restoring forces (1/s)."""
+    rotations = [form.axis.velocity for form in rov.layout.axes if form.axis.is_rotation]
+    return [sqrt(abs(k)) for _, k in _terms(rov, rotations, "restoring")]
+
+
+def _terms(rov: Rov, velocities: Iterable[str], *effects: str) -> Iterator[tuple[Term, float]]:
+    """Yield the terms of some effects in the accelerations along axes, and the values of their coefficients."""
     rows = equation_of(rov.layout).rows
-    terms = [term for form in rov.layout.axes if form.axis.is_rotation for term in rows[form.axis.velocity]]
-    return [sqrt(abs(rov.parameters[t.coefficient])) for t in terms if t.coefficient.startswith("restoring_")]
+    for term in (term for v in velocities for term in rows[v]):
+        if term.effect in effects and isinstance(term.coefficient, Name):
+            yield term, rov.parameters[term.coefficient.identifier]
 
 
 def _coupling_rate(rov: Rov, inputs: Values) -> float:
@@ -202,11 +209,10 @@ def _coupling_rate(rov: Rov, inputs: Values) -> float:
         size[v] = root[v] * abs(V) if isfinite(root[v] * V) else 0.0
     changes = []
     for v in rov.layout.velocities:
-        for term in equation_of(rov.layout).rows[v]:
-            if term.coefficient.startswith(("coupling_", "lift_")):
-                a, b = term.factors
-                k = rov.parameters[term.coefficient] * root[v] / (root[a] * root[b])
-                changes += [k * size[a], k * size[b]]
+        for term, value in _terms(rov, [v], "coupling", "lift"):
+            a, b = term.factors
+            k = value * root[v] / (root[a] * root[b])
+            changes += [k * size[a], k * size[b]]
     return hypot(*(x for x in changes if isfinite(x)))
 
 

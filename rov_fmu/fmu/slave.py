@@ -15,7 +15,7 @@ from typing import Any
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.model import attitude, delay, formula, layout, rov
+from rov_fmu.model import attitude, delay, expression, layout, rov
 
 _TOO_LATE = "must not be set after the initialization"
 
@@ -65,7 +65,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         inputs, states = len(self.layout.inputs), len(self.layout.state)
         self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.calculated))
         self.place = {v["name"]: place for place, v in enumerate(self.declared)}
-        self.begin = formula.compiled(attitude.start_formulas())
+        self.begin = expression.compiled(attitude.start_formulas())
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
         self._set_attitude()
         self.time = 0.0

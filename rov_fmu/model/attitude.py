@@ -7,8 +7,9 @@ contains the rotation matrix R from the body frame to the earth frame instead: R
 from collections.abc import Mapping, Sequence
 from math import atan2, isfinite, nan, tau
 
-from .formula import joined
+from .expression import Expression, Name, call, directed, scaled, total, where
 
+Formulas = dict[str, Expression]
 QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
 """The quaternion from the body frame to the earth frame."""
 _RATES = {1: "p", 2: "q", 3: "r"}
@@ -19,12 +20,12 @@ def entry(row: int, column: int) -> str:
     return f"R_{row}{column}"
 
 
-def rotation_terms(row: int, velocities: frozenset[str]) -> dict[str, list[tuple[str, tuple[str, str]]]]:
+def rotation_terms(row: int, velocities: frozenset[str]) -> dict[str, list[tuple[float, tuple[str, str]]]]:
     """Return the terms of R' = R S(omega) for the entries of a row: signs and factors."""
     found = {}
     for column in (1, 2, 3):
         following, last = column % 3 + 1, (column + 1) % 3 + 1
-        terms = [("1", (_RATES[last], entry(row, following))), ("-1", (_RATES[following], entry(row, last)))]
+        terms = [(1.0, (_RATES[last], entry(row, following))), (-1.0, (_RATES[following], entry(row, last)))]
         found[entry(row, column)] = [term for term in terms if term[1][0] in velocities]
     return found
 
@@ -59,21 +60,21 @@ def unwrapped_heading(psi: float, values: Mapping[str, float], near: float) -> f
     return unwrapped(psi, turned_heading(values, near))
 
 
-def rotation_formulas() -> dict[str, str]:
+def rotation_formulas() -> Formulas:
     """Return formulas from the quaternion, which need not have length 1, to the entries of the rotation matrix."""
-    e, a, b, c = QUATERNION
-    n = "square_length"
+    e, a, b, c = map(Name, QUATERNION)
+    n = Name("square_length")
     return {
-        n: " + ".join(f"{name} * {name}" for name in QUATERNION),
-        "R_11": f"({e} * {e} + {a} * {a} - {b} * {b} - {c} * {c}) / {n}",
-        "R_12": f"2 * ({a} * {b} - {c} * {e}) / {n}",
-        "R_13": f"2 * ({a} * {c} + {b} * {e}) / {n}",
-        "R_21": f"2 * ({a} * {b} + {c} * {e}) / {n}",
-        "R_22": f"({e} * {e} - {a} * {a} + {b} * {b} - {c} * {c}) / {n}",
-        "R_23": f"2 * ({b} * {c} - {a} * {e}) / {n}",
-        "R_31": f"2 * ({a} * {c} - {b} * {e}) / {n}",
-        "R_32": f"2 * ({b} * {c} + {a} * {e}) / {n}",
-        "R_33": f"({e} * {e} - {a} * {a} - {b} * {b} + {c} * {c}) / {n}",
+        n.identifier: e * e + a * a + b * b + c * c,
+        "R_11": (e * e + a * a - b * b - c * c) / n,
+        "R_12": 2.0 * (a * b - c * e) / n,
+        "R_13": 2.0 * (a * c + b * e) / n,
+        "R_21": 2.0 * (a * b + c * e) / n,
+        "R_22": (e * e - a * a + b * b - c * c) / n,
+        "R_23": 2.0 * (b * c - a * e) / n,
+        "R_31": 2.0 * (a * c - b * e) / n,
+        "R_32": 2.0 * (b * c + a * e) / n,
+        "R_33": (e * e - a * a - b * b + c * c) / n,
     }
 
 
@@ -81,94 +82,99 @@ INITIAL = {"phi_0": "Roll angle φ", "theta_0": "Pitch angle θ", "psi_0": "Head
 """The Euler angles at the start, from which the quaternion follows."""
 
 
-def start_formulas() -> dict[str, str]:
+def start_formulas() -> Formulas:
     """Return formulas from the Euler angles at the start to the quaternion."""
-    half: dict[str, str] = {}
+    half: Formulas = {}
     # cp and sp are the cosine and the sine of half of phi_0; t is for theta_0 and s for psi_0
-    for letter, angle in zip("pts", INITIAL, strict=True):
-        half |= {f"c{letter}": f"cos(0.5 * {angle})", f"s{letter}": f"sin(0.5 * {angle})"}
+    for letter, angle in zip("pts", map(Name, INITIAL), strict=True):
+        half |= {f"c{letter}": call("cos", 0.5 * angle), f"s{letter}": call("sin", 0.5 * angle)}
+    cp, sp, ct, st, cs, ss = map(Name, half)
     return half | {
-        "eta": "cp * ct * cs + sp * st * ss",
-        "epsilon_1": "sp * ct * cs - cp * st * ss",
-        "epsilon_2": "cp * st * cs + sp * ct * ss",
-        "epsilon_3": "cp * ct * ss - sp * st * cs",
+        "eta": cp * ct * cs + sp * st * ss,
+        "epsilon_1": sp * ct * cs - cp * st * ss,
+        "epsilon_2": cp * st * cs + sp * ct * ss,
+        "epsilon_3": cp * ct * ss - sp * st * cs,
     }
 
 
-def start_angle_formulas() -> dict[str, str]:
+def start_angle_formulas() -> Formulas:
     """Return formulas from the Euler angles at the start to the rotation matrix and to theta.
 
     The formulas by way of the quaternion give the same numbers, but their names do not tell which angle matters.
     """
-    (cp, ct, cs), (sp, st, ss) = ([f"{function}({angle})" for angle in INITIAL] for function in ("cos", "sin"))
+    (cp, ct, cs), (sp, st, ss) = ([call(function, Name(angle)) for angle in INITIAL] for function in ("cos", "sin"))
     return {
-        "R_11": f"{cs} * {ct}",
-        "R_12": f"{cs} * {st} * {sp} - {ss} * {cp}",
-        "R_13": f"{cs} * {st} * {cp} + {ss} * {sp}",
-        "R_21": f"{ss} * {ct}",
-        "R_22": f"{ss} * {st} * {sp} + {cs} * {cp}",
-        "R_23": f"{ss} * {st} * {cp} - {cs} * {sp}",
-        "R_31": f"-{st}",
-        "R_32": f"{ct} * {sp}",
-        "R_33": f"{ct} * {cp}",
-        "theta": f"atan2({st}, abs({ct}))",
+        "R_11": cs * ct,
+        "R_12": cs * st * sp - ss * cp,
+        "R_13": cs * st * cp + ss * sp,
+        "R_21": ss * ct,
+        "R_22": ss * st * sp + cs * cp,
+        "R_23": ss * st * cp - cs * sp,
+        "R_31": -st,
+        "R_32": ct * sp,
+        "R_33": ct * cp,
+        "theta": call("atan2", st, call("abs", ct)),
     }
 
 
-def quaternion_rates(velocities: frozenset[str]) -> dict[str, str]:
+def quaternion_rates(velocities: frozenset[str]) -> Formulas:
     """Return formulas for the time derivatives of the quaternion."""
     e, a, b, c = QUATERNION
     products = {
-        e: (("-", a, "p"), ("-", b, "q"), ("-", c, "r")),
-        a: (("", e, "p"), ("", b, "r"), ("-", c, "q")),
-        b: (("", e, "q"), ("", c, "p"), ("-", a, "r")),
-        c: (("", e, "r"), ("", a, "q"), ("-", b, "p")),
+        e: ((-1, a, "p"), (-1, b, "q"), (-1, c, "r")),
+        a: ((1, e, "p"), (1, b, "r"), (-1, c, "q")),
+        b: ((1, e, "q"), (1, c, "p"), (-1, a, "r")),
+        c: ((1, e, "r"), (1, a, "q"), (-1, b, "p")),
     }
     found = {}
     for name, terms in products.items():
-        parts = [f"{sign}{factor} * {rate}" for sign, factor, rate in terms if rate in velocities]
-        found[name] = f"0.5 * ({joined(parts)})" if parts else "0"
+        parts = [scaled(sign, Name(factor) * Name(rate)) for sign, factor, rate in terms if rate in velocities]
+        found[name] = 0.5 * total(parts) if parts else total(())
     return found
 
 
-def quaternion_formulas() -> dict[str, str]:
+def quaternion_formulas() -> Formulas:
     """Return formulas from the rotation matrix to the quaternion. Of its two signs, the one nearer to the old is taken.
 
     The matrix 4 q q^T has the rows below. The quaternion is the row with the largest entry on the diagonal, divided by
     its length (Shepperd, Quaternion from rotation matrix, Journal of Guidance and Control, 1978).
     """
-    diagonal = (
-        "1 + R_11 + R_22 + R_33",
-        "1 + R_11 - R_22 - R_33",
-        "1 - R_11 + R_22 - R_33",
-        "1 - R_11 - R_22 + R_33",
-    )
-    found = {f"square_{n}": formula for n, formula in enumerate(diagonal)}
-    others = {
-        (0, 1): "R_32 - R_23",
-        (0, 2): "R_13 - R_31",
-        (0, 3): "R_21 - R_12",
-        (1, 2): "R_12 + R_21",
-        (1, 3): "R_13 + R_31",
-        (2, 3): "R_23 + R_32",
+    R = {(i, j): Name(entry(i, j)) for i in (1, 2, 3) for j in (1, 2, 3)}
+    found: Formulas = {
+        "square_0": 1.0 + R[1, 1] + R[2, 2] + R[3, 3],
+        "square_1": 1.0 + R[1, 1] - R[2, 2] - R[3, 3],
+        "square_2": 1.0 - R[1, 1] + R[2, 2] - R[3, 3],
+        "square_3": 1.0 - R[1, 1] - R[2, 2] + R[3, 3],
     }
-    found["larger_01"] = "square_0 if square_0 >= square_1 else square_1"
-    found["larger_23"] = "square_2 if square_2 >= square_3 else square_3"
+    square = [*map(Name, found)]
+    others = {
+        (0, 1): R[3, 2] - R[2, 3],
+        (0, 2): R[1, 3] - R[3, 1],
+        (0, 3): R[2, 1] - R[1, 2],
+        (1, 2): R[1, 2] + R[2, 1],
+        (1, 3): R[1, 3] + R[3, 1],
+        (2, 3): R[2, 3] + R[3, 2],
+    }
+    is_early, is_late = square[0] >= square[1], square[2] >= square[3]
+    found["larger_01"] = where(is_early, square[0], square[1])
+    found["larger_23"] = where(is_late, square[2], square[3])
     for n in range(4):
-        row = [f"square_{n}" if k == n else f"({others[min(k, n), max(k, n)]})" for k in range(4)]
-        found[f"first_{n}"] = f"{row[0]} if square_0 >= square_1 else {row[1]}"
-        found[f"second_{n}"] = f"{row[2]} if square_2 >= square_3 else {row[3]}"
-        found[f"row_{n}"] = f"first_{n} if larger_01 >= larger_23 else second_{n}"
-    agreement = " + ".join(f"row_{n} * {name}" for n, name in enumerate(QUATERNION))
-    found["length"] = "sqrt(" + " + ".join(f"row_{n} * row_{n}" for n in range(4)) + ")"
-    found["divisor"] = f"-length if {agreement} < 0 else length"
-    return found | {f"next_{name}": f"row_{n} / divisor" for n, name in enumerate(QUATERNION)}
+        row = [square[n] if k == n else others[min(k, n), max(k, n)] for k in range(4)]
+        found[f"first_{n}"] = where(is_early, row[0], row[1])
+        found[f"second_{n}"] = where(is_late, row[2], row[3])
+        found[f"row_{n}"] = where(Name("larger_01") >= Name("larger_23"), Name(f"first_{n}"), Name(f"second_{n}"))
+    rows, length = [Name(f"row_{n}") for n in range(4)], Name("length")
+    agreement = total(row * Name(name) for row, name in zip(rows, QUATERNION, strict=True))
+    found["length"] = call("sqrt", total(row * row for row in rows))
+    found["divisor"] = directed(agreement, length, -length)
+    return found | {f"next_{name}": row / Name("divisor") for row, name in zip(rows, QUATERNION, strict=True)}
 
 
-def angle_formulas() -> dict[str, str]:
+def angle_formulas() -> Formulas:
     """Return formulas for the Euler angles phi, theta and psi (zyx). psi lies between -pi and pi."""
+    R_11, R_21, R_31, R_32, R_33 = map(Name, ("R_11", "R_21", "R_31", "R_32", "R_33"))
     return {
-        "phi": "atan2(R_32, R_33)",
-        "theta": "atan2(-R_31, sqrt(R_32 * R_32 + R_33 * R_33))",
-        "psi": "atan2(R_21, R_11)",
+        "phi": call("atan2", R_32, R_33),
+        "theta": call("atan2", -R_31, call("sqrt", R_32 * R_32 + R_33 * R_33)),
+        "psi": call("atan2", R_21, R_11),
     }

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from .attitude import QUATERNION, start_angle_formulas, start_formulas
 from .equation import equation_of
-from .formula import CHANGE, names, tangent
+from .expression import Expression, change_of, tangent
 from .layout import Layout
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
@@ -29,11 +29,11 @@ def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
     for known in (*layout.inputs, *layout.state):
         kind_of_slope = {known: 0}  # the derivative of the known itself is 1
         for name, formula in formulas.items():
-            changing = {other: f"{CHANGE}{other}" for other in names(formula) if other in kind_of_slope}
+            changing = {other: change_of(other) for other in formula.names if other in kind_of_slope}
             slope = tangent(formula, changing.get) if changing else None
             if slope is not None:
-                inner = kinds | {word: kind_of_slope[other] for other, word in changing.items()}
-                kind_of_slope[name] = slopes[name][known] = max(inner[word] for word in names(slope))
+                inner = kinds | {change.identifier: kind_of_slope[other] for other, change in changing.items()}
+                kind_of_slope[name] = slopes[name][known] = max(inner[word] for word in slope.names)
     return {name: {known: KINDS[kind] for known, kind in slopes[name].items()} for name in _calculated(layout)}
 
 
@@ -47,7 +47,7 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
         formulas = start_formulas() | formulas | start_angle_formulas()
     found: dict[str, set[str]] = {}
     for name, formula in formulas.items():
-        found[name] = set().union(*(found.get(other, {other}) for other in names(formula)))
+        found[name] = set().union(*(found.get(other, {other}) for other in formula.names))
     parameters = (*layout.coefficients, *layout.initial)
     calculated = (*_calculated(layout), *(name for name in QUATERNION if name in layout.state))
     return {name: tuple(p for p in parameters if p in found[name]) for name in calculated}
@@ -57,18 +57,18 @@ def _calculated(layout: Layout) -> tuple[str, ...]:
     return (*(f"der({name})" for name in layout.state), *layout.calculated)
 
 
-def _formulas(layout: Layout) -> dict[str, str]:
+def _formulas(layout: Layout) -> dict[str, Expression]:
     """Return all formulas of a vehicle. Each uses only inputs, states, parameters and formulas before it."""
     equation = equation_of(layout)
     return equation.program | {f"der({name})": equation.rates[name] for name in layout.state} | dict(equation.outputs)
 
 
-def _kinds(layout: Layout, formulas: Mapping[str, str]) -> dict[str, int]:
+def _kinds(layout: Layout, formulas: Mapping[str, Expression]) -> dict[str, int]:
     """Return for each name its kind as a factor, which is an index of KINDS."""
     found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
     found |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
     for name, declaration in layout.coefficients.items():
         found[name] = KINDS.index("tunable" if declaration.tunable else "fixed")
     for name, formula in formulas.items():
-        found[name] = max((found[other] for other in names(formula)), default=0)
+        found[name] = max((found[other] for other in formula.names), default=0)
     return found

@@ -11,32 +11,37 @@ an entry in `starts`, and its row must come before those of the states that no t
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
+from .expression import Expression, Name, Names, call, directed, of, product, scaled, total
 from .forces import Force, forces_of
-from .formula import joined, weighted
 from .layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, ThrustTable, VehicleAxis, cross_name
 from .mass import MassMatrix
-from .thrust import thrust_formulas
+from .thrust import steady_name, thrust_formulas
 
 
 @dataclass(frozen=True)
 class Term:
     """A term in the rate of a state: a coefficient alone, or a coefficient times one or two states."""
 
-    coefficient: str
-    """A number or the name of a formula, possibly with a minus before it."""
+    coefficient: Expression
     factors: tuple[str, ...] = ()
     """The states that are multiplied with the coefficient."""
+    effect: str = ""
+    """The name of the effect of a force, as in forces.py, or "coupling"."""
 
     @property
-    def formula(self) -> str:
+    def formula(self) -> Expression:
         """The term as a formula."""
-        if self.factors and self.coefficient in ("1", "-1"):
-            return self.coefficient[:-1] + " * ".join(self.factors)
-        return " * ".join((self.coefficient, *self.factors))
+        states = map(Name, self.factors)
+        if self.factors and self.coefficient in (ONE, -ONE):
+            return scaled(1.0 if self.coefficient == ONE else -1.0, product(*states))
+        return product(self.coefficient, *states)
+
+
+ONE = of(1.0)
 
 
 @dataclass(frozen=True)
@@ -44,34 +49,32 @@ class Directed:
     """A coefficient that depends on the direction of a velocity. Every term with it contains that velocity."""
 
     velocity: str
-    forward: str
+    forward: Expression
     """The formula for a positive velocity."""
-    reverse: str
+    reverse: Expression
     """The formula for a negative velocity."""
 
     @property
-    def formula(self) -> str:
+    def formula(self) -> Expression:
         """One formula for both directions."""
-        if self.forward == self.reverse:
-            return self.forward
-        return f"{self.reverse} if {self.velocity} < 0 else {self.forward}"
+        return directed(Name(self.velocity), self.forward, self.reverse)
 
 
 @dataclass(frozen=True)
 class Equation:
     """The equation of motion of a vehicle. Formulas are evaluated in their order, and each may use those before it."""
 
-    parameters: Mapping[str, str]
+    parameters: Mapping[str, Expression]
     """Formulas for the numbers that follow from the coefficients alone."""
     directed: Mapping[str, Directed]
     """The coefficients that depend on the direction of a velocity."""
-    thrust: Mapping[str, str]
+    thrust: Mapping[str, Expression]
     """Formulas from the commands to the steady thrust of every thruster."""
-    forces: Mapping[str, str]
+    forces: Mapping[str, Expression]
     """Formulas for torques and other outputs, and for the accelerations that are constant while the inputs are held."""
     rows: Mapping[str, tuple[Term, ...]]
     """The terms in the rate of every state of the table."""
-    starts: Mapping[str, str]
+    starts: Mapping[str, Expression]
     """Formulas from the states of the vehicle to the states of the table at the start of a step, and `square_length`,
     which some of them use. States without a formula start at 0. These are the integrals, which no term contains, and
     the progress of the lags. A state that a term contains must have a formula."""
@@ -80,12 +83,14 @@ class Equation:
 
     The progress p rises from 0 towards 1 during a piece of a step, and each force is then F + (steady - F) p."""
 
-    outputs: Mapping[str, str] = field(default_factory=dict)
+    outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas."""
-    ends: Mapping[str, str] = field(default_factory=dict)
+    ends: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
     tables: Mapping[str, ThrustTable] = field(default_factory=dict)
     """The thrust tables that the formulas call, by their names."""
+    names: Names = field(default_factory=Names)
+    """The names of the quantities of the equation."""
 
     @cached_property
     def measured(self) -> dict[str, Callable[[float], float]]:
@@ -98,12 +103,12 @@ class Equation:
         return tuple(self.rows)
 
     @cached_property
-    def lagging(self) -> dict[str, tuple[str, str]]:
+    def lagging(self) -> dict[str, tuple[Expression, Expression]]:
         """For each force that lags: the formulas of its rate, and of its value after a piece of a step."""
         return {
             force: (
-                f"{self.rows[progress][0].coefficient} * ({steady} - {force})",
-                f"{force} + ({steady} - {force}) * {progress}",
+                self.rows[progress][0].coefficient * (Name(steady) - Name(force)),
+                Name(force) + (Name(steady) - Name(force)) * Name(progress),
             )
             for progress, forces in self.lags.items()
             for force, steady in forces.items()
@@ -167,23 +172,24 @@ class Equation:
         return self.components[: last + 1]
 
     @cached_property
-    def orientation(self) -> dict[str, str]:
+    def orientation(self) -> dict[str, Expression]:
         """Formulas for the orientation in the table.
 
         It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
         """
-        return {name: formula for name, formula in self.starts.items() if name != formula}
+        return {name: formula for name, formula in self.starts.items() if formula != Name(name)}
 
     @cached_property
-    def program(self) -> dict[str, str]:
+    def program(self) -> dict[str, Expression]:
         """All formulas from the inputs, states and coefficients of a vehicle to the numbers in its thrust and rates."""
         directed = {name: d.formula for name, d in self.directed.items()}
-        by_lag = {term.coefficient for terms in self.rows.values() for term in terms if self._is_lag(term)}
+        lags = [term.coefficient.names for terms in self.rows.values() for term in terms if self._is_lag(term)]
+        by_lag = frozenset().union(*lags)
         forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
         return {**self.parameters, **directed, **self.orientation, **self.thrust, **forces}
 
     @cached_property
-    def rates(self) -> dict[str, str]:
+    def rates(self) -> dict[str, Expression]:
         """The time derivative of each state of the vehicle, as a formula of its states and of `program`."""
         found = {name: rate for name, (rate, _) in self.lagging.items()}
         for name, terms in self.rows.items():
@@ -203,88 +209,53 @@ class Equation:
         return tuple(name for name in self.states if name in found)
 
 
-def rate_formula(terms: Iterable[Term]) -> str:
-    """Write the rate of a state as one formula."""
-    return joined(term.formula for term in terms) or "0"
-
-
-def equation_of(layout: Layout) -> Equation:
-    """Return the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics.
-
-    Raises ValueError when the names of parts of the vehicle clash.
-    """
-    for name, reason in name_clashes(layout):
-        raise ValueError(f"{name}: {reason}")
-    return _equation_of(layout)
+def rate_formula(terms: Iterable[Term]) -> Expression:
+    """Return the rate of a state as one formula."""
+    return total(term.formula for term in terms)
 
 
 @lru_cache(maxsize=100)
-def name_clashes(layout: Layout) -> tuple[tuple[str, str], ...]:
-    """Return each name that two variables or formulas of a vehicle would have, with the reason.
+def equation_of(layout: Layout) -> Equation:
+    """Return the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics.
 
-    The names of variables and formulas are made of the names of the vehicle's parts, and two of them may be equal:
-    angle_max_rudder is the largest angle of the fin rudder and the angle of the fin max_rudder. To know the part behind
-    each name, the equation is made of a layout whose parts have placeholders as names, which are then filled.
+    Raises ValueError when two thrust tables have the same name.
     """
-    parts: list[tuple[str, str]] = []
-
-    def placeholder(kind: str, name: str) -> str:
-        parts.append((kind, name))
-        return f"{{{len(parts) - 1}}}"
-
-    def part_of(name: str) -> int:
-        return max((n for n in range(len(parts)) if f"{{{n}}}" in name), default=-1)
-
-    twin = layout.renamed(placeholder)
-    equation = _equation_of(twin)
-    variables = twin.inputs | twin.state | twin.calculated | twin.delayed | twin.coefficients | twin.initial
-    names = [*variables, *equation.program, *equation.forces, *equation.rows, *equation.ends, *equation.outputs]
-    names += equation.tables  # the names of slopes and changes begin as no other name does
-    origin: dict[str, str] = {}
-    found: list[tuple[tuple[int, int], str, str]] = []
-    for name in dict.fromkeys(names):
-        filled = name.format(*(part for _, part in parts))
-        other = origin.setdefault(filled, name)
-        if other != name:
-            first, last = sorted((name, other), key=part_of)
-            if part_of(first) >= 0:
-                rest = "one of {}.{}".format(*parts[part_of(first)])
-            else:
-                rest = variables[first].description if first in variables else "one of every vehicle with these effects"
-            pair, are_variables = (part_of(last), part_of(first)), {name, other} <= variables.keys()
-            if not are_variables and any(pair == known for known, *_ in found):
-                continue
-            what = "variables of the FMU" if are_variables else "quantities of the equation"
-            part = "{}.{}".format(*parts[part_of(last)])
-            found.append((pair, filled, f"two {what} would have this name, one of {part} and {rest}; rename a part"))
-    return tuple((filled, reason) for _, filled, reason in found)
-
-
-def _equation_of(layout: Layout) -> Equation:
-    mass = _mass(layout)
-    parameters = _parameters(layout, mass)
-    directed: dict[str, Directed] = {}
-    held = _held_forces(layout, mass)
+    measured = [table for curve in layout.curves for table in curve.tables]
+    tables = {table.function: table for table in measured}
+    if len(tables) < len(measured):
+        raise ValueError("two thrust tables have the same name")
+    by_attitude = rotation_formulas() | quaternion_formulas() if layout.has_attitude else {}
+    names = Names([*layout.places, *by_attitude])
+    mass = mass_matrix(layout, names)
+    parameters = _parameters(layout, mass, names)
+    by_direction: dict[str, Directed] = {}
+    held = _held_forces(layout, mass, names)
     rows: dict[str, tuple[Term, ...]] = {}
     for v in layout.velocities:
-        lagging = _lagging(layout, mass, v)
-        terms = [Term(f"held_{v}"), *(Term(f"remaining_{v}_{curve}", (f"progress_{curve}",)) for curve in lagging)]
-        for name, force in _accelerations(layout, mass, v).items():
-            coefficient = name
-            if force.velocity and force.is_held:
-                held[name] = force.coefficient
-                directed[f"direction_{force.velocity}"] = Directed(force.velocity, "1", "-1")
-                coefficient = f"direction_{force.velocity} * {name}"
-            elif force.velocity:
-                directed[name] = Directed(force.velocity, force.coefficient, force.reverse)
+        terms = [Term(names("held", v))]
+        terms += [
+            Term(names("remaining", v, curve), (names("progress", curve).identifier,))
+            for curve in _lagging(layout, mass, v)
+        ]
+        for name, forces in _accelerations(layout, mass, v, names).items():
+            first = forces[0][1]
+            ahead, astern = (total(f.along(one, reverse=reverse) for one, f in forces) for reverse in (False, True))
+            coefficient: Expression = name
+            if first.velocity and first.is_held:
+                held[name.identifier] = ahead
+                direction = names("direction", first.velocity)
+                by_direction[direction.identifier] = Directed(first.velocity, ONE, -ONE)
+                coefficient = direction * name
+            elif first.velocity:
+                by_direction[name.identifier] = Directed(first.velocity, ahead, astern)
             else:
-                (held if force.is_held else parameters)[name] = force.coefficient
-            terms.append(Term(coefficient, force.factors))
+                (held if first.is_held else parameters)[name.identifier] = ahead
+            terms.append(Term(coefficient, first.factors, first.effect))
         coriolis = mass.coriolis(v) if layout.coupled else {}
         for factors, formula in coriolis.items():
-            name = f"coupling_{v}" if len(coriolis) == 1 else f"coupling_{v}_{''.join(factors)}"
-            parameters[name] = formula
-            terms.append(Term(name, factors))
+            name = names("coupling", v, *([] if len(coriolis) == 1 else ["".join(factors)]))
+            parameters[name.identifier] = formula
+            terms.append(Term(name, factors, "coupling"))
         rows[v] = tuple(terms)
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
@@ -292,173 +263,167 @@ def _equation_of(layout: Layout) -> Equation:
     lags: dict[str, dict[str, str]] = {}
     for curve in layout.curves:
         if curve.has_lag:
-            progress = f"progress_{curve.name}"
-            rows[progress] = (Term(f"rate_{curve.name}"), Term(f"-rate_{curve.name}", (progress,)))
-            lags[progress] = {f"F_{t.name}": f"steady_{t.name}" for t in layout.thrusters if t.curve == curve.name}
+            progress, rate = names("progress", curve.name).identifier, names("rate", curve.name)
+            rows[progress] = (Term(rate), Term(-rate, (progress,)))
+            own = [t.name for t in layout.thrusters if t.curve == curve.name]
+            lags[progress] = {f"F_{name}": steady_name(name, curve, names).identifier for name in own}
     rows |= attitude
-    rows |= _kinematics(layout)
-    starts = {v: v for v in layout.velocities}
+    rows |= _kinematics(layout, names)
+    starts: dict[str, Expression] = {v: Name(v) for v in layout.velocities}
     if "cos_psi" in rows:
-        starts |= {"cos_psi": "cos(psi)", "sin_psi": "sin(psi)"}
+        starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     if layout.has_attitude:
         starts |= rotation_formulas()
     return Equation(
         parameters,
-        directed,
-        thrust_formulas(layout),
+        by_direction,
+        thrust_formulas(layout, names),
         held,
         rows,
         starts,
         lags,
         outputs=angle_formulas() if layout.has_attitude else {},
         ends=quaternion_formulas() if layout.has_attitude else {},
-        tables={table.function: table for curve in layout.curves for table in curve.tables},
+        tables=tables,
+        names=names,
     )
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
 
 
-def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, Force]:
-    """Return the forces as accelerations of an axis, by the names of their coefficients.
+def _accelerations(layout: Layout, mass: MassMatrix, axis: str, names: Names) -> dict[Name, list[tuple[Name, Force]]]:
+    """Return the forces that accelerate an axis, by the names of their coefficients, each with its inverse mass.
 
     A force along another axis accelerates this one through the inverse of the mass matrix. Forces with the same effect
     and the same factors are added. They must agree in `velocity` and `is_held`.
     """
     inverse = mass.inverse(axis)
-    sums: dict[str, list[Force]] = {}
-    for force in forces_of(layout):
+    found: dict[Name, list[tuple[Name, Force]]] = {}
+    for force in forces_of(layout, names):
         if force.axis in inverse:
             others = dict.fromkeys(factor for factor in force.factors if factor != axis or force.effect not in _DRAG)
-            sums.setdefault("_".join((force.effect, axis, *others)), []).append(force)
-    found = {}
-    for name, forces in sums.items():
-        forward = joined(_acceleration(inverse[force.axis], force.coefficient) for force in forces)
-        reverse = joined(_acceleration(inverse[force.axis], force.reverse or force.coefficient) for force in forces)
-        found[name] = replace(forces[0], axis=axis, coefficient=forward, reverse=reverse)
+            found.setdefault(names(force.effect, axis, *others), []).append((inverse[force.axis], force))
     return found
 
 
 _DRAG = ("linear", "quadratic")
 
 
-def _acceleration(inverse: str, coefficient: str) -> str:
-    """Write an acceleration: an acceleration per load times a load, which may begin with a minus."""
-    sign = "-" if coefficient.startswith("-") else ""
-    return f"{sign}{inverse} * {coefficient.removeprefix('-')}"
-
-
-def _mass(layout: Layout) -> MassMatrix:
+def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
     """Return the mass matrix with the tuning of (18)."""
-    gains = {}
+    gains: dict[str, Expression] = {}
     for form in layout.axes:
-        axis = form.axis
-        inertia = f"({axis.inertia} + {form.coefficient('m_a')})" if "m_a" in form.keys else axis.inertia
-        gains[axis.velocity] = f"{axis.coefficient('beta')} / {inertia}"
-    parts: dict[tuple[str, str], list[str]] = {}
+        inertia: Expression = Name(form.axis.inertia)
+        if "m_a" in form.keys:
+            inertia = inertia + Name(form.coefficient("m_a"))
+        gains[form.axis.velocity] = Name(form.axis.coefficient("beta")) / inertia
+    parts: dict[tuple[str, str], list[Expression]] = {}
     for key, *axes in layout.cross:
         if key == "m_a":
-            parts.setdefault((axes[0], axes[1]), []).append(cross_name(key, *axes))
+            parts.setdefault((axes[0], axes[1]), []).append(Name(cross_name(key, *axes)))
     # with the coupling, momentum along an axis that the vehicle lacks still acts on its other axes
     moves = layout.coupled and layout.has(SURGE, SWAY, HEAVE)
     for pair, (sign, coordinate) in _OF_CENTRE.items():
         present = [axis for axis in pair if axis in gains]
         if coordinate in layout.restoring and (len(present) == 2 or (present and moves)):
-            parts.setdefault(pair, []).append(f"{sign}m_rov * {coordinate}")
+            parts.setdefault(pair, []).append(scaled(sign, Name("m_rov") * Name(coordinate)))
     entries = {}
     for pair, sums in parts.items():
-        betas = " * ".join(f"beta_{axis}" for axis in pair if axis in gains)
-        entries[pair] = f"({joined(sums)}) / sqrt({betas})"
-    return MassMatrix(gains, entries)
+        betas = product(*(Name(f"beta_{axis}") for axis in pair if axis in gains))
+        entries[pair] = total(sums) / call("sqrt", betas)
+    return MassMatrix(gains, entries, names)
 
 
 _OF_CENTRE = {
-    ("u", "q"): ("", "z_G"),
-    ("u", "r"): ("-", "y_G"),
-    ("v", "p"): ("-", "z_G"),
-    ("v", "r"): ("", "x_G"),
-    ("w", "p"): ("", "y_G"),
-    ("w", "q"): ("-", "x_G"),
+    ("u", "q"): (1, "z_G"),
+    ("u", "r"): (-1, "y_G"),
+    ("v", "p"): (-1, "z_G"),
+    ("v", "r"): (1, "x_G"),
+    ("w", "p"): (1, "y_G"),
+    ("w", "q"): (-1, "x_G"),
 }
 """The entries of the mass matrix that follow from a centre of mass outside the origin, divided by the mass. Each is a
 sign and a coordinate."""
 
 
-def _parameters(layout: Layout, mass: MassMatrix) -> dict[str, str]:
+def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
     """Return formulas for the inverse of the mass matrix (18), the arm (4), the lags' rates, and restoring."""
     found = mass.parameters()
     if layout.has_arm:
-        found["arm"] = "R * sin(gamma)"
+        found[names("arm").identifier] = Name("R") * call("sin", Name("gamma"))
     for curve in layout.curves:
         if curve.has_lag:
-            found[f"rate_{curve.name}"] = f"1 / {curve.coefficient('T')}"
+            found[names("rate", curve.name).identifier] = 1.0 / Name(curve.coefficient("T"))
     if layout.restoring:
-        found["net_weight"] = "W - B"
+        found[names("net_weight").identifier] = Name("W") - Name("B")
         for axis in "xyz":
-            centres = (("W", f"{axis}_G"), ("-B", f"{axis}_B"))
-            found[f"righting_{axis}"] = joined(f"{k} * {c}" for k, c in centres if c in layout.restoring) or "0"
+            moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
+            found[names("righting", axis).identifier] = total(
+                scaled(sign, Name(force) * Name(centre))
+                for sign, force, centre in moments
+                if centre in layout.restoring
+            )
     return found
 
 
-def _held_forces(layout: Layout, mass: MassMatrix) -> dict[str, str]:
+def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
     """Return formulas for the torque of every curve, (4), and for the held accelerations of every axis, (18).
 
     For each curve with a lag, an axis has another formula: the change of acceleration until the thrust is steady.
     """
-    found = {f"tau_{curve.name}": weighted(_torques(layout, curve, "F_{}")) for curve in layout.turning_curves}
-    loads = {form.axis.velocity: _load(layout, form) for form in layout.axes}
+    found = {f"tau_{curve.name}": total(_thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves}
+    loads = {form.axis.velocity: load_along(layout, form, names) for form in layout.axes}
     lagging = [curve for curve in layout.curves if curve.has_lag]
     for form in layout.axes:
         v = form.axis.velocity
         inverse = mass.inverse(v)
-        found[f"held_{v}"] = joined(f"{gain} * ({loads[other]})" for other, gain in inverse.items())
+        found[names("held", v).identifier] = total(gain * loads[other] for other, gain in inverse.items())
         for curve in lagging:
-            changes = {other: _remaining(layout, layout.by_velocity[other].axis, curve) for other in inverse}
-            if any(changes.values()):
-                found[f"remaining_{v}_{curve.name}"] = joined(
-                    f"{inverse[other]} * ({change})" for other, change in changes.items() if change
-                )
+            changes = []
+            for other, gain in inverse.items():
+                axis = layout.by_velocity[other].axis
+                if thrusts := _thrusts(layout, axis, names, curve, remaining=True):
+                    changes.append(gain * (Name(axis.coefficient("alpha")) * total(thrusts)))
+            if changes:
+                found[names("remaining", v, curve.name).identifier] = total(changes)
     for name, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
         if name in layout.pose and current in layout.inputs:
-            found[f"held_{name}"] = current
+            found[names("held", name).identifier] = Name(current)
     return found
 
 
-def _load(layout: Layout, form: VehicleAxis) -> str:
+def load_along(layout: Layout, form: VehicleAxis, names: Names) -> Expression:
     """Return the force along an axis, or the moment about it, that is constant while the inputs are held."""
     axis = form.axis
     if axis is YAW:
-        thrust = [(1.0, f"tau_{curve.name}") for curve in layout.turning_curves]
+        thrust: list[Expression] = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
     else:
-        thrust = [(t.effect(axis), f"F_{t.name}") for t in layout.drivers(axis)]
-    parts = [f"{axis.coefficient('alpha')} * ({weighted(thrust)})"] if thrust else []
-    parts += [axis.external, *([form.coefficient("F_0")] if "F_0" in form.keys else [])]
+        thrust = _thrusts(layout, axis, names)
+    parts: list[Expression] = [Name(axis.coefficient("alpha")) * total(thrust)] if thrust else []
+    parts += [Name(axis.external), *([Name(form.coefficient("F_0"))] if "F_0" in form.keys else [])]
     if axis is HEAVE and layout.restoring and not layout.has_attitude:
-        parts.append("net_weight")
-    return joined(parts)
+        parts.append(names("net_weight"))
+    return total(parts)
 
 
-def _remaining(layout: Layout, axis: Axis, curve: Curve) -> str:
-    """Return the change of the thrust along an axis until a curve's thrust is steady, or an empty text."""
-    change = "(steady_{0} - F_{0})"
-    if axis is YAW:
-        changes = _torques(layout, curve, change)
-    else:
-        drivers = [t for t in layout.drivers(axis) if t.curve == curve.name]
-        changes = [(t.effect(axis), change.format(t.name)) for t in drivers]
-    return f"{axis.coefficient('alpha')} * ({weighted(changes)})" if changes else ""
+def _thrusts(
+    layout: Layout, axis: Axis, names: Names, curve: Curve | None = None, *, remaining: bool = False
+) -> list[Expression]:
+    """Return the thrusts along an axis, or their moments about it: all of them, or only those of a curve.
 
-
-def _torques(layout: Layout, curve: Curve, force: str) -> list[tuple[float, str]]:
-    """Return a weight and a formula for the torque of each thruster of a curve.
-
-    In `force`, {} stands for the name of the thruster.
+    `remaining` gives the changes of these thrusts until they are steady.
     """
     found = []
-    for thruster in layout.drivers(YAW):
-        if thruster.curve == curve.name:
-            by_arm = thruster.position is None and thruster.arm
-            found.append((thruster.effect(YAW), ("arm * " if by_arm else "") + force.format(thruster.name)))
+    for t in layout.drivers(axis):
+        own = layout.curve_of[t.name]
+        if curve in (None, own):
+            force: Expression = Name(f"F_{t.name}")
+            if remaining:
+                force = steady_name(t.name, own, names) - force
+            if axis is YAW and t.position is None and t.arm:
+                force = names("arm") * force
+            found.append(scaled(t.effect(axis), force))
     return found
 
 
@@ -476,11 +441,11 @@ def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
         velocities = frozenset(layout.velocities)
         for row in (1, 2, 3):
             for name, terms in rotation_terms(row, velocities).items():
-                rows[name] = tuple(Term(sign, factors) for sign, factors in terms)
+                rows[name] = tuple(Term(of(sign), factors) for sign, factors in terms)
     return rows
 
 
-def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
+def _kinematics(layout: Layout, names: Names) -> dict[str, tuple[Term, ...]]:
     """Return the rows of the pose, which follows from the velocities and a steady current.
 
     A vehicle without yaw always heads north, so its cos_psi is 1 and its sin_psi is 0.
@@ -490,24 +455,24 @@ def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
         velocities = frozenset(layout.velocities)
         for row, name in enumerate("xyz", 1):
             if name in layout.pose:
-                moving = [Term("1", (v, entry(row, n))) for n, v in enumerate("uvw", 1) if v in velocities]
-                rows[name] = (Term(f"held_{name}"), *moving)
+                moving = [Term(ONE, (v, entry(row, n))) for n, v in enumerate("uvw", 1) if v in velocities]
+                rows[name] = (Term(names("held", name)), *moving)
         return rows
     if layout.has(SURGE, SWAY):
         turns = layout.has(YAW)
         if turns:
-            rows["cos_psi"] = (Term("-1", ("r", "sin_psi")),)
-            rows["sin_psi"] = (Term("1", ("r", "cos_psi")),)
-        north, east = [Term("held_x")], [Term("held_y")]
+            rows["cos_psi"] = (Term(-ONE, ("r", "sin_psi")),)
+            rows["sin_psi"] = (Term(ONE, ("r", "cos_psi")),)
+        north, east = [Term(names("held", "x"))], [Term(names("held", "y"))]
         if layout.has(SURGE):
-            north.append(Term("1", ("u", "cos_psi") if turns else ("u",)))
-            east += [Term("1", ("u", "sin_psi"))] if turns else []
+            north.append(Term(ONE, ("u", "cos_psi") if turns else ("u",)))
+            east += [Term(ONE, ("u", "sin_psi"))] if turns else []
         if layout.has(SWAY):
-            north += [Term("-1", ("v", "sin_psi"))] if turns else []
-            east.append(Term("1", ("v", "cos_psi") if turns else ("v",)))
+            north += [Term(-ONE, ("v", "sin_psi"))] if turns else []
+            east.append(Term(ONE, ("v", "cos_psi") if turns else ("v",)))
         rows["x"], rows["y"] = tuple(north), tuple(east)
     if layout.has(HEAVE):
-        rows["z"] = (Term("1", ("w",)),)
+        rows["z"] = (Term(ONE, ("w",)),)
     if layout.has(YAW):
-        rows["psi"] = (Term("1", ("r",)),)
+        rows["psi"] = (Term(ONE, ("r",)),)
     return rows

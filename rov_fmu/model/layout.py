@@ -13,12 +13,14 @@ which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the c
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sin
+from typing import Any, TypeVar
 
 from .attitude import INITIAL, QUATERNION
+from .expression import unused
 
 # ---- Axes ------------------------------------------------------------------------------------------------------------
 
@@ -308,6 +310,11 @@ LEAST_BETA = 1e-3
 # ---- Layout ----------------------------------------------------------------------------------------------------------
 
 
+def cubic(f: Any, g: Any, a: Any, b: Any, t: Any) -> Any:
+    """Return the cubic between 0 and 1 at t. Its values at the ends are f and g, and its slopes there are a and b."""
+    return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+
+
 @dataclass(frozen=True)
 class ThrustTable:
     """Measured forces of one thruster, with a monotone cubic between the commands."""
@@ -333,7 +340,7 @@ class ThrustTable:
         It is the cubic that has the forces and the slopes at the ends of the interval of the command.
         """
         f, g, a, b, _, t = self._interval(command)
-        return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+        return float(cubic(f, g, a, b, t))
 
     def slope(self, command: float) -> float:
         """Return the derivative of `force` with respect to the command."""
@@ -369,10 +376,12 @@ class Curve:
     """The number of the paper's equation, or another source."""
     tables: tuple[ThrustTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
+    others: tuple[tuple[str, str], ...] = ()
+    """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        return coefficient_name(key if key in self.keys else key.removesuffix(REVERSE), self.name)
+        return _coefficient(self, key, self.name)
 
     @property
     def has_lag(self) -> bool:
@@ -450,10 +459,20 @@ class VehicleAxis:
     axis: Axis
     keys: tuple[str, ...] = ("a_d", "b_d")
     """The keys of AXIS that the vehicle has. It always has α and β."""
+    others: tuple[tuple[str, str], ...] = ()
+    """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        return self.axis.coefficient(key if key in self.keys else key.removesuffix(REVERSE))
+        return _coefficient(self, key, self.axis.velocity)
+
+
+def _coefficient(part: Curve | VehicleAxis, key: str, owner: str) -> str:
+    key = key if key in part.keys else key.removesuffix(REVERSE)
+    return dict(part.others).get(key) or coefficient_name(key, owner)
+
+
+_Part = TypeVar("_Part", Curve, VehicleAxis)
 
 
 @dataclass(frozen=True)
@@ -483,9 +502,28 @@ class Layout:
     pulse: tuple[float, float, float] | None = None
     """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
 
+    def __post_init__(self) -> None:
+        """Name the coefficients. The curves main and main_reverse would both have a coefficient d_main_reverse.
+
+        A name that is taken gets a number, so the names of parts are free.
+        """
+        taken = {*(f"F_{thruster.name}" for thruster in self.thrusters), *(COMMANDS if self.has_dead_time else ())}
+
+        def named(part: _Part, owner: str) -> _Part:
+            others = []
+            for key in part.keys:
+                name = coefficient_name(key, owner)
+                found = unused(name, taken)
+                taken.add(found)
+                others += [(key, found)] if found != name else []
+            return replace(part, others=tuple(others)) if others or part.others else part
+
+        object.__setattr__(self, "axes", tuple(named(form, form.axis.velocity) for form in self.axes))
+        object.__setattr__(self, "curves", tuple(named(curve, curve.name) for curve in self.curves))
+
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
-        wanted = set(names)
+        wanted = set(names) - self.coefficients.keys()
 
         def keys(kinds: Iterable[str], has: tuple[str, ...], of: str) -> tuple[str, ...]:
             return tuple(key for key in kinds if key in has or coefficient_name(key, of) in wanted)
@@ -495,25 +533,6 @@ class Layout:
             axes=tuple(replace(form, keys=keys(AXIS, form.keys, form.axis.velocity)) for form in self.axes),
             curves=tuple(replace(curve, keys=keys(CURVE, curve.keys, curve.name)) for curve in self.curves),
         )
-
-    def renamed(self, rename: Callable[[str, str], str]) -> "Layout":
-        """Return the layout with other names of its parts.
-
-        `rename` is called once for each part with its kind and its name. The kinds are curves, thruster, fin and
-        inputs, as in the vehicle file, and table.
-        """
-        tables = [tuple(replace(table, name=rename("table", table.name)) for table in c.tables) for c in self.curves]
-        curves = [replace(c, name=rename("curves", c.name), tables=t) for c, t in zip(self.curves, tables, strict=True)]
-        curve_of = {old.name: new.name for old, new in zip(self.curves, curves, strict=True)}
-        thrusters = [replace(t, name=rename("thruster", t.name), curve=curve_of[t.curve]) for t in self.thrusters]
-        fins = [replace(fin, name=rename("fin", fin.name)) for fin in self.fins]
-        driven = {old.name: new.name for old, new in zip(self.thrusters, thrusters, strict=True)}
-        driven |= {old.name: new.name for old, new in zip(self.fins, fins, strict=True)}
-        mix = {
-            rename("inputs", name): {driven[one]: gain for one, gain in gains.items()}
-            for name, gains in self.mix.items()
-        }
-        return replace(self, curves=tuple(curves), thrusters=tuple(thrusters), fins=tuple(fins), mix=mix)
 
     # -- lookup --
 

@@ -13,15 +13,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from .formula import joined
+from .expression import Expression, Name, Names, minus, product, scaled, total
 
 _KIRCHHOFF = {
-    "u": (("", "v", "r"), ("-", "w", "q")),
-    "v": (("", "w", "p"), ("-", "u", "r")),
-    "w": (("", "u", "q"), ("-", "v", "p")),
-    "p": (("", "q", "r"), ("-", "r", "q"), ("", "v", "w"), ("-", "w", "v")),
-    "q": (("", "r", "p"), ("-", "p", "r"), ("", "w", "u"), ("-", "u", "w")),
-    "r": (("", "p", "q"), ("-", "q", "p"), ("", "u", "v"), ("-", "v", "u")),
+    "u": ((1, "v", "r"), (-1, "w", "q")),
+    "v": ((1, "w", "p"), (-1, "u", "r")),
+    "w": ((1, "u", "q"), (-1, "v", "p")),
+    "p": ((1, "q", "r"), (-1, "r", "q"), (1, "v", "w"), (-1, "w", "v")),
+    "q": ((1, "r", "p"), (-1, "p", "r"), (1, "w", "u"), (-1, "u", "w")),
+    "r": ((1, "p", "q"), (-1, "q", "p"), (1, "u", "v"), (-1, "v", "u")),
 }
 """For each axis, the products of a momentum and a velocity: the sign, the axis of the momentum, and the velocity."""
 _ORDER = "uvwpqr"
@@ -31,12 +31,13 @@ _ORDER = "uvwpqr"
 class MassMatrix:
     """The mass matrix of the axes that a vehicle has."""
 
-    gains: Mapping[str, str]
+    gains: Mapping[str, Expression]
     """For each axis, by its velocity: the formula of beta/m from the entry on the diagonal."""
-    entries: Mapping[tuple[str, str], str]
+    entries: Mapping[tuple[str, str], Expression]
     """The formulas of the effective entries off the diagonal, by two velocities in the order of the axes.
 
     The vehicle may lack one of the two axes. The entry then gives a momentum along or about the missing axis."""
+    names: Names
 
     @cached_property
     def blocks(self) -> tuple[tuple[str, ...], ...]:
@@ -50,78 +51,84 @@ class MassMatrix:
     def _is_alone(self, axis: str) -> bool:
         return not any(axis in block for block in self.blocks)
 
-    def inverse(self, axis: str) -> dict[str, str]:
+    def inverse(self, axis: str) -> dict[str, Name]:
         """Return a row of the inverse.
 
         For each axis that acts on this one, it has the name of the acceleration per load along that axis.
         """
         for block in self.blocks:
             if axis in block:
-                return {other: f"inverse_{_pair(axis, other)}" for other in block}
-        return {axis: f"gain_{axis}"}
+                return {other: self._name("inverse", *_sorted(axis, other)) for other in block}
+        return {axis: self.names("gain", axis)}
 
-    def parameters(self) -> dict[str, str]:
+    def _name(self, kind: str, row: str, column: str) -> Name:
+        return self.names(kind, row + column)
+
+    def parameters(self) -> dict[str, Expression]:
         """Return the formulas of the names in `inverse` and of the entries."""
-        found = {f"gain_{axis}": formula for axis, formula in self.gains.items()}
+        found = {self.names("gain", axis).identifier: formula for axis, formula in self.gains.items()}
+        entries = {self._name("mass", *pair).identifier: formula for pair, formula in self.entries.items()}
         for block in self.blocks:
-            found |= {f"mass_{axis}{axis}": f"1 / gain_{axis}" for axis in block}
-            found |= {f"mass_{a}{b}": formula for (a, b), formula in self.entries.items() if {a, b} <= {*block}}
+            found |= {self._name("mass", axis, axis).identifier: 1.0 / self.names("gain", axis) for axis in block}
+            own = [self._name("mass", *pair).identifier for pair in self.entries if {*pair} <= {*block}]
+            found |= {name: entries[name] for name in own}
             found |= self._inverse_of(block)
-        known = found.keys()
-        return found | {
-            f"mass_{a}{b}": formula for (a, b), formula in self.entries.items() if f"mass_{a}{b}" not in known
-        }
+        return found | {name: formula for name, formula in entries.items() if name not in found}
 
-    def _inverse_of(self, block: tuple[str, ...]) -> dict[str, str]:
+    def _inverse_of(self, block: tuple[str, ...]) -> dict[str, Expression]:
         """Return formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
-        found: dict[str, str] = {}
-        has_factor: set[tuple[str, str]] = set()
+        found: dict[str, Expression] = {}
+        pivot = {axis: self.names("pivot", axis) for axis in block}
+        factor: dict[tuple[str, str], Name] = {}
         for n, row in enumerate(block):  # M = L D L^T, row by row; L has the factors, D the pivots
             for m, column in enumerate(block[:n]):
-                parts = [f"mass_{column}{row}"] if (column, row) in self.entries else []
-                for k in block[:m]:
-                    if {(row, k), (column, k)} <= has_factor:
-                        parts.append(f"-factor_{row}{k} * factor_{column}{k} * pivot_{k}")
+                parts: list[Expression] = [self._name("mass", column, row)] if (column, row) in self.entries else []
+                parts += [
+                    minus(factor[row, k] * factor[column, k] * pivot[k])
+                    for k in block[:m]
+                    if {(row, k), (column, k)} <= factor.keys()
+                ]
                 if parts:
-                    has_factor.add((row, column))
-                    found[f"factor_{row}{column}"] = f"({joined(parts)}) / pivot_{column}"
-            squares = [f"-factor_{row}{k} * factor_{row}{k} * pivot_{k}" for k in block[:n] if (row, k) in has_factor]
-            found[f"pivot_{row}"] = joined([f"mass_{row}{row}", *squares])
+                    factor[row, column] = self._name("factor", row, column)
+                    found[factor[row, column].identifier] = total(parts) / pivot[column]
+            squares = [minus(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
+            found[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
         for n, row in enumerate(block):  # K L = 1, from the diagonal outwards; K has the names undo_..
             for m in reversed(range(n)):
                 column = block[m]
-                parts = []
-                for k in block[m + 1 : n + 1]:
-                    if (k, column) in has_factor:
-                        parts.append(f"-factor_{k}{column}" if k == row else f"-undo_{row}{k} * factor_{k}{column}")
-                found[f"undo_{row}{column}"] = joined(parts) or "0"
+                found[self._name("undo", row, column).identifier] = total(
+                    minus(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
+                    for k in block[m + 1 : n + 1]
+                    if (k, column) in factor
+                )
         for n, row in enumerate(block):  # K^T D^-1 K
             for column in block[n:]:
-                parts = []
-                for k in block[block.index(column) :]:
-                    factors = [f"undo_{k}{axis}" for axis in (row, column) if axis != k]
-                    parts.append(" * ".join(factors) + f" / pivot_{k}" if factors else f"1 / pivot_{k}")
-                found[f"inverse_{row}{column}"] = joined(parts)
+                found[self._name("inverse", row, column).identifier] = total(
+                    product(*(self._name("undo", k, axis) for axis in (row, column) if axis != k)) / pivot[k]
+                    for k in block[block.index(column) :]
+                )
         return found
 
-    def coriolis(self, axis: str) -> dict[tuple[str, str], str]:
+    def coriolis(self, axis: str) -> dict[tuple[str, str], Expression]:
         """Return the coefficients of products of two velocities in the acceleration of an axis, as formulas."""
-        found: dict[tuple[str, str], list[str]] = {}
+        found: dict[tuple[str, str], list[Expression]] = {}
         for other, inverse in self.inverse(axis).items():
-            for pair, entries in self._products(other).items():
-                found.setdefault(pair, []).extend(sign + self._term(inverse, entry) for sign, entry in entries)
-        return {pair: joined(parts) for pair, parts in sorted(found.items(), key=lambda item: _places(item[0]))}
+            for pair, entries in self.products(other).items():
+                parts = (scaled(sign, self._term(inverse, entry)) for sign, entry in entries)
+                found.setdefault(pair, []).extend(parts)
+        return {pair: total(parts) for pair, parts in sorted(found.items(), key=lambda item: _places(item[0]))}
 
-    def _term(self, inverse: str, entry: tuple[str, str]) -> str:
+    def _term(self, inverse: Name, entry: tuple[str, str]) -> Expression:
         a, b = entry
-        return f"{inverse} / gain_{a}" if a == b and self._is_alone(a) else f"{inverse} * mass_{a}{b}"
+        is_alone = a == b and self._is_alone(a)
+        return inverse / self.names("gain", a) if is_alone else inverse * self._name("mass", a, b)
 
-    def _products(self, axis: str) -> dict[tuple[str, str], list[tuple[str, tuple[str, str]]]]:
+    def products(self, axis: str) -> dict[tuple[str, str], list[tuple[int, tuple[str, str]]]]:
         """Return the right side of Kirchhoff's equations for an axis.
 
         For each product of two velocities, it has entries of the mass matrix with their signs.
         """
-        found: dict[tuple[str, str], list[tuple[str, tuple[str, str]]]] = {}
+        found: dict[tuple[str, str], list[tuple[int, tuple[str, str]]]] = {}
         for sign, momentum, velocity in _KIRCHHOFF[axis]:
             if velocity not in self.gains:
                 continue
@@ -129,20 +136,16 @@ class MassMatrix:
                 entry = _sorted(momentum, other)
                 if momentum == other or entry in self.entries:
                     signed = found.setdefault(_sorted(other, velocity), [])
-                    opposite = ("" if sign else "-", entry)
-                    if opposite in signed:
-                        signed.remove(opposite)
+                    if (-sign, entry) in signed:
+                        signed.remove((-sign, entry))
                     else:
                         signed.append((sign, entry))
-        return {pair: entries for pair, entries in found.items() if entries}
+        ordered = sorted(found.items(), key=lambda item: _places(item[0]))
+        return {pair: entries for pair, entries in ordered if entries}
 
 
 def _sorted(a: str, b: str) -> tuple[str, str]:
     return (a, b) if _ORDER.index(a) <= _ORDER.index(b) else (b, a)
-
-
-def _pair(a: str, b: str) -> str:
-    return "".join(_sorted(a, b))
 
 
 def _places(names: Iterable[str]) -> tuple[int, ...]:

@@ -10,11 +10,11 @@ from math import inf
 
 from .attitude import unwrapped_heading
 from .equation import equation_of
-from .formula import compiled
+from .expression import compiled
 from .layout import ARM, HEAVE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm, delayed_name
 from .riccati import Riccati
 from .step import Table, step
-from .thrust import curve_formulas
+from .thrust import curve_formulas, steady_name
 
 Values = Mapping[str, float]
 
@@ -25,6 +25,7 @@ class _Formulas:
     def __init__(self, layout: Layout) -> None:
         equation = equation_of(layout)
         rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
+        self.names = equation.names
         self.table = Table(equation)
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
@@ -71,15 +72,13 @@ class Rov:
         """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage."""
         values = {"u_one": command, "voltage": self.layout.voltage or 0.0}
         *_, force = _thrust_of(curve)({**self.coefficients, **values}).values()
-        return force
+        return float(force)
 
     def commanded(self, inputs: Values) -> dict[str, float]:
         """Return the steady thrust of every thruster (N), by its name, for the commands."""
         found = self._steady(inputs)
-        thrust = {}
-        for name, curve in self.layout.curve_of.items():
-            thrust[name] = found[f"steady_{name}" if curve.has_lag else f"F_{name}"]
-        return thrust
+        names = self._formulas.names
+        return {name: found[steady_name(name, curve, names).identifier] for name, curve in self.layout.curve_of.items()}
 
     def _steady(self, inputs: Values) -> dict[str, float]:
         """Return the values of all formulas from the commands to the steady thrust."""
@@ -91,7 +90,7 @@ class Rov:
         if not lossy:
             return 0.0
         found = self._steady(inputs)
-        return sum(t.effect(axis) ** 2 * found[f"loss_{t.name}"] for t in lossy)
+        return sum(t.effect(axis) ** 2 * found[self._formulas.names("loss", t.name).identifier] for t in lossy)
 
     def _acting(self, inputs: Values) -> dict[str, float]:
         """Return the commands that act after the dead time: those that are given, or else the present ones."""

@@ -17,7 +17,7 @@ from operator import mul
 
 from .attitude import BESIDE_NOSE, QUATERNION, beside_nose, turned_heading, unwrapped
 from .equation import Equation
-from .formula import compiled, names
+from .expression import Expression, compiled
 
 ORDER = 20
 """The order of the series. A higher order costs more than its longer pieces save. The C code has its own order."""
@@ -47,12 +47,12 @@ class Table:
         """For each state, the terms of its rate: the place of the coefficient, and the places of the factors."""
         self.velocities: list[int | None] = []
         """For each coefficient, the place of the velocity on whose direction it depends, or None."""
-        formulas: dict[str, str] = {}
+        formulas: dict[str, Expression] = {}
         for terms in equation.rows.values():
             self.rows.append([])
             for term in terms:
                 self.rows[-1].append((len(formulas), tuple(place[name] for name in term.factors)))
-                directed = [equation.directed[name] for name in names(term.coefficient) if name in equation.directed]
+                directed = [equation.directed[name] for name in term.coefficient.names if name in equation.directed]
                 self.velocities.append(place[directed[0].velocity] if directed else None)
                 formulas[f"coefficient_{len(formulas)}"] = term.coefficient
         self.coefficients = list(formulas)
@@ -184,7 +184,7 @@ class Motion:
 
     def rotation(self, y: Sequence[float]) -> dict[str, float]:
         """Return the entries of the rotation matrix by name."""
-        return {name: y[self.table.place[name]] for name in self.table.equation.orientation if name.startswith("R_")}
+        return {name: y[self.table.place[name]] for name in self.table.equation.orientation if name in self.table.place}
 
     # ---- Settled states ----
 

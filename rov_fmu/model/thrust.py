@@ -2,111 +2,142 @@
 
 from itertools import pairwise
 
-from .formula import weighted
+from .expression import (
+    Expression,
+    Name,
+    Names,
+    beyond_dead_band,
+    call,
+    directed,
+    equal,
+    minus,
+    of,
+    product,
+    saturated,
+    scaled,
+    total,
+    where,
+)
 from .layout import REVERSE, Curve, Layout, delayed_name
 
+Formulas = dict[str, Expression]
+_VOLTAGE = Name("voltage")
 
-def thrust_formulas(layout: Layout) -> dict[str, str]:
+
+def thrust_formulas(layout: Layout, names: Names) -> Formulas:
     """Return formulas for the steady thrust (2), (9), (10) of every thruster, and for the angles of the fins.
 
     Each input saturates at ±1, and so does each sum of inputs.
     """
-    found: dict[str, str] = {}
+    found: Formulas = {}
     if layout.voltage is not None:
-        found["battery"] = "0 if voltage < 0 else voltage"
+        found |= _battery(names)
     for name, gains in layout.gains.items():
-        parts = []
+        parts: list[tuple[float, Expression]] = []
         for command, gain in gains.items():
-            acting = delayed_name(command) if layout.has_dead_time else command
+            acting = Name(delayed_name(command) if layout.has_dead_time else command)
             if layout.pulse:
-                found[f"fraction_{command}"] = _fraction(acting, layout.pulse)
-                acting = f"fraction_{command}"
-            found[f"saturated_{command}"] = _saturated(acting)
-            parts.append((gain, f"saturated_{command}"))
+                fraction = names("fraction", command)
+                found[fraction.identifier] = _fraction(acting, layout.pulse)
+                acting = fraction
+            limited = names("saturated", command)
+            found[limited.identifier] = saturated(acting)
+            parts.append((gain, limited))
+        command_of = names("command", name).identifier
         if list(gains.values()) == [1.0]:
-            found[f"command_{name}"] = parts[0][1]
+            found[command_of] = parts[0][1]
         else:
-            found[f"mixed_{name}"] = weighted(parts)
-            found[f"command_{name}"] = _saturated(f"mixed_{name}")
+            mixed = names("mixed", name)
+            found[mixed.identifier] = total(scaled(*part) for part in parts)
+            found[command_of] = saturated(mixed)
         if name in layout.curve_of:
-            found |= _steady_thrust(name, layout.curve_of[name])
+            found |= _steady_thrust(name, layout.curve_of[name], names)
     for fin in layout.fins:
-        found[f"angle_{fin.name}"] = f"{fin.coefficient('angle_max')} * command_{fin.name}"
+        angle = Name(fin.coefficient("angle_max")) * names("command", fin.name)
+        found[names("angle", fin.name).identifier] = angle
     return found
 
 
-def curve_formulas(curve: Curve) -> dict[str, str]:
+def curve_formulas(curve: Curve) -> Formulas:
     """Return formulas from the command u_one of a thruster to its steady thrust, which is the last."""
-    return {
-        "battery": "0 if voltage < 0 else voltage",
-        "command_one": _saturated("u_one"),
-        **_steady_thrust("one", curve),
-    }
+    names = Names(["u_one", "voltage", *(curve.coefficient(key) for key in curve.keys)])
+    command = {names("command", "one").identifier: saturated(Name("u_one"))}
+    return {**_battery(names), **command, **_steady_thrust("one", curve, names)}
 
 
-def _fraction(name: str, pulse: tuple[float, float, float]) -> str:
+def steady_name(thruster: str, curve: Curve, names: Names) -> Name:
+    """Return the name of the steady thrust of a thruster, which is its force unless the force lags."""
+    return names("steady", thruster) if curve.has_lag else Name(f"F_{thruster}")
+
+
+def _battery(names: Names) -> Formulas:
+    return {names("battery").identifier: where(_VOLTAGE < 0.0, 0.0, _VOLTAGE)}
+
+
+def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
     """Return the formula from a pulse width to its fraction. Above and below neutral, the scale may differ.
 
     A pulse of 0 means that there is no signal, and stops the thruster as speed controllers do.
     """
     low, neutral, high = pulse
     below, above = neutral - low, high - neutral
-    span = repr(above) if below == above else f"({above!r} if {name} > {neutral!r} else {below!r})"
-    return f"0 if {name} == 0 else ({name} - {neutral!r}) / {span}"
+    span = of(above) if below == above else where(command > neutral, above, below)
+    return where(equal(command, 0.0), 0.0, (command - neutral) / span)
 
 
-def _saturated(name: str) -> str:
-    return f"1 if {name} > 1 else -1 if {name} < -1 else {name}"
-
-
-def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
+def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
-    share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
-    found, signed = _from_tables(name, curve) if curve.tables else _from_coefficients(name, curve, share)
+    command, share = names("command", name), _share(curve)
+    found, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
-        signed = f"{signed} * pow(battery / {curve.coefficient('V_0')}, {curve.coefficient('n_V')})"
+        by_voltage = names("battery") / Name(curve.coefficient("V_0"))
+        force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
-        found[f"loss_{name}"] = f"{_by_direction(name, curve, 'd')} * abs(command_{name}){share}"
+        loss = product(by_direction(command, curve, "d"), call("abs", command), *share)
+        found[names("loss", name).identifier] = loss
+    if curve.tables:
+        force = product(force, *share)
     # + 0 makes 0.0 of -0.0
-    return found | {f"steady_{name}" if curve.has_lag else f"F_{name}": f"{signed}{share if curve.tables else ''} + 0"}
+    return found | {steady_name(name, curve, names).identifier: force + 0.0}
 
 
-def _by_direction(name: str, curve: Curve, key: str) -> str:
+def _share(curve: Curve) -> tuple[float, ...]:
+    """Return the factor for one of the thrusters that a curve describes together, if there are several."""
+    return (1.0 / curve.together,) if curve.together != 1 else ()
+
+
+def by_direction(command: Name, curve: Curve, key: str) -> Expression:
     """Return the coefficient of a curve for the direction of a thruster's command."""
-    forward, reverse = curve.coefficient(key), curve.coefficient(key + REVERSE)
-    return forward if forward == reverse else f"({reverse} if command_{name} < 0 else {forward})"
+    return directed(command, Name(curve.coefficient(key)), Name(curve.coefficient(key + REVERSE)))
 
 
-def _from_tables(name: str, curve: Curve) -> tuple[dict[str, str], str]:
+def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
     """Return the formula of the force of the tables, and the formula of the force times the scale.
 
     Between two voltages, the force is interpolated linearly.
     """
-    command = f"command_{name}"
-    formula = f"{curve.tables[-1].function}({command})"
-    for table, following in reversed([*pairwise(curve.tables)]):
-        share = f"(battery - {table.voltage!r}) / {following.voltage - table.voltage!r}"
-        low, high = f"{table.function}({command})", f"{following.function}({command})"
-        formula = f"{low} + {share} * ({high} - {low}) if battery < {following.voltage!r} else {formula}"
-    if len(curve.tables) > 1:
-        formula = f"{curve.tables[0].function}({command}) if battery < {curve.tables[0].voltage!r} else {formula}"
-    return {f"table_{name}": formula}, f"{curve.coefficient('k_t')} * table_{name}"
+    battery, (first, *_) = names("battery"), curve.tables
+    forces = [call(table.function, names("command", name)) for table in curve.tables]
+    force: Expression = forces[-1]
+    for (table, low), (following, high) in reversed([*pairwise(zip(curve.tables, forces, strict=True))]):
+        share = (battery - table.voltage) / (following.voltage - table.voltage)
+        force = where(battery < following.voltage, low + share * (high - low), force)
+    if len(forces) > 1:
+        force = where(battery < first.voltage, forces[0], force)
+    measured = names("table", name)
+    return {measured.identifier: force}, Name(curve.coefficient("k_t")) * measured
 
 
-def _from_coefficients(name: str, curve: Curve, share: str) -> tuple[dict[str, str], str]:
+def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
     """Return the formulas of the force a_t m^2 + b_t m, and the formula of the force with its sign.
 
     m is the part of the command beyond the dead band.
     """
-    is_reverse = f"command_{name} < 0"
-    a_t, b_t = (_by_direction(name, curve, key) for key in ("a_t", "b_t"))
-    signed = f"(-magnitude_{name} if {is_reverse} else magnitude_{name})"
-    beyond, dead = f"beyond_{name}", ""
-    if "c_0" in curve.keys:
-        c_0 = _by_direction(name, curve, "c_0")
-        dead = f" - {c_0}"
-        signed = f"(0 if {beyond} < 0 or {beyond} == 0 and {c_0} > 0 else {signed})"
+    command, beyond, size = (names(kind, name) for kind in ("command", "beyond", "magnitude"))
+    a_t, b_t, c_0 = (by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
+    has_dead_band = "c_0" in curve.keys
+    force = directed(command, size, minus(size))
     return {
-        beyond: f"abs(command_{name}){dead}",
-        f"magnitude_{name}": f"({a_t} * {beyond} + {b_t}) * {beyond}{share}",
-    }, signed
+        beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
+        size.identifier: product(a_t * beyond + b_t, beyond, *_share(curve)),
+    }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force

@@ -33,7 +33,7 @@ from rov_fmu.model.layout import (
     cross_name,
     cross_of,
 )
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_part_names, check_thruster_places
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, Hardware, Parts, given_quantities
 
@@ -89,7 +89,6 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
-        yield from check_part_names(layout)
         for title, alternative in parts.alternatives.items():
             yield from check_quantities(f"alternatives.{title}", alternative.quantities, layout.coefficients)
         if "estimates" not in lost:

@@ -10,7 +10,6 @@ from typing import Any
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.equation import name_clashes
 from rov_fmu.model.layout import PITCH, ROLL, SWAY, YAW, Axis, Layout, cross_name
 from rov_fmu.model.rov import Rov
 
@@ -123,9 +122,12 @@ def _unit(row: Sequence[float]) -> list[float]:
 
 
 def check_part_names(layout: Layout) -> Iterator[str]:
-    """Check that no two variables of the FMU, and no two quantities of the equation, have the same name."""
-    for name, reason in name_clashes(layout):
-        yield key_line(name, reason)
+    """Check that all coefficients have their usual names, by which the identification knows them."""
+    parts = [(f"axes.{form.axis.name}", form.others) for form in layout.axes]
+    parts += [(f"curves.{curve.name}", curve.others) for curve in layout.curves]
+    for part, others in parts:
+        for key, name in others:
+            yield key_line(f"{part}.{key}", f"another variable has its name, and it would be {name}; rename a part")
 
 
 # ---- Mass, damping, weight -------------------------------------------------------------------------------------------

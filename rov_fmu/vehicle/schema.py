@@ -553,7 +553,6 @@ def keys_in_file(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
         yield from ((fin.coefficient(key), ("fin", fin.name, key)) for key in FIN if key != "drag" or fin.has_drag)
     for keys in (AXIS, TUNING):
         for vehicle_axis in of.axes:
-            axis = vehicle_axis.axis
             present = keys if keys is TUNING else (key for key in keys if key in vehicle_axis.keys)
-            yield from ((axis.coefficient(key), ("axes", axis.name, key)) for key in present)
+            yield from ((vehicle_axis.coefficient(key), ("axes", vehicle_axis.axis.name, key)) for key in present)
     yield from ((name, ("cross", name)) for name in (layout.cross_name(*row) for row in of.cross))

@@ -82,7 +82,7 @@ def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
                 "dependencies",
                 "equation",
                 "forces",
-                "formula",
+                "expression",
                 "layout",
                 "mass",
                 "riccati",

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.attitude import QUATERNION, start_formulas
-from rov_fmu.model.formula import compiled
+from rov_fmu.model.expression import compiled
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -9,7 +9,8 @@ from time import process_time
 import pytest
 
 from rov_fmu.model import step as module
-from rov_fmu.model.equation import Directed, Equation, Term
+from rov_fmu.model.equation import ONE, Directed, Equation, Term
+from rov_fmu.model.expression import Name, of
 from rov_fmu.model.rov import Rov
 from rov_fmu.model.step import ORDER, Table, usable_time
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -105,12 +106,12 @@ def test_a_step_is_exact_whatever_the_drag_in_reverse(names: list[str], shares: 
 
 def table_of(rows: Mapping[str, tuple[Term, ...]], **directed: Directed) -> Table:
     """Return a table with these rows and without formulas. All its states are states of the vehicle."""
-    return Table(Equation({}, directed, {}, {}, rows, {name: name for name in rows}, lags={}))
+    return Table(Equation({}, directed, {}, {}, rows, {name: Name(name) for name in rows}, lags={}))
 
 
 def test_a_series_of_which_two_coefficients_in_three_are_zero_is_not_used_too_far() -> None:
     """With t' = 1, q' = 2 t and y' = q y, the solution is y = exp(t^3/3)."""
-    table = table_of({"t": (Term("1"),), "q": (Term("2", ("t",)),), "y": (Term("1", ("q", "y")),)})
+    table = table_of({"t": (Term(ONE),), "q": (Term(of(2.0), ("t",)),), "y": (Term(ONE, ("q", "y")),)})
     for h in (0.5, 1.0, 2.0, 3.0):
         found = module.step(table, {"t": 0.0, "q": 0.0, "y": 1.0}, h)
         assert found == pytest.approx({"t": h, "q": h * h, "y": exp(h**3 / 3.0)}, rel=2e-14)
@@ -119,8 +120,8 @@ def test_a_series_of_which_two_coefficients_in_three_are_zero_is_not_used_too_fa
 def test_a_pendulum_with_a_stop_that_pushes_back_harder_reverses_at_the_exact_time() -> None:
     """With v' = -x and x' = k v, where k depends on the direction, the motion consists of half ellipses."""
     table = table_of(
-        {"x": (Term("k", ("v",)),), "v": (Term("-1", ("x",)),)},
-        k=Directed("v", "4", "1"),
+        {"x": (Term(Name("k"), ("v",)),), "v": (Term(-ONE, ("x",)),)},
+        k=Directed("v", of(4.0), ONE),
     )
     found = module.step(table, {"x": 1.0, "v": 0.0}, 0.5 * pi)  # v < 0: x = cos t
     assert found == pytest.approx({"x": 0.0, "v": -1.0}, abs=1e-15)

@@ -1,17 +1,17 @@
 """The equations that a page shows are those of the vehicle: evaluated as they stand, they give its rates and forces."""
 
 import random
-from collections.abc import Callable, Mapping
-from math import atan2, copysign, cos, prod, sin, sqrt
+from collections.abc import Mapping
+from math import copysign, prod
 
 import pytest
 from lxml import html
 
+from rov_fmu.model.expression import Expression, Name, Operation, compiled, where
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
-from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Product, Reader, Sum
-from rov_fmu.report.page.equations import Equations, Line, MathML, Text
+from rov_fmu.report.page.equations import Equations, Line, MathML, Text, products
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import EVERYTHING, SIX, VEHICLES, random_body, random_inputs, random_state, random_vehicle
@@ -24,40 +24,25 @@ ROVS = {
     "everything": load_vehicle(EVERYTHING).rov,
 }
 Values = Mapping[str, float]
-FUNCTIONS: dict[str, Callable[..., float]] = {
-    "sin": sin,
-    "cos": cos,
-    "abs": abs,
-    "sqrt": sqrt,
-    "atan2": atan2,
-    "sgn": lambda x: copysign(1.0, x) if x else 0.0,
-}
+SIGN = {"sgn": lambda x: copysign(1.0, x) if x else 0.0}
 
 
-def of_sum(terms: Sum, at: Values) -> float:
-    return sum(of_product(product, at) for product in terms)
+def value_of(x: Expression, at: Values) -> float:
+    return float(compiled({"value": x}, SIGN)(at)["value"])
 
 
-def of_product(product: Product, at: Values) -> float:
-    above, below = (prod(of_factor(factor, at) for factor in part) for part in (product.above, product.below))
-    return product.sign * above / below
+def value_as_shown(x: Expression, at: Values) -> float:
+    """Return the value of a formula by the products in which the page shows it."""
+    return sum(
+        one.sign * prod(factor(f, at) for f in one.above) / prod(factor(f, at) for f in one.below)
+        for one in products(x)
+    )
 
 
-def of_factor(factor: Factor, at: Values) -> float:
-    match factor:
-        case str():
-            return at[factor]
-        case float():
-            return factor
-        case Choice():
-            return at[factor.reverse if at[factor.subject] < 0.0 else factor.forward]
-        case Group():
-            return of_sum(factor.inner, at)
-        case Call():
-            arguments = [factor.inner, factor.second] if factor.second else [factor.inner]
-            return FUNCTIONS[factor.function](*(of_sum(argument, at) for argument in arguments))
-        case Cases():
-            return of_sum(factor.at_most_zero if at[factor.name] <= 0.0 else factor.otherwise, at)
+def factor(x: Expression, at: Values) -> float:
+    """Return the value of a factor; a sum in brackets is again shown as products."""
+    is_sum = isinstance(x, Operation) and x.op in ("+", "-")
+    return value_as_shown(x, at) if is_sum else value_of(x, at)
 
 
 def exactly(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
@@ -76,12 +61,14 @@ def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict
     found: dict[str, float] = {}
 
     def calculate(line: Line) -> None:
-        left = prod(of_factor(factor, at) for factor in line.factors)
-        others = sum(at[factor] * exact[f"der({name})"] for factor, name in line.coupled)
-        value = (of_sum(line.right, at) - others) / left
-        found[f"der({line.name})" if line.is_rate else line.name] = value
-        if not line.is_rate:
-            at[line.name] = max(-1.0, min(1.0, value)) if line in shown.commands else value
+        name = line.name.identifier
+        value = value_as_shown(line.right, at)
+        if line.factor is not None:
+            others = sum(at[m.identifier] * exact[f"der({other.identifier})"] for m, other in line.coupled)
+            found[f"der({name})"] = (value - others) / value_of(line.factor, at)
+        else:
+            found[name] = value
+            at[name] = max(-1.0, min(1.0, value)) if line in shown.commands else value
 
     for line in shown.commands:
         calculate(line)
@@ -92,7 +79,8 @@ def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict
         first = curve.thrusters[0].name
         for line in curve.advance:  # the page mentions the other thrusters in words: "likewise"
             at |= {
-                f"loss_{t.name}": of_sum(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]}) for t in curve.thrusters
+                f"loss_{t.name}": value_as_shown(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]})
+                for t in curve.thrusters
             }
     for name in rov.layout.calculated:
         if name not in at and name.startswith("F_"):
@@ -215,5 +203,12 @@ def test_mathml_says_what_the_text_says(kind: str) -> None:
 
 
 def test_a_form_that_cannot_be_shown_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"2\.0 if x > 3\.0 else y: there is no way to show this"):
-        Reader({}).read("2 if x > 3 else y")
+    choice = where(Name("u") > 3.0, 2.0, Name("w"))
+    with pytest.raises(ValueError, match=r"2\.0 if u > 3\.0 else w: there is no way to show this"):
+        Text(VEHICLES["VideoRay"].layout).sum(choice)
+
+
+def test_the_page_of_a_vehicle_shows_momenta_along_axes_that_it_lacks() -> None:
+    """Without sway, a centre of mass aside still adds to the momentum in yaw."""
+    shown = _text(random_body(random.Random(1), "uwr").layout)
+    assert any(line.startswith("m_ur = ") for line in shown)

@@ -155,11 +155,6 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "a curve of no thruster": ({"curves.spare": _CURVE}, [("curves.spare: no thruster has this curve",)]),
     "no curves": ({"curves": {}}, [("curves = {}", "must have at least 1 item")]),
     "no thrusters": ({"thruster": []}, [("thruster = []", "must have at least 1 item")]),
-    "coefficients that coincide": (
-        {"curves.frame_reverse": _CURVE, "thruster.5.curve": "frame_reverse"},
-        [("a_t_frame_reverse", "two variables"), ("b_t_frame_reverse", "two variables")],
-    ),
-    "a force called as a load": ({**_ALONE, "thruster.5.name": "0_w"}, [("F_0_w", "two variables of the FMU")]),
     # keys that need others, or have no use
     "half a curve in reverse": (
         {"curves.frame.b_t_reverse": GONE},

@@ -6,23 +6,27 @@ commands must not turn any velocity back. It computes no thrust and looks for no
 """
 
 import time
+from collections.abc import Mapping
 from importlib.util import find_spec
-from math import atan2, cos, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.model.equation import Term, equation_of
+from rov_fmu.model.equation import ONE, Term, equation_of
+from rov_fmu.model.expression import Expression, compiled
 from rov_fmu.model.rov import Rov
 
 NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'
-_FUNCTIONS = {"sin": sin, "cos": cos, "abs": abs, "sqrt": sqrt, "atan2": atan2}
 Reals = NDArray[np.float64]
 
 
 def installed() -> bool:
     """Return True when heyoka can be imported."""
     return find_spec("heyoka") is not None
+
+
+def _value(formula: Expression, at: Mapping[str, float]) -> float:
+    return float(compiled({"value": formula})(at)["value"])
 
 
 class Heyoka:
@@ -34,13 +38,13 @@ class Heyoka:
         self._rov, self._equation = rov, equation_of(rov.layout)
         rows = self._equation.rows
         coefficients = dict.fromkeys(term.coefficient for terms in rows.values() for term in terms)
-        self._parameters = [text for text in coefficients if text not in ("1", "-1")]
-        parameter = {text: heyoka.par[n] for n, text in enumerate(self._parameters)}
+        self._parameters = [formula for formula in coefficients if formula not in (ONE, -ONE)]
+        parameter = {formula: heyoka.par[n] for n, formula in enumerate(self._parameters)}
         symbols = dict(zip(rows, heyoka.make_vars(*rows), strict=True))
 
         def product(term: Term) -> object:
             coefficient = parameter.get(term.coefficient)
-            first = heyoka.expression(float(term.coefficient)) if coefficient is None else coefficient
+            first = heyoka.expression(_value(term.coefficient, {})) if coefficient is None else coefficient
             return heyoka.prod([first, *(symbols[name] for name in term.factors)])
 
         system = [(symbols[name], heyoka.sum([product(term) for term in terms])) for name, terms in rows.items()]
@@ -55,7 +59,7 @@ class Heyoka:
         integrator, end, seconds = self._integrator, start.copy(), 0
         for command in commands:
             at = self._at(command, end)
-            values, initial = [eval(text, _FUNCTIONS, at) for text in self._parameters], self._initial(at)
+            values, initial = [_value(formula, at) for formula in self._parameters], self._initial(at)
             integrator.time = 0.0
             integrator.state[:], integrator.pars[:] = initial, values
             began = time.thread_time_ns()
@@ -71,9 +75,9 @@ class Heyoka:
     def _end(self, at: dict[str, float], state: Reals) -> Reals:
         """Return the states of the vehicle. Forces that lag and the quaternion are not states of the equation."""
         at = at | dict(zip(self._equation.states, state.tolist(), strict=True))
-        found = at | {force: eval(after, _FUNCTIONS, at) for force, (_, after) in self._equation.lagging.items()}
+        found = at | {force: _value(after, at) for force, (_, after) in self._equation.lagging.items()}
         for name, formula in self._equation.ends.items():
-            at[name] = found[name.removeprefix("next_")] = eval(formula, _FUNCTIONS, at)
+            at[name] = found[name.removeprefix("next_")] = _value(formula, at)
         return np.array([found[name] for name in self._rov.layout.state])
 
     def _at(self, command: Reals, state: Reals) -> dict[str, float]:
@@ -82,9 +86,9 @@ class Heyoka:
         at = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, command.tolist(), strict=True))
         at |= {**self._rov.coefficients, **dict(zip(layout.state, state.tolist(), strict=True))}
         for name, formula in {**equation.program, **equation.forces}.items():
-            at[name] = eval(formula, _FUNCTIONS, at)
+            at[name] = _value(formula, at)
         for name, directed in equation.directed.items():  # a velocity at rest goes where its force pushes it
             v = directed.velocity
             is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"held_{v}"] < 0.0)
-            at[name] = eval(directed.reverse if is_reverse else directed.forward, _FUNCTIONS, at)
+            at[name] = _value(directed.reverse if is_reverse else directed.forward, at)
         return at

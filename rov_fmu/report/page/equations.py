@@ -1,4 +1,8 @@
-"""The equations of a vehicle for readers, made from the formulas of its equation of motion (rov_fmu/model/)."""
+"""The equations of a vehicle for readers, made from its forces and from the formulas of its thrust and its pose.
+
+A formula is shown as a sum of products, in the order in which it is built. Numbers come first, and a common first
+factor stands before a bracket. The page leaves out only the saturation of commands, which its text mentions.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -6,23 +10,32 @@ from itertools import groupby
 
 from markupsafe import escape
 
-from rov_fmu.model.attitude import rotation_formulas
-from rov_fmu.model.equation import Equation, equation_of
+from rov_fmu.model.equation import ONE, Equation, equation_of, load_along, mass_matrix
+from rov_fmu.model.expression import (
+    FUNCTIONS,
+    PYTHON,
+    Expression,
+    Name,
+    Number,
+    Operation,
+    beyond_dead_band,
+    call,
+    product,
+    replaced,
+    scaled,
+    total,
+    written,
+)
+from rov_fmu.model.forces import forces_of
 from rov_fmu.model.layout import (
-    AXIS,
-    BODY,
-    CURVE,
-    RESTORING,
     REVERSE,
-    TUNING,
     YAW,
     Curve,
     Layout,
     Thruster,
     VehicleAxis,
-    cross_name,
 )
-from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Product, Reader, Sum, arranged, inverse
+from rov_fmu.model.thrust import by_direction, steady_name
 from rov_fmu.report.templates import RAISED, number
 
 
@@ -41,16 +54,16 @@ class Symbol:
 
 @dataclass(frozen=True)
 class Line:
-    """An equation: on the left some factors times a name or its time derivative, on the right a sum."""
+    """An equation: on the left a name, or a factor times a time derivative, on the right a formula."""
 
-    factors: tuple[Factor, ...]
-    name: str
-    is_rate: bool
-    right: Sum
+    name: Name
+    right: Expression
     reference: str = ""
     """The number of the equation in the paper, or another publication of it."""
-    coupled: tuple[tuple[str, str], ...] = ()
-    """The other rates on the left: the names of their factors and of the variables."""
+    factor: Expression | None = None
+    """The factor of the time derivative of the name."""
+    coupled: tuple[tuple[Name, Name], ...] = ()
+    """The other rates on the left: their factors and the names of the variables."""
 
 
 @dataclass(frozen=True)
@@ -94,178 +107,250 @@ class Equations:
 def of(layout: Layout) -> Equations:
     """Return the equations of a vehicle."""
     equation = equation_of(layout)
-    inlined = _inlined(layout, equation)
-    rotation = [name for name in equation.orientation if name.startswith("R_")]
-    reader = Reader(inlined)
+    names = equation.names
+    formulas = _inlined(layout, equation)
+    mass = mass_matrix(layout, names)
+    has_effective_inertia = layout.coupled or bool(mass.entries) or any("m_a" in form.keys for form in layout.axes)
 
-    def line(name: str, formula: str, reference: str = "") -> Line:
-        return Line((), name, False, arranged(reader.read(formula)), reference)
+    def line(name: Name, formula: Expression, reference: str = "") -> Line:
+        return Line(name, replaced(formula, formulas), reference)
 
-    def rate(name: str, formula: str, reference: str = "") -> Line:
-        """Return the equation of a time derivative, multiplied by the divisors that all its terms share."""
-        right = reader.read(formula)
-        below = [factor for factor in right[0].below if all(factor in p.below for p in right)]
-        for factor in below:
-            right = tuple(Product(p.sign, p.above, tuple(f for f in p.below if f != factor)) for p in right)
-        return Line(tuple(below), name, True, arranged(right), reference)
+    def rate(name: str, formula: Expression, factor: Expression = ONE) -> Line:
+        return replace(line(Name(name), formula), factor=factor)
 
-    entries = _mass_entries(equation)
+    def thrust(name: Name) -> list[Line]:
+        """Return the equation of a quantity that follows from the commands, if the vehicle has it."""
+        return [line(name, equation.thrust[name.identifier])] if name.identifier in equation.thrust else []
 
     def motion(form: VehicleAxis) -> Line:
         """Return the equation of motion of an axis: with effective masses on the left, if the axis has several."""
-        v = form.axis.velocity
-        found = rate(v, equation.rates[v], form.axis.equations[1])
-        pairs = [((b if a == v else a), name) for (a, b), name in entries.items() if v in (a, b)]
-        others = [(name, other) for other, name in pairs if other in layout.by_velocity]
-        return replace(found, factors=(f"M_{v}",), coupled=tuple(others)) if others else found
+        v, loads = form.axis.velocity, load_along(layout, form, names)
+        loads = total([loads, *(force.formula for force in forces_of(layout, names) if force.axis == v)])
+        if not has_effective_inertia:
+            found = rate(v, Name(form.axis.coefficient("beta")) * loads, Name(form.axis.inertia))
+            return replace(found, reference=form.axis.equations[1])
+        if layout.coupled:
+            by_pair = mass.products(v).items()
+            munk = [(sign, _entry(*entry), pair) for pair, entries in by_pair for sign, entry in entries]
+            loads = total([loads, *(scaled(sign, product(entry, *map(Name, pair))) for sign, entry, pair in munk)])
+        partners = [((b if a == v else a), _entry(a, b)) for a, b in mass.entries if v in (a, b)]
+        coupled = tuple((entry, Name(other)) for other, entry in partners if other in layout.by_velocity)
+        return replace(rate(v, loads, _entry(v, v)), reference=form.axis.equations[1], coupled=coupled)
 
-    inertia = []
-    if _has_effective_inertia(layout, equation):
-        for v in layout.by_velocity:
-            inertia.append(Line((), f"M_{v}", False, inverse(Reader({}).read(equation.parameters[f"gain_{v}"]))))
-        for (a, b), name in entries.items():
-            inertia.append(Line((), name, False, arranged(Reader({}).read(equation.parameters[f"mass_{a}{b}"]))))
+    inertia = [line(_entry(v, v), 1.0 / mass.gains[v]) for v in layout.by_velocity] if has_effective_inertia else []
+    inertia += [line(_entry(*pair), formula) for pair, formula in mass.entries.items()]
     curves = []
     for curve in layout.curves:
         thrusters = [t for t in layout.thrusters if t.curve == curve.name]
         first = thrusters[0].name
-        name = f"steady_{first}" if curve.has_lag else f"F_{first}"
-        thrust = [line(name, equation.thrust[name], curve.equation)]
-        if f"beyond_{first}" in equation.thrust and f"beyond_{first}" not in inlined:
-            thrust.append(line(f"beyond_{first}", equation.thrust[f"beyond_{first}"]))
-        loss = f"loss_{first}"
-        advance = [line(loss, equation.thrust[loss])] if loss in equation.thrust else []
-        lag = [rate(f"F_{first}", equation.lagging[f"F_{first}"][0])] if curve.has_lag else []
+        steady, force = steady_name(first, curve, names), Name(f"F_{first}")
+        shown = [line(steady, _steady(first, curve, equation), curve.equation)]
+        shown += thrust(names("beyond", first)) if "c_0" in curve.keys else []
+        lag = [rate(force.identifier, steady - force, Name(curve.coefficient("T")))] if curve.has_lag else []
         by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
-        tau = f"tau_{curve.name}"
-        torque = [line(tau, equation.forces[tau], "(4)" if by_arm else "")] if tau in equation.forces else []
-        curves.append(CurveLines(curve, thrusters, thrust, advance, lag, torque))
-    mixed = [t.name for t in layout.thrusters if f"mixed_{t.name}" in equation.thrust]
+        tau = Name(f"tau_{curve.name}")
+        turning = equation.forces.get(tau.identifier)
+        torque = [] if turning is None else [line(tau, turning, "(4)" if by_arm else "")]
+        curves.append(CurveLines(curve, thrusters, shown, thrust(names("loss", first)), lag, torque))
+    mixed = [one for t in layout.thrusters for one in thrust(names("mixed", t.name))]
     return Equations(
         [motion(form) for form in layout.axes],
         inertia,
         [
-            *(line(f"command_{name}", f"mixed_{name}") for name in mixed),
-            *(line(f"angle_{fin.name}", equation.thrust[f"angle_{fin.name}"]) for fin in layout.fins),
+            *(replace(one, name=names("command", *one.name.owners)) for one in mixed),
+            *(one for fin in layout.fins for one in thrust(names("angle", fin.name))),
         ],
         curves,
         [rate(name, equation.rates[name]) for name in layout.pose],
-        [line(name, equation.orientation[name]) for name in rotation],
-        [line(name, formula) for name, formula in equation.outputs.items()],
+        [line(Name(name), formula) for name, formula in _rotation(layout, equation).items()],
+        [line(Name(name), formula) for name, formula in equation.outputs.items()],
     )
+
+
+def _entry(a: str, b: str) -> Name:
+    """Return the name on the page of an entry of the effective mass matrix."""
+    return Name(f"M_{a}" if a == b else f"m_{a}{b}")
+
+
+def _steady(thruster: str, curve: Curve, equation: Equation) -> Expression:
+    """Return the steady thrust of a thruster as one writes it: with |c| c in place of a choice by the sign of c."""
+    names = equation.names
+    c, m = names("command", thruster), names("beyond", thruster)
+    a_t, b_t, c_0 = (by_direction(c, curve, key) for key in ("a_t", "b_t", "c_0"))
+    if curve.tables:
+        force: Expression = Name(curve.coefficient("k_t")) * names("table", thruster)
+    elif "c_0" in curve.keys:
+        force = beyond_dead_band(m, c_0, call("sgn", c) * (a_t * m * m + b_t * m))
+    else:
+        force = a_t * call("abs", c) * c + b_t * c
+    if "V_0" in curve.keys:
+        by_voltage = names("battery") / Name(curve.coefficient("V_0"))
+        force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
+    return scaled(1.0 / curve.together, force)
 
 
 def coupled(layout: Layout) -> list[str]:
     """Return the names of the axes with Coriolis and Munk terms."""
-    coefficients = " ".join(equation_of(layout).parameters)
-    return [form.axis.name for form in layout.axes if f"coupling_{form.axis.velocity}" in coefficients]
+    rows = equation_of(layout).rows
+    axes = (form.axis for form in layout.axes)
+    return [axis.name for axis in axes if any(term.effect == "coupling" for term in rows[axis.velocity])]
 
 
-def _mass_entries(equation: Equation) -> dict[tuple[str, str], str]:
-    """Return the entries of the mass matrix off the diagonal: by two velocities, the name on the page."""
-    pairs = [(name[-2], name[-1]) for name in equation.parameters if name.startswith("mass_")]
-    return {(a, b): f"m_{a}{b}" for a, b in pairs if a != b}
+def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
+    """Return the formulas of the entries of the rotation matrix, if the vehicle rolls or pitches."""
+    found = equation.orientation if layout.has_attitude else {}
+    return {name: formula for name, formula in found.items() if name in equation.rows}
 
 
-def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
-    """Return the formulas that replace their names. A name stays if it has its own equation."""
-    found = {
-        name: formula
-        for name, formula in equation.program.items()
-        if not name.startswith(("F_", "tau_", "steady_", "loss_", "R_", "table_", "angle_", "battery", "fraction_"))
+def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
+    """Return the formulas that replace their names, because the page has no equation of these names."""
+    names = equation.names
+    kinds = ("saturated", "command", "net_weight", "righting", "arm", "held")
+    inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
+    inlined -= {
+        names("command", t.name).identifier
+        for t in layout.thrusters
+        if names("mixed", t.name).identifier in equation.thrust
     }
-    if layout.has_attitude:
-        found["square_length"] = "1"
-    for thruster in layout.thrusters:
-        if f"mixed_{thruster.name}" in equation.thrust:
-            del found[f"command_{thruster.name}"]
-        if "c_0" in layout.curve_of[thruster.name].keys:
-            del found[f"beyond_{thruster.name}"]
-    if _has_effective_inertia(layout, equation):
-        found |= {f"gain_{v}": f"1 / M_{v}" for v in layout.by_velocity}
-    found |= {f"mass_{v}{v}": f"M_{v}" for v in layout.by_velocity}
-    found |= {f"mass_{a}{b}": name for (a, b), name in _mass_entries(equation).items()}
-    for name in equation.parameters:  # the page multiplies by the mass matrix instead of its inverse
-        if name.startswith("inverse_"):
-            found[name] = "1" if name[-1] == name[-2] else "0"
-    return found
+    found = {name: formula for name, formula in equation.program.items() if name in inlined}
+    return found | ({"square_length": Number(1.0)} if layout.has_attitude else {})
 
 
-def _has_effective_inertia(layout: Layout, equation: Equation) -> bool:
-    """Return True if the effective inertias have equations of their own."""
-    return layout.coupled or bool(_mass_entries(equation)) or any("m_a" in form.keys for form in layout.axes)
-
-
-def choices(lines: Iterable[Line]) -> list[Choice]:
+def choices(lines: Iterable[Line]) -> list[Operation]:
     """Return the parameters in these equations that depend on a direction."""
     return list(dict.fromkeys(choice for line in lines for choice in _choices(line.right)))
 
 
-def _choices(terms: Sum) -> Iterator[Choice]:
-    """Yield the parameters in a sum that depend on a direction."""
-    for factor in (factor for product in terms for factor in (*product.above, *product.below)):
-        if isinstance(factor, Choice):
-            yield factor
-        elif isinstance(factor, Group | Call):
-            yield from _choices(factor.inner)
-        elif isinstance(factor, Cases):
-            yield from _choices((*factor.at_most_zero, *factor.otherwise))
+def _choices(x: Expression) -> Iterator[Operation]:
+    if isinstance(x, Operation):
+        if x.op == "directed":
+            yield x
+        for arg in x.args[2:] if x.op == "dead band" else x.args:  # its width has an equation of its own
+            yield from _choices(arg)
+
+
+# ---- Sums of products ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Product:
+    """A sign, the factors above the fraction bar, and those below it. A factor is not a product itself."""
+
+    sign: int = 1
+    above: tuple[Expression, ...] = ()
+    below: tuple[Expression, ...] = ()
+
+    def __mul__(self, other: "Product") -> "Product":
+        """Return the product of both, with numbers first."""
+        above = sorted((*self.above, *other.above), key=lambda factor: not isinstance(factor, Number))
+        return Product(self.sign * other.sign, tuple(above), (*self.below, *other.below))
+
+
+def products(x: Expression) -> list[Product]:
+    """Return a formula as a sum of products. Common first factors stand before a bracket: a x - a y becomes a (x - y).
+
+    Numbers count as equal if their first twelve digits are.
+    """
+    alike: dict[object, list[Product]] = {}
+    for place, one in enumerate(_terms(x)):
+        head = one.above[0] if len(one.above) > 1 else None
+        key = f"{head.value:.12g}" if isinstance(head, Number) else head or place
+        alike.setdefault(key, []).append(one)
+    found = []
+    for first, *others in alike.values():
+        rest = total(scaled(one.sign * first.sign, _quotient(one.above[1:], one.below)) for one in (first, *others))
+        found.append(Product(first.sign, first.above[:1]) * _product(rest) if others else first)
+    return found
+
+
+def _quotient(above: Iterable[Expression], below: tuple[Expression, ...]) -> Expression:
+    return product(*above) / product(*below) if below else product(*above)
+
+
+def _terms(x: Expression) -> list[Product]:
+    match x:
+        case Number(0.0):
+            return []
+        case Operation("+" | "-" as op, (left, right)):
+            sign = Product(1 if op == "+" else -1)
+            return _terms(left) + [sign * one for one in _terms(right)]
+    one = _product(x)
+    is_sum = len(one.above) == 1 and not one.below and _is_sum(one.above[0])
+    return [Product(one.sign) * term for term in _terms(one.above[0])] if is_sum else [one]
+
+
+def _is_sum(x: Expression) -> bool:
+    return isinstance(x, Operation) and x.op in ("+", "-")
+
+
+def _product(x: Expression) -> Product:  # noqa: PLR0911 - a case for each operation
+    """Return a formula as one product, in which a sum of several products is a factor."""
+    match x:
+        case Number(1.0):
+            return Product()
+        case Operation("neg", (inner,)):
+            return Product(-1) * _product(inner)
+        case Operation("saturated", (inner,)):
+            return _product(inner)
+        case Operation("*", (left, right)):
+            return _product(left) * _product(right)
+        case Operation("/", (left, right)):
+            below = _product(right)
+            return _product(left) * Product(below.sign, below.below, below.above)
+        case Operation("+" | "-"):
+            terms = products(x)
+            if len(terms) == 1:
+                return terms[0]
+            if all(one.sign < 0 for one in terms):
+                return Product(-1, (total(_quotient(one.above, one.below) for one in terms),))
+    return Product(1, (x,))
 
 
 # ---- Written ---------------------------------------------------------------------------------------------------------
 
 
+_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"}
+
+
+def symbol_of(identifier: str) -> Symbol:
+    """Return the symbol of a name without the name of a part: a letter and its indices, as in m_a_u or alpha_u."""
+    letter, *indices = identifier.removesuffix(REVERSE).split("_")
+    index, upper = (*indices, "", "")[:2]
+    return Symbol(_GREEK.get(letter, letter), index, upper, "−" if identifier.endswith(REVERSE) else "")
+
+
 def symbols(layout: Layout) -> dict[str, Symbol]:
-    """Return the symbol of every name in the equations of a vehicle."""
-    found = {name: Symbol(name) for name in (*layout.velocities, *layout.pose)}
-    found |= {"phi": Symbol("φ"), "theta": Symbol("θ"), "psi": Symbol("ψ"), "eta": Symbol("η")}
-    found |= {f"epsilon_{n}": Symbol("ε", f"{n}") for n in (1, 2, 3)}
-    found |= {name: Symbol(*name.split("_", 1)) for name in (*layout.inputs, *BODY, *RESTORING, *rotation_formulas())}
-    found |= {"R": Symbol("R"), "gamma": Symbol("γ")}
-    for key, *velocities in layout.cross:
-        name = cross_name(key, *velocities)
-        letter, _, rest = name.partition("_")
-        found[name] = Symbol(letter, *rest.split("_"))
-    found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
+    """Return the symbol of every name in the equations of a vehicle that contains the name of a part."""
+    names = equation_of(layout).names
+    found = {names("battery").identifier: Symbol("U")}
     mark = "d" if layout.has_dead_time else ""
-    found |= {f"fraction_{name}": Symbol("u", name.removeprefix("u_"), mark) for name in layout.commands}
-    found |= {"battery": Symbol("U"), "T_d": Symbol("T", "d")}
+    for name in layout.commands:
+        own = name.removeprefix("u_")
+        found |= {name: Symbol("u", own), names("fraction", name).identifier: Symbol("u", own, mark)}
+    found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
     for fin in layout.fins:
-        found[f"angle_{fin.name}"] = Symbol("δ", fin.name)
-        found |= {fin.coefficient(key): Symbol(letter, fin.name) for key, letter in (("lift", "l"), ("drag", "d"))}
+        found[names("angle", fin.name).identifier] = Symbol("δ", fin.name)
+        found |= {fin.coefficient(key): Symbol(key[0], fin.name) for key in ("lift", "drag")}
         found[fin.coefficient("angle_max")] = Symbol("δ", "max", fin.name)
     for t in layout.thrusters:
-        found[f"table_{t.name}"] = Symbol("f", t.curve)
-        letters = {"F": "F", "command": "c", "beyond": "m", "loss": "k"}
-        found |= {f"{word}_{t.name}": Symbol(letter, t.name) for word, letter in letters.items()}
-        found[f"steady_{t.name}"] = Symbol("F", t.name, mark="*")
+        letters = {"command": "c", "beyond": "m", "loss": "k"}
+        found |= {names(kind, t.name).identifier: Symbol(letter, t.name) for kind, letter in letters.items()}
+        found |= {names("table", t.name).identifier: Symbol("f", t.curve), f"F_{t.name}": Symbol("F", t.name)}
+        found[names("steady", t.name).identifier] = Symbol("F", t.name, mark="*")
     for curve in layout.curves:
         found[f"tau_{curve.name}"] = Symbol("τ", curve.name)
-        found |= {curve.coefficient(key): _coefficient(key, curve.name) for key in CURVE if key in curve.keys}
-    for form in layout.axes:
-        v = form.axis.velocity
-        found |= {form.coefficient(key): _coefficient(key, v) for key in AXIS if key in form.keys}
-        found |= {form.axis.coefficient(key): Symbol({"alpha": "α", "beta": "β"}[key], v) for key in TUNING}
-        found[f"M_{v}"] = Symbol("M", v)
-        found |= {f"m_{v}{other}": Symbol("m", f"{v}{other}") for other in layout.velocities}
+        for key in curve.keys:  # a_t of the curve rear has the index t below and rear above; T has only rear below
+            symbol = symbol_of(key)
+            above = {"upper": curve.name} if symbol.index else {"index": curve.name}
+            found[curve.coefficient(key)] = replace(symbol, **above)
     return found
-
-
-def _coefficient(key: str, owner: str) -> Symbol:
-    """Return the symbol of a coefficient of a curve or an axis.
-
-    a_t of the curve rear is the letter a with the index t below and rear above; T has only the index below.
-    """
-    letter, _, index = key.removesuffix(REVERSE).partition("_")
-    mark = "−" if key.endswith(REVERSE) else ""
-    return Symbol(letter, index, owner, mark) if index else Symbol(letter, owner, "", mark)
 
 
 class Text:
     """Equations as plain text, with the names of the FMU's variables."""
 
     forms: Mapping[str, str] = {
-        "dotted": "{}'",
+        "rate": "{}'",
         "number": "{}",
         "equal": "{} = {}",
         "sign": " {} ",
@@ -287,54 +372,65 @@ class Text:
 
     def line(self, line: Line) -> str:
         """Write one equation."""
-        name = self.factor(line.name)
-        rate = self.write("dotted", name) if line.is_rate else name
-        left = self.side_by_side([*map(self.factor, line.factors), rate])
-        for factor, other in line.coupled:
-            left += self.write("sign", "+")
-            left += self.side_by_side([self.factor(factor), self.write("dotted", self.factor(other))])
+        left = self.factor(line.name)
+        if line.factor is not None:
+            left = self.rate(line.factor, line.name)
+        for factor, name in line.coupled:
+            left += self.write("sign", "+") + self.rate(factor, name)
         return self.write("equal", left, self.sum(line.right))
 
-    def sum(self, terms: Sum) -> str:
-        """Write a sum."""
+    def rate(self, factor: Expression, name: Name) -> str:
+        """Write a factor times a time derivative."""
+        return self.factors((factor, call("rate", name)) if factor != ONE else (call("rate", name),))
+
+    def sum(self, x: Expression) -> str:
+        """Write a formula as a sum of products."""
+        return self.terms(products(x))
+
+    def terms(self, terms: Iterable[Product]) -> str:
+        """Write a sum of products."""
         text = ""
-        for product in terms:
-            if text or product.sign < 0:
-                text += self.write("sign" if text else "first", "−" if product.sign < 0 else "+")
-            if product.below:
-                text += self.write("fraction", *map(self.part, (product.above, product.below)))
+        for one in terms:
+            if text or one.sign < 0:
+                text += self.write("sign" if text else "first", "−" if one.sign < 0 else "+")
+            if one.below:
+                text += self.write("fraction", self.part(one.above), self.part(one.below))
             else:
-                text += self.factors(product.above)
+                text += self.factors(one.above)
         return text or self.write("number", "0")
 
-    def factors(self, factors: tuple[Factor, ...]) -> str:
+    def factors(self, factors: tuple[Expression, ...]) -> str:
         """Write a product."""
         counts = [(self.factor(factor), len(list(equal))) for factor, equal in groupby(factors)]
         texts = [self.write("power", text, n, str(n).translate(RAISED)) if n > 1 else text for text, n in counts]
         return self.side_by_side(texts) or self.write("number", "1")
 
-    def part(self, factors: tuple[Factor, ...]) -> str:
+    def part(self, factors: tuple[Expression, ...]) -> str:
         """Write the numerator or the denominator of a fraction."""
         return self.factors(factors) if len(factors) < 2 else self.write("bracket", self.factors(factors))
 
-    def factor(self, factor: Factor) -> str:
-        """Write a factor."""
-        match factor:
-            case str():
-                return self.symbol(self._symbols[factor])
-            case float():
-                return self.write("number", number(factor, 4))
-            case Choice():
-                return self.symbol(replace(self._symbols[factor.forward], mark="±"))
-            case Group():
-                return self.write("bracket", self.sum(factor.inner))
-            case Call():
-                parts = self.sum(factor.inner), self.sum(factor.second)
-                is_own = factor.function in self.forms
-                return self.write(*([] if is_own else ["function"]), factor.function, *parts)
-            case Cases():
-                values = self.sum(factor.otherwise), self.sum(factor.at_most_zero)
-                return self.write("cases", self.factor(factor.name), *values)
+    def factor(self, x: Expression) -> str:  # noqa: PLR0911 - a case for each kind of factor
+        """Write a factor. Raises ValueError if there is no way to show it."""
+        match x:
+            case Name(identifier):
+                return self.symbol(self.symbol_of(identifier))
+            case Number(value):
+                return self.write("number", number(value, 4))
+            case Operation("directed", (_, Name(identifier), _)):
+                return self.symbol(replace(self.symbol_of(identifier), mark="±"))
+            case Operation("dead band", (beyond, _, force)):
+                return self.write("cases", self.factor(beyond), self.sum(force), self.sum(Number(0.0)))
+            case Operation("+" | "-"):
+                return self.write("bracket", self.sum(x))
+            case Operation(function, args) if function in self.forms:
+                return self.write(function, *map(self.sum, args))
+            case Operation(function, (argument,)) if function in FUNCTIONS:
+                return self.write("function", function, self.sum(argument))
+        raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
+
+    def symbol_of(self, identifier: str) -> Symbol:
+        """Return the symbol of a name."""
+        return self._symbols.get(identifier) or symbol_of(identifier)
 
     def write(self, form: str, *parts: object) -> str:
         """Fill the parts into one of the forms."""
@@ -355,7 +451,7 @@ class MathML(Text):
 
     _CELL = '<mtd style="text-align: left">'
     forms: Mapping[str, str] = {
-        "dotted": "<mover>{}<mo>˙</mo></mover>",
+        "rate": "<mover>{}<mo>˙</mo></mover>",
         "number": "<mn>{}</mn>",
         "equal": "{}<mo>=</mo>{}",
         "sign": "<mo>{}</mo>",
@@ -373,13 +469,14 @@ class MathML(Text):
         f"{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr><mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
     }
 
-    def terms(self, line: Line) -> Iterator[str]:
+    def parts(self, line: Line) -> Iterator[str]:
         """Yield the left side with the first term, and then each term: a line may break between them."""
-        first, *others = line.right
-        yield self.line(replace(line, right=(first,)))
-        for product in others:
-            sign = "−" if product.sign < 0 else "+"
-            yield f'<mo form="infix">{sign}</mo>{self.sum((replace(product, sign=1),))}'
+        first, *others = products(line.right)
+        left = self.line(replace(line, right=Number(0.0))).removesuffix(self.sum(Number(0.0)))
+        yield left + self.terms([first])
+        for one in others:
+            sign = "−" if one.sign < 0 else "+"
+            yield f'<mo form="infix">{sign}</mo>{self.terms([replace(one, sign=1)])}'
 
     def symbol(self, symbol: Symbol) -> str:
         letter, index, upper = (
@@ -391,10 +488,9 @@ class MathML(Text):
             return f"<msubsup>{letter}{index or '<mrow/>'}{upper}</msubsup>"
         return f"<msub>{letter}{index}</msub>" if index else letter
 
-    def part(self, factors: tuple[Factor, ...]) -> str:
-        match factors:
-            case (Group(inner=inner),):  # the bar replaces the brackets
-                return self.sum(inner)
+    def part(self, factors: tuple[Expression, ...]) -> str:
+        if len(factors) == 1 and _is_sum(factors[0]):  # the bar replaces the brackets
+            return self.sum(factors[0])
         return self.factors(factors)
 
     def side_by_side(self, factors: Iterable[str]) -> str:

@@ -14,7 +14,7 @@ from rov_fmu.model.attitude import (
     start_formulas,
     unwrapped,
 )
-from rov_fmu.model.formula import compiled
+from rov_fmu.model.expression import compiled, of
 
 ENTRIES = [f"R_{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
 ATTITUDES = {
@@ -70,7 +70,7 @@ def test_the_quaternion_turns_by_half_its_product_with_the_rates() -> None:
         ],
         rel=1e-15,
     )
-    assert quaternion_rates(frozenset("uvw")) == dict.fromkeys(QUATERNION, "0")
+    assert quaternion_rates(frozenset("uvw")) == dict.fromkeys(QUATERNION, of(0.0))
 
 
 @pytest.mark.parametrize(

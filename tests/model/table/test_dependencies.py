@@ -6,23 +6,24 @@ import pytest
 
 from rov_fmu.model import dependencies
 from rov_fmu.model.dependencies import dependencies_of, parameters_of
-from rov_fmu.model.equation import Equation, Term, equation_of
+from rov_fmu.model.equation import ONE, Equation, Term, equation_of
+from rov_fmu.model.expression import Name, directed, of
 from rov_fmu.model.layout import Layout
 from tests.vehicles import HEAVY, VIDEORAY
 
 ADDED = {
-    "a number": (Term("-2.5", ("z",)), "constant", ()),
-    "a formula of numbers": (Term("(3 - 1) / 4", ("z",)), "constant", ()),
-    "a fixed parameter": (Term("R", ("z",)), "fixed", ("R",)),
-    "a formula of fixed parameters": (Term("arm", ("z",)), "fixed", ("R", "gamma")),
-    "a tunable parameter": (Term("alpha_w", ("z",)), "tunable", ("alpha_w",)),
-    "a formula of fixed and tunable parameters": (Term("gain_w", ("z",)), "tunable", ("m_rov", "beta_w")),
-    "another state": (Term("1", ("z", "psi")), "dependent", ()),
-    "itself": (Term("1", ("z", "z")), "dependent", ()),
-    "an input": (Term("Z_ext", ("z",)), "dependent", ()),
-    "a formula of inputs": (Term("F_t", ("z",)), "dependent", ("a_t_top", "b_t_top")),
-    "a choice by a state": (Term("(2 if psi < 0 else 1)", ("z",)), "dependent", ()),
-    "a coefficient of zero": (Term("0", ()), None, ()),
+    "a number": (Term(of(-2.5), ("z",)), "constant", ()),
+    "a formula of numbers": (Term((of(3.0) - 1.0) / 4.0, ("z",)), "constant", ()),
+    "a fixed parameter": (Term(Name("R"), ("z",)), "fixed", ("R",)),
+    "a formula of fixed parameters": (Term(Name("arm"), ("z",)), "fixed", ("R", "gamma")),
+    "a tunable parameter": (Term(Name("alpha_w"), ("z",)), "tunable", ("alpha_w",)),
+    "a formula of fixed and tunable parameters": (Term(Name("gain_w"), ("z",)), "tunable", ("m_rov", "beta_w")),
+    "another state": (Term(ONE, ("z", "psi")), "dependent", ()),
+    "itself": (Term(ONE, ("z", "z")), "dependent", ()),
+    "an input": (Term(Name("Z_ext"), ("z",)), "dependent", ()),
+    "a formula of inputs": (Term(Name("F_t"), ("z",)), "dependent", ("a_t_top", "b_t_top")),
+    "a choice by a state": (Term(directed(Name("psi"), ONE, of(2.0)), ("z",)), "dependent", ()),
+    "a coefficient of zero": (Term(of(0.0), ()), None, ()),
 }
 """For each case: a term that is added to the rate of u, the expected kind of dependency on z, and its parameters."""
 
