@@ -22,17 +22,12 @@ _HOLD, _REST = 8.0, 4.0
 """How long a command is held, and the rest after it, s."""
 _COASTING, _STEP = 60.0, 0.02
 """The coasting after a test that stays within the tank, and the step with which it is simulated, s."""
-_EXACT_ENOUGH = 0.02
-"""The relative half-width of an interval that no test needs to narrow: V_ss is never claimed to better than 1 %."""
 _RATE = 10.0
 """The samples per second of the proposed test."""
 
 
 def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: TankLimits) -> NextTest | None:
-    """Return the test that narrows the least certain steady velocity of an axis most.
-
-    None if no log tests the axis, or if all its velocities are well known.
-    """
+    """Return the test that narrows the least certain steady velocity of an axis most; None without a log of it."""
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
 
     def motion(z: Array, command: float) -> Riccati:
@@ -53,8 +48,6 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
     slopes = posterior.slopes(logarithms, posterior.of_vehicle)
     now = _widths(slopes, posterior.covariance)
     worst = int(np.argmax(now))
-    if now[worst] < _EXACT_ENOUGH:
-        return None
     found = []
     for strength in _STRENGTHS:
         hold = _hold([motion(posterior.z, c) for c in (0.0, strength, -strength)], axis, limits)
