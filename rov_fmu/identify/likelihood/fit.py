@@ -97,17 +97,19 @@ def _scaled(known: Beginning, objective: Objective, z: Array) -> Array:
     Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
     The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
     """
-    direction = np.zeros(len(z))
+    direction, loads = np.zeros(len(z)), np.zeros(len(z), bool)
     for n, p in enumerate(objective.table.parameters):
         if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
             direction[n] = 1.0
         elif p.kind == "load":
             axis = next(axis for axis in known.fitted if axis.name == p.of)
             direction[n] = z[n] + known.coefficients[axis.coefficient("F_0")] / known.full[p.of]
-    weight = direction / objective.deviation**2
+            loads[n] = True
     if not direction.any():
         return z
-    moved = z - direction * float(weight @ (z - objective.mean)) / float(weight @ direction)
+    weight = direction / objective.deviation**2
+    change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
+    moved = z + direction * np.where(loads, np.expm1(change), change)  # the others are logarithms
     moved = np.clip(moved, objective.low, objective.high)
     if objective.prior(moved) > objective.prior(z) - ENOUGH:
         return z
