@@ -100,7 +100,7 @@ def test_what_the_tank_tutorial_says_of_the_thrust_is_so(otter: Identification) 
     pulls = np.loadtxt(otter.folder.path / "thrust_rear.csv", delimiter=",", skiprows=1)
     off = [force - bollard_pull("rear", command / 100.0) for command, force in pulls.tolist()]
     assert np.std(off) == pytest.approx(float(scatter), rel=0.3)
-    assert forces[:, 1] == pytest.approx(rear_forces(OTTER)[:, 1], rel=0.03)
+    assert forces[:, 1] == pytest.approx(rear_forces(OTTER)[:, 1], rel=0.05)
 
 
 @pytest.mark.long
