@@ -565,7 +565,8 @@ static void correct(const filter *f, belief *b, const double gain[N_X], double o
     }
 }
 
-/* Take one sample into the belief, and write its innovation, its variance and its gain. */
+/* Take one sample into the belief, and write its innovation, its variance and its gain. A sample far beside its prediction counts less.
+ * If the sensor's sample before was, too, it has its full weight: then the state is lost, and not the sample. */
 static void take(filter *f, belief *b, ptrdiff_t k, int repeats, double *off, double *variance, double gain[N_X])
 {
     const int sensor = f->log->sensor[k];

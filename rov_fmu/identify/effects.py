@@ -6,10 +6,10 @@ import numpy as np
 
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.parameters import Beginning, Parameter
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, Sensor
+from rov_fmu.model.layout import AXES
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -22,13 +22,12 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if p.null is None:
             continue
         posterior = fit.posterior.without([m for m in gone if m != n])
-        factor, unit = _in_units(fit.known, p)
-        value, error = number(p, posterior.z[n]) * factor, posterior.errors[n] * factor
+        value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
         if p.kind == "dead band":
             error = max(error, EXACT_BAND / QUANTILE)
         if p.kind == "load":
-            axis = next(axis for axis in fit.known.fitted if axis.name == p.of)
-            value += fit.known.coefficients[axis.coefficient("F_0")]
+            full = fit.known.full[p.of]
+            value, error, unit = (value - p.null) * full, error * full, AXES[p.of].load
         if p.kind in ("reverse thrust", "drag astern"):
             low, high = (float(np.exp(end)) for end in around(value, error))
             yield Effect(p.kind, p.of, _WORDS[p.kind], float(np.exp(value)), (low, high), "1", posterior.evidence(n))
@@ -56,13 +55,6 @@ _WORDS = {
 }
 
 
-def _in_units(known: Beginning, p: Parameter) -> tuple[float, str]:
-    """Return what turns the number of an effect into its unit, and the unit."""
-    if p.kind == "load":
-        return known.full[p.of], next(axis for axis in known.fitted if axis.name == p.of).load
-    return 1.0, p.unit
-
-
 def loggers_of(fit: Fit) -> Iterator[Logging]:
     """Yield how long after their rows the commands of each log act, s, without the dead time of the vehicle."""
     posterior, table = fit.posterior, fit.posterior.table
@@ -86,7 +78,8 @@ def sensors_of(fit: Fit) -> Iterator[Sensor]:
     counts: dict[str, int] = {}
     outlying: dict[str, list[bool]] = {}
     first: dict[str, SampledChannel] = {}
-    for one, record, data in zip(fit.objective.logs, fit.objective.records, fit.best.data, strict=False):
+    logs = fit.objective.logs
+    for one, record, data in zip(logs, fit.objective.records, fit.best.data[: len(logs)], strict=True):
         for place, m in enumerate(one.measured):
             name = m.channel.quantity.name
             counts[name] = counts.get(name, 0) + len(m.channel.values)

@@ -11,10 +11,7 @@ from rov_fmu.identify.likelihood.curves import fitted
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
-from rov_fmu.identify.result import (
-    Coefficient,
-    Interval,
-)
+from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -28,23 +25,27 @@ EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
 
 
-def identified_vehicle(tests: Tests, fit: Fit) -> Vehicle:
-    """Return the vehicle with its sources, intervals and correlations."""
+def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coefficient]]:
+    """Return the vehicle with its sources, intervals and correlations, and the coefficients that the fit changes.
+
+    These have intervals where the tests determine them.
+    """
     given, kept = tests.given, fit.kept
     layout = _layout(tests, fit)
-    coefficients = _in_file(fit, kept.z)
-    coefficients |= {  # a file has no smaller exponent
-        c.coefficient("n_V"): max(coefficients[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
+    values = _in_file(fit, kept.z)
+    values |= {  # a file has no smaller exponent
+        c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
     }
-    rov = Rov(layout, {name: coefficients.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
+    rov = Rov(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in given.known.items() if name in layout.coefficients}
-    identified = {one.name: one.interval for one in _identified(fit, rov) if one.interval}
+    changed = _changed(fit, rov)
+    coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
+    identified = {name: one.interval for name, one in coefficients.items() if one.interval}
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = given.description.base_quantities
     sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
     intervals = {name: q.interval for name, q in known.items() if q.interval}
     estimates: dict[str, Estimated] = {}
-    changed = _changed(fit, rov)
     names = [name for name in changed if name in identified or name in intervals]
     for name in changed:
         sources[name] = _SOURCE if name in identified else f"{sources[name]}; adapted to the tests"
@@ -69,11 +70,11 @@ def identified_vehicle(tests: Tests, fit: Fit) -> Vehicle:
             )
     validity = given.description.tables.validity
     made = Provenance(f"rov-fmu {__version__} identify", METHOD, tests.inputs, data=_data(fit))
-    return Vehicle(
+    vehicle = Vehicle(
         **dict(given.head),
         rov=rov,
         sources=sources,
-        command_range=validity.command_range if validity else _command_range(fit),
+        command_range=validity.command_range if validity else fit.command_range,
         alternatives={},
         data=None,
         limits=given.description.limits,
@@ -83,6 +84,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> Vehicle:
         voltage_source="" if layout.voltage is None else "Mean voltage of the logs",
         thruster_sources=given.thruster_sources,
     )
+    return vehicle, coefficients
 
 
 def _given_the_last(covariance: Array, count: int) -> Array:
@@ -109,7 +111,7 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
 
     A file has no shapes of curves: a_t and b_t are those of the nearest curve over the tested commands.
     """
-    table, (low, high) = fit.kept.table, _command_range(fit)
+    table, (low, high) = fit.kept.table, fit.command_range
     coefficients = table.coefficients(z.tolist())
     shapes, rov = table.shapes(z.tolist()), Rov(table.layout, coefficients)
     for curve in fit.known.curves:
@@ -201,27 +203,9 @@ def _data(fit: Fit) -> str:
     return " and ".join(parts) or "given values"
 
 
-def _command_range(fit: Fit) -> tuple[float, float]:
-    """Return the weakest and the strongest command of the tests."""
-    used = [abs(row.command) for row in fit.objective.rows]
-    for one in fit.objective.logs:
-        assert one.log.commands
-        used += np.abs(one.log.commands.value).tolist()
-    used = [round(c, 6) for c in used if c > 1e-3]
-    low, high = min(used, default=0.0), max(used, default=1.0)
-    return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
-
-
-def _identified(fit: Fit, rov: Rov) -> Iterator[Coefficient]:
-    """Yield the coefficients of the vehicle that the tests determine."""
-    names = [name for name in _changed(fit, rov) if not name.startswith("alpha_")]
-    for one in _known_of(fit, rov, names):
-        if one.interval:
-            yield one
-
-
-def _known_of(fit: Fit, rov: Rov, names: Sequence[str]) -> Iterator[Coefficient]:
-    """Yield coefficients with their intervals, where the tests determine them."""
+def _coefficients(fit: Fit, rov: Rov, changed: Sequence[str]) -> Iterator[Coefficient]:
+    """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
+    names = [name for name in changed if not name.startswith("alpha_")]
     if not names:
         return
     _, covariance, prior = _numbers(fit, names)
@@ -244,9 +228,3 @@ def _interval(rov: Rov, name: str, error: float) -> Interval:
         error = max(error, EXACT_BAND / QUANTILE)
     low, high = around(rov[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
     return max(low, declaration.minimum), min(high, declaration.maximum)
-
-
-def known_of(fit: Fit, vehicle: Vehicle, names: Sequence[str]) -> Iterator[Coefficient]:
-    """Yield those of some coefficients that the fit changes, with intervals where the tests determine them."""
-    changed = _changed(fit, vehicle.rov)
-    yield from _known_of(fit, vehicle.rov, [n for n in names if n in changed])

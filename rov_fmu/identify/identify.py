@@ -3,7 +3,7 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -12,10 +12,10 @@ from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import facts, findings_of, warnings
-from rov_fmu.identify.identified_vehicle import identified_vehicle, known_of
+from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.result import AxisResult, Disturbance, Identification, Prediction, Slip
+from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Identification, Prediction, Slip
 from rov_fmu.identify.rows import HeldOut, held_out_rows, points_of
 from rov_fmu.identify.unexplained.disturbances import disturbances
 from rov_fmu.identify.unexplained.slips import slips
@@ -43,12 +43,12 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     if not (known.fitted or known.curves):
         own = ", ".join(sorted(tests.given.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
-    fit = fit_all(tests, known, logs, rows, on_progress)
+    fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
     on_progress("predicting what was left out", 0.85)
     predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior)]
     unexplained = disturbances(fit.objective, fit.best, fit.posterior)
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
-    vehicle = identified_vehicle(tests, fit)
+    vehicle, coefficients = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.rov.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
@@ -57,7 +57,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
-        axes.append(_axis(tests, fit, vehicle, axis, predicted, slow, wrong, held_out))
+        axes.append(_axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out))
     names = tuple(vehicle.estimates)
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings]),
@@ -65,10 +65,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         vehicle=vehicle,
         against=against,
         axes=tuple(axes),
-        curves={
-            curve.name: tuple(known_of(fit, vehicle, [curve.coefficient(key) for key in curve.keys]))
-            for curve in known.curves
-        },
+        curves={curve.name: _those_of(coefficients, map(curve.coefficient, curve.keys)) for curve in known.curves},
         forces=tuple(points_of(tests, held_out, vehicle.rov, "thrust")),
         effects=tuple(effects_of(fit)),
         disturbances=tuple(slow),
@@ -90,6 +87,7 @@ def _axis(
     tests: Tests,
     fit: Fit,
     vehicle: Vehicle,
+    coefficients: Mapping[str, Coefficient],
     axis: Axis,
     predicted: Sequence[Prediction],
     slow: Sequence[Disturbance],
@@ -109,8 +107,13 @@ def _axis(
         axis=axis,
         verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files]),
         answers=answers,
-        known=tuple(known_of(fit, vehicle, names)),
+        known=_those_of(coefficients, names),
         predictions=own,
         points=tuple(points),
         next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits),
     )
+
+
+def _those_of(coefficients: Mapping[str, Coefficient], names: Iterable[str]) -> tuple[Coefficient, ...]:
+    """Return the coefficients with these names, of those that the fit changes."""
+    return tuple(coefficients[name] for name in names if name in coefficients)

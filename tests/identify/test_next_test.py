@@ -32,7 +32,7 @@ def fitted(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]
         write_log(path, name, clean(TRUTH, axis, plan, 10.0).noisy(random))
     tests = load_tests(path)
     known, recorded, rows = begin(tests)
-    return fit_all(tests, known, recorded, rows)
+    return fit_all(tests.folder.path, known, recorded, rows)
 
 
 @pytest.fixture(scope="module")

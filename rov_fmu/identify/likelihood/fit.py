@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from rov_fmu.engine.filter import DivergedError
-from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -48,9 +49,20 @@ class Fit:
     difference: float
     """How much larger J is at the end of the second start."""
 
+    @cached_property
+    def command_range(self) -> tuple[float, float]:
+        """The weakest and the strongest command of the tests."""
+        used = [abs(row.command) for row in self.objective.rows]
+        for one in self.objective.logs:
+            assert one.log.commands
+            used += np.abs(one.log.commands.value).tolist()
+        used = [round(c, 6) for c in used if c > 1e-3]
+        low, high = min(used, default=0.0), max(used, default=1.0)
+        return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
+
 
 def fit_all(
-    tests: Tests, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
+    folder: Path, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
 ) -> Fit:
     """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples."""
     table = table_of(known, logs, sorted({row.noise for row in rows}))
@@ -71,14 +83,14 @@ def fit_all(
         except DivergedError:
             continue
     if not ends:
-        raise DataFileError(f"{tests.folder.path}: no simulation of the logs stays finite. Are units and signs right?")
+        raise DataFileError(f"{folder}: no simulation of the logs stays finite. Are units and signs right?")
     ends.sort(key=lambda end: end.value)
 
     def show_full(step: int) -> None:
         on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
 
-    best = minimise(full, _scaled(known, full, ends[0].z), on_step=show_full)
-    scaled = _scaled(known, full, best.z)
+    best = minimise(full, _scaled(full, ends[0].z), on_step=show_full)
+    scaled = _scaled(full, best.z)
     if scaled is not best.z:
         best = minimise(full, scaled, on_step=show_full, most=2)
     posterior = Posterior.of(table, best.z, best.information)
@@ -91,20 +103,17 @@ def fit_all(
     return Fit(known, full, best, posterior, averaged, kept, float(difference))
 
 
-def _scaled(known: Beginning, objective: Objective, z: Array) -> Array:
+def _scaled(objective: Objective, z: Array) -> Array:
     """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
 
     Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
     The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
     """
-    direction, loads = np.zeros(len(z)), np.zeros(len(z), bool)
-    for n, p in enumerate(objective.table.parameters):
-        if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
-            direction[n] = 1.0
-        elif p.kind == "load":
-            axis = next(axis for axis in known.fitted if axis.name == p.of)
-            direction[n] = z[n] + known.coefficients[axis.coefficient("F_0")] / known.full[p.of]
-            loads[n] = True
+    kinds = np.array([p.kind for p in objective.table.parameters])
+    loads = kinds == "load"
+    no_load = np.array([p.null or 0.0 for p in objective.table.parameters])
+    direction = np.isin(kinds, ("thrust scale", "inertia", "quadratic drag", "linear drag")) * 1.0
+    direction[loads] = (z - no_load)[loads]
     if not direction.any():
         return z
     weight = direction / objective.deviation**2
