@@ -289,7 +289,13 @@ def _print_built(built: "Built", seconds: float) -> None:
     type=_seconds("1e-6"),
     help="Time between two results, s. The default is 0.01. It does not change the motion.",
 )
-@click.option("-o", "--output", type=_FILE, metavar="RESULT.csv", help="Table of results to write, .csv or .parquet.")
+@click.option(
+    "-o",
+    "--output",
+    type=_FILE,
+    metavar="RESULT.csv",
+    help="Results to write: a table (.csv, .parquet), or .mcap for Foxglove and PlotJuggler.",
+)
 @click.option(
     "--plot",
     is_flag=False,
@@ -315,16 +321,24 @@ def _simulate(
     at the end are printed.
     """
     from rov_fmu.interface.model import load
-    from rov_fmu.interface.simulate_command import check_outputs, moves, print_final, run, title, write_results
+    from rov_fmu.interface.simulate_command import (
+        check_outputs,
+        is_mcap,
+        moves,
+        print_final,
+        run,
+        title,
+        write_results,
+    )
     from rov_fmu.report.console import print_end
 
     opens = plot == Path()
     loaded = load(vehicle)
     inputs = [vehicle, *loaded.files, *([commands] if commands else [])]
     check_outputs(output, None if opens else plot, inputs)
-    result = run(loaded, settings, commands, stop, step)
+    result = run(loaded, settings, commands, stop, step, with_inputs=is_mcap(output))
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    write_results(result, output, picture, title(loaded, settings, commands))
+    write_results(loaded, result, output, picture, title(loaded, settings, commands))
     if opens and picture:
         _open(picture, "--plot FILE.svg")
     following = "open the plot" if plot and not opens else "add --plot to see the curves" if not opens else ""

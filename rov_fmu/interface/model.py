@@ -138,6 +138,20 @@ class VehicleModel(Vehicle):
         workers = checked_workers(workers) or usable_cores()
         return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True)
 
+    def to_mcap(self, result: Result) -> bytes:
+        """Return a simulation of this vehicle as the content of an MCAP file, for Foxglove and PlotJuggler.
+
+        `Path("run.mcap").write_bytes(vehicle.to_mcap(result))`. The file has the pose and the jets of the vehicle, as
+        far as their variables were recorded, and all recorded inputs and outputs by name (rov_fmu/bridges/mcap.py).
+
+        Raises InputError if the result is that of many vehicles, or where foxglove-sdk is not installed.
+        """
+        from rov_fmu.bridges.mcap import motion_mcap
+
+        if any(values.ndim != 1 for values in result.values()):
+            raise InputError("result: must be the simulation of one vehicle")
+        return motion_mcap(self, result.time, result)
+
     @property
     def force_names(self) -> tuple[str, ...]:
         """The names of the components of `forces`, in their order."""

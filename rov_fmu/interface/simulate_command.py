@@ -23,7 +23,7 @@ _STOP, _STEP = 10.0, 0.01
 _SHORTEST = 1e-6
 """The shortest simulation, s."""
 _MOST_RESULTS = 1_000_000
-_TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet"), (".png", ".svg", ".pdf")
+_TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet", ".mcap"), (".png", ".svg", ".pdf")
 
 
 def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]) -> None:
@@ -40,9 +40,18 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
 
 
 def run(
-    vehicle: VehicleModel, settings: Sequence[str], commands: Path | None, stop: float | None, step: float | None
+    vehicle: VehicleModel,
+    settings: Sequence[str],
+    commands: Path | None,
+    stop: float | None,
+    step: float | None,
+    *,
+    with_inputs: bool = False,
 ) -> Result:
-    """Simulate a vehicle as the options say. Raises InputError, FileError, BuildError."""
+    """Simulate a vehicle as the options say, and record the inputs, too, if it is asked for.
+
+    Raises InputError, FileError, BuildError.
+    """
     inputs: dict[str, Any] = {}
     if commands:
         inputs = {**read_inputs(commands, vehicle.layout)}
@@ -60,7 +69,10 @@ def run(
         ends = f"--stop {stop:g}" if commands is None or stop != inputs[TIME][-1] else f"{commands}, up to {stop:g} s,"
         raise InputError(f"{ends} needs a longer --step than {_STEP:g} s: at least {_least_step(stop):g} s")
     time = _result_times(_STOP if stop is None else stop, _STEP if step is None else step)
-    return vehicle.with_(**given.coefficients).simulate(time, inputs | given.inputs, start=given.start)
+    layout = vehicle.layout
+    record = [*layout.inputs, *layout.state, *layout.calculated] if with_inputs else None
+    changed = vehicle.with_(**given.coefficients)
+    return changed.simulate(time, inputs | given.inputs, start=given.start, record=record)
 
 
 def _result_times(stop: float, step: float) -> Array:
@@ -142,10 +154,17 @@ def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None)
     return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
 
 
-def write_results(result: Result, table: Path | None, plot: Path | None, title: str) -> None:
-    """Write a result as a table and as a plot, if there are paths for them. Raises InputError, WriteError."""
+def is_mcap(path: Path | None) -> bool:
+    """Return True if a result is to be written as MCAP."""
+    return path is not None and path.suffix.lower() == ".mcap"
+
+
+def write_results(vehicle: VehicleModel, result: Result, table: Path | None, plot: Path | None, title: str) -> None:
+    """Write a result as a table or as MCAP, and as a plot, if there are paths. Raises InputError, WriteError."""
     outputs = []
-    if table:
+    if table and is_mcap(table):
+        outputs.append(Output(table, vehicle.to_mcap(result)))
+    elif table:
         outputs.append(_table_output(result, table))
     if plot:
         outputs.append(_plot_output(result, plot, title))

@@ -1,0 +1,224 @@
+"""Motions as MCAP files, which Foxglove, PlotJuggler and Rerun open.
+
+The frames are those of REP 103 and REP 105, which these programs expect: `map` is east-north-up, and `base_link`, the
+frame of the vehicle, is forward-left-up. With the FMU's body frame (forward, starboard, down) and earth frame (north,
+east, down), the rotation from `base_link` to `map` is
+
+    T R diag(1, -1, -1),   T = [[0, 1, 0], [1, 0, 0], [0, 0, -1]],
+
+where R is the rotation from the FMU's body frame to its earth frame. Positions and orientations use Foxglove's
+schemas; all other variables are JSON with the names and units of the FMU, with north, east, and down as there.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rov_fmu.engine.simulation import Array
+from rov_fmu.io.messages import InputError
+from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.layout import Declaration
+from rov_fmu.report.plots.drawing import place
+from rov_fmu.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from foxglove import Context
+    from foxglove.messages import ArrowPrimitive, Color, Quaternion, SceneEntity, Vector3
+
+EARTH = "map"
+"""The name of the frame that is fixed to the earth: east, north, up."""
+BODY = "base_link"
+"""The name of the frame of the vehicle: forward, left, up. It is the same for all vehicles, so layouts fit all."""
+MISSING = "MCAP needs foxglove-sdk: pip install 'rov-fmu[ros]'"
+_TO_ENU = Rotation.from_matrix([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""The rotation from north-east-down to east-north-up."""
+_TO_FRD = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
+"""The rotation from forward-left-up to forward-starboard-down, which is its own inverse."""
+_SCENE_INTERVAL = 0.04
+"""The least time between two pictures of the vehicle, s: 25 pictures a second look smooth."""
+_LONGEST_JET = 1.5
+"""The length of the longest jet, relative to the size of the vehicle."""
+_LEAST_HULL = (0.2, 0.15, 0.1)
+"""The least length, width and height of the hull, m."""
+_HULL, _JET = (0.93, 0.69, 0.13, 0.8), (0.34, 0.71, 0.91, 0.9)
+"""The colours of the hull and of the jets: red, green, blue and opacity."""
+
+
+def motion_mcap(vehicle: Vehicle, time: Array, values: Mapping[str, Array]) -> bytes:
+    """Return a motion of a vehicle as the content of an MCAP file.
+
+    `time` has the times (s), and `values` the value of each variable at each of them, by the names of the FMU and in
+    its units. The topics are `/tf`, `/pose` and `/scene` with Foxglove's schemas, and `/inputs` and `/outputs` with
+    numbers by name. A pose coordinate that the vehicle does not have, such as the depth without heave, is 0. Inputs
+    are held: each is written when it changes.
+
+    Raises InputError where foxglove-sdk is not installed.
+    """
+    try:
+        from foxglove import Channel, Context, open_mcap
+        from foxglove.mcap import MCAPWriteOptions
+    except ImportError as error:
+        raise InputError(MISSING) from error
+    context, stream = Context(), BytesIO()
+    declared = vehicle.layout.inputs | vehicle.layout.state | vehicle.layout.calculated
+    inputs = {name: declared[name] for name in vehicle.layout.inputs if name in values}
+    outputs = {name: declared[name] for name in values if name in declared and name not in inputs}
+    options = MCAPWriteOptions(profile="", compression_threads=0)
+    with open_mcap(stream, context=context, writer_options=options) as writer:
+        writer.write_metadata("vehicle", {"name": vehicle.name, "version": vehicle.version, "source": vehicle.source})
+        rows = {
+            topic: Channel(topic, schema=_schema(topic, kinds), message_encoding="json", context=context)
+            for topic, kinds in (("/inputs", inputs), ("/outputs", outputs))
+            if kinds
+        }
+        stamps = nanoseconds(time)
+        log_pose = _pose_logger(vehicle, values, context)
+        before: dict[str, float] | None = None
+        for n, stamp in enumerate(stamps):
+            log_pose(n, stamp)
+            now = {name: float(values[name][n]) for name in inputs}
+            if now and now != before:
+                rows["/inputs"].log(now, log_time=stamp)
+                before = now
+            if outputs:
+                rows["/outputs"].log({name: float(values[name][n]) for name in outputs}, log_time=stamp)
+    return stream.getvalue()
+
+
+def nanoseconds(time: Array) -> list[int]:
+    """Return times in seconds as whole nanoseconds."""
+    return [round(t) for t in (1e9 * time).tolist()]
+
+
+def poses(values: Mapping[str, Array]) -> tuple[Array, Rotation]:
+    """Return the positions (times, 3) and the orientations of a vehicle in the frame `map`.
+
+    The variables are those of the FMU: x, y, z in m, and the quaternion or the heading psi in rad.
+    """
+    zero = np.zeros_like(next(iter(values.values())))
+    north, east, down = (values.get(name, zero) for name in "xyz")
+    if values.keys() >= set(QUATERNION):
+        turned = Rotation.from_quat(np.stack([values[name] for name in QUATERNION], axis=-1), scalar_first=True)
+    else:
+        turned = Rotation.from_euler("z", values.get("psi", zero)[:, None])
+    return np.stack([east, north, 0.0 - down], axis=-1), _TO_ENU * turned * _TO_FRD
+
+
+def _schema(topic: str, declared: Mapping[str, Declaration]) -> dict[str, Any]:
+    """Return the JSON schema of a topic with numbers by name. Each has its unit and its description."""
+    return {
+        "title": topic.removeprefix("/"),
+        "type": "object",
+        "properties": {
+            name: {"type": "number", "unit": of.unit, "description": f"{of.description} [{of.unit}]"}
+            for name, of in declared.items()
+        },
+    }
+
+
+def _pose_logger(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
+    """Return the function that writes pose and picture of the vehicle at the n-th time, with its stamp in ns."""
+    from foxglove.channels import FrameTransformsChannel, PoseInFrameChannel, SceneUpdateChannel
+    from foxglove.messages import FrameTransform, FrameTransforms, Pose, PoseInFrame, SceneUpdate, Timestamp
+
+    tf = FrameTransformsChannel("/tf", context=context)
+    pose = PoseInFrameChannel("/pose", context=context)
+    scene = SceneUpdateChannel("/scene", context=context)
+    positions, orientations = poses(values)
+    forces = {t.name: values[f"F_{t.name}"] for t in vehicle.layout.thrusters if f"F_{t.name}" in values}
+    strongest = max((float(np.nanmax(np.abs(force))) for force in forces.values()), default=0.0)
+    due = -1
+
+    def log(n: int, stamp: int) -> None:
+        nonlocal due
+        seconds, rest = divmod(stamp, 1_000_000_000)
+        at = Timestamp(sec=seconds, nsec=rest)
+        position, orientation = _vector(positions[n]), _quaternion(orientations[n])
+        transform = FrameTransform(
+            timestamp=at,
+            parent_frame_id=EARTH,
+            child_frame_id=BODY,
+            translation=position,
+            rotation=orientation,
+        )
+        tf.log(FrameTransforms(transforms=[transform]), log_time=stamp)
+        pose.log(
+            PoseInFrame(timestamp=at, frame_id=EARTH, pose=Pose(position=position, orientation=orientation)),
+            log_time=stamp,
+        )
+        if stamp >= due:
+            shares = {name: float(force[n]) / strongest if strongest else 0.0 for name, force in forces.items()}
+            scene.log(SceneUpdate(entities=[_picture(vehicle, shares)]), log_time=stamp)
+            due = stamp + round(1e9 * _SCENE_INTERVAL)
+
+    return log
+
+
+def _picture(vehicle: Vehicle, shares: Mapping[str, float]) -> "SceneEntity":
+    """Return a picture of the vehicle: a hull, and for each thruster its jet, which leaves against the force.
+
+    `shares` are the forces relative to the strongest one.
+    """
+    from foxglove.messages import CubePrimitive, Pose, SceneEntity
+
+    size = hull_size(vehicle)
+    middle = Pose(position=_vector(np.zeros(3)), orientation=_quaternion(Rotation.identity()))
+    return SceneEntity(
+        frame_id=BODY,
+        id="vehicle",
+        frame_locked=True,
+        cubes=[CubePrimitive(pose=middle, size=_vector(size), color=_colour(_HULL))],
+        arrows=[*_jets(vehicle, shares, _LONGEST_JET * float(size.max()))],
+    )
+
+
+def hull_size(vehicle: Vehicle) -> Array:
+    """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
+    corners = np.abs([place(vehicle.rov, thruster) for thruster in vehicle.layout.thrusters])
+    size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
+    return size
+
+
+def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iterator["ArrowPrimitive"]:
+    """Yield the jets as arrows in the frame of the vehicle. An arrow of Foxglove points along its own x axis."""
+    from foxglove.messages import ArrowPrimitive, Pose
+
+    for thruster in vehicle.layout.thrusters:
+        share = shares.get(thruster.name, 0.0)
+        if share == 0.0:
+            continue
+        jet = _TO_FRD.apply(np.multiply(-np.sign(share), thruster.direction))
+        turned, _ = Rotation.align_vectors([jet], [[1.0, 0.0, 0.0]])
+        length = abs(share) * longest
+        yield ArrowPrimitive(
+            pose=Pose(position=_vector(_TO_FRD.apply(place(vehicle.rov, thruster))), orientation=_quaternion(turned)),
+            shaft_length=0.8 * length,
+            shaft_diameter=0.04 * longest,
+            head_length=0.2 * length,
+            head_diameter=0.08 * longest,
+            color=_colour(_JET),
+        )
+
+
+def _vector(of: Array) -> "Vector3":
+    from foxglove.messages import Vector3
+
+    x, y, z = of.tolist()
+    return Vector3(x=x, y=y, z=z)
+
+
+def _quaternion(of: Rotation) -> "Quaternion":
+    from foxglove.messages import Quaternion
+
+    x, y, z, w = of.as_quat().tolist()
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def _colour(of: tuple[float, float, float, float]) -> "Color":
+    from foxglove.messages import Color
+
+    r, g, b, a = of
+    return Color(r=r, g=g, b=b, a=a)

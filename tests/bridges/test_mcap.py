@@ -1,0 +1,195 @@
+"""MCAP files, read back with the public reader: numbers, units, frames and pictures."""
+
+import json
+import sys
+from collections.abc import Mapping
+from io import BytesIO
+from math import cos, pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lxml import etree
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+import rov_fmu
+from rov_fmu.bridges.mcap import motion_mcap, poses
+from rov_fmu.cli import main
+from rov_fmu.interface.model import VehicleModel
+from rov_fmu.interface.result import Result
+from rov_fmu.io.messages import InputError
+
+LAYOUTS = Path(__file__).parents[2] / "examples" / "mcap"
+
+
+def recorded(vehicle: VehicleModel, seconds: float, inputs: Mapping[str, Any], **start: float) -> Result:
+    """Return a simulation with all inputs and outputs, every 0.1 s."""
+    layout = vehicle.layout
+    names = [*layout.inputs, *layout.state, *layout.calculated]
+    return vehicle.simulate(np.arange(0.0, seconds + 0.05, 0.1), inputs, start=start, record=names)
+
+
+def messages(content: bytes) -> dict[str, list[tuple[int, Any]]]:
+    """Return the stamps (ns) and the messages of each topic."""
+    found: dict[str, list[tuple[int, Any]]] = {}
+    reader = make_reader(BytesIO(content), validate_crcs=True, decoder_factories=[DecoderFactory()])
+    for _, channel, message in reader.iter_messages():
+        if channel.message_encoding == "json":
+            decoded = json.loads(message.data)
+        else:
+            decoded = DecoderFactory().decoder_for(channel.message_encoding, _)(message.data)  # type: ignore[misc]
+        found.setdefault(channel.topic, []).append((message.log_time, decoded))
+    return found
+
+
+@pytest.fixture(scope="module")
+def heavy() -> VehicleModel:
+    """The vehicle with six axes."""
+    return rov_fmu.load("bluerov2_heavy")
+
+
+def test_numbers_and_units(heavy: VehicleModel) -> None:
+    """All variables have the values, times and units of the simulation, and inputs are written when they change."""
+    result = recorded(heavy, 2.0, {"u_5": lambda t: np.where(t < 1.0, 0.2, -0.1), "V_N": 0.3})
+    content = heavy.to_mcap(result)
+    found = messages(content)
+    assert [stamp for stamp, _ in found["/outputs"]] == [100_000_000 * n for n in range(21)]
+    for n, (_, values) in enumerate(found["/outputs"]):
+        assert values == {name: result[name][n] for name in values}
+    assert {name for _, values in found["/outputs"] for name in values} == result.keys() - heavy.layout.inputs.keys()
+    assert [(stamp, values["u_5"], values["V_N"]) for stamp, values in found["/inputs"]] == [
+        (0, 0.2, 0.3),
+        (1_000_000_000, -0.1, 0.3),
+    ]
+    summary = make_reader(BytesIO(content)).get_summary()
+    assert summary
+    schemas = {c.topic: summary.schemas[c.schema_id] for c in summary.channels.values()}
+    for topic in ("/inputs", "/outputs"):
+        properties = json.loads(schemas[topic].data)["properties"]
+        assert {name: of["unit"] for name, of in properties.items()} == {
+            name: result.units[name] for name in properties
+        }
+    assert {t: s.name for t, s in schemas.items() if t not in ("/inputs", "/outputs")} == {
+        "/tf": "foxglove.FrameTransforms",
+        "/pose": "foxglove.PoseInFrame",
+        "/scene": "foxglove.SceneUpdate",
+    }
+
+
+@pytest.mark.parametrize(
+    ("phi", "theta", "psi"), [(0.0, 0.0, 0.0), (0.0, 0.0, pi / 2), (0.3, -0.4, 2.5), (3.0, 1.2, -1)]
+)
+def test_frames(heavy: VehicleModel, phi: float, theta: float, psi: float) -> None:
+    """In `map`, x is east, y north and z up; the vehicle's x points forward, y to port and z up."""
+    result = recorded(heavy, 0.0 + 0.1, {}, x=1.0, y=2.0, z=3.0, phi_0=phi, theta_0=theta, psi_0=psi)
+    first = messages(heavy.to_mcap(result))["/pose"][0][1]
+    assert first.frame_id == "map"
+    at, q = first.pose.position, first.pose.orientation
+    assert (at.x, at.y, at.z) == (2.0, 1.0, -3.0)
+    # The unit vectors of the body in north-east-down (Fossen 2021, (2.31)), written with east, north, up.
+    forward = (cos(theta) * sin(psi), cos(theta) * cos(psi), sin(theta))
+    down_n = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
+    down_e = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
+    up = (-down_e, -down_n, cos(phi) * cos(theta))
+    x, y, z, w = q.x, q.y, q.z, q.w
+    matrix = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    np.testing.assert_allclose(matrix[:, 0], forward, atol=1e-12)
+    np.testing.assert_allclose(matrix[:, 2], up, atol=1e-12)
+    np.testing.assert_allclose(matrix[:, 1], np.cross(up, forward), atol=1e-12)
+
+
+def test_transform_is_the_pose(heavy: VehicleModel) -> None:
+    """/tf says the same as /pose, from `map` to `base_link`."""
+    found = messages(heavy.to_mcap(recorded(heavy, 1.0, {"u_1": 0.4, "u_7": -0.2})))
+    for (_, tf), (_, pose) in zip(found["/tf"], found["/pose"], strict=True):
+        (transform,) = tf.transforms
+        assert (transform.parent_frame_id, transform.child_frame_id) == ("map", "base_link")
+        assert str(transform.rotation) == str(pose.pose.orientation)
+        assert str(transform.translation) == str(pose.pose.position)
+
+
+def test_heading_without_attitude() -> None:
+    """A vehicle that neither rolls nor pitches has its pose from x, y, z and psi."""
+    position, orientation = poses({"x": np.array([4.0]), "y": np.array([5.0]), "psi": np.array([pi / 2])})
+    np.testing.assert_array_equal(position, [[5.0, 4.0, 0.0]])
+    np.testing.assert_allclose(orientation.apply([1.0, 0.0, 0.0]), [[1.0, 0.0, 0.0]], atol=1e-15)  # it heads east
+    np.testing.assert_allclose(orientation.apply([0.0, 0.0, 1.0]), [[0.0, 0.0, 1.0]], atol=1e-15)
+
+
+def test_jets_leave_against_the_force() -> None:
+    """Each thruster that pushes has an arrow at its place, whose x axis points where the water goes."""
+    vehicle = rov_fmu.load("videoray")
+    result = recorded(vehicle, 1.0, {"u_l": 0.5, "u_t": -0.5})
+    _, scene = messages(vehicle.to_mcap(result))["/scene"][-1]
+    (entity,) = scene.entities
+    assert entity.frame_id == "base_link"
+    assert entity.frame_locked
+    forces = {t.name: result[f"F_{t.name}"][-1] for t in vehicle.layout.thrusters}
+    pushing = [t for t in vehicle.layout.thrusters if forces[t.name]]
+    assert {t.name for t in pushing} == {"l", "t"}
+    longest = max(map(abs, forces.values()))
+    lengths = []
+    for thruster, arrow in zip(pushing, entity.arrows, strict=True):
+        q = arrow.pose.orientation
+        x_axis = np.array([1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y + q.z * q.w), 2 * (q.x * q.z - q.y * q.w)])
+        forward, starboard, down = thruster.direction
+        against = -np.sign(forces[thruster.name]) * np.array([forward, -starboard, -down])
+        np.testing.assert_allclose(x_axis, against, atol=1e-12)
+        lengths.append((arrow.shaft_length + arrow.head_length) / abs(forces[thruster.name]) * longest)
+    assert lengths[0] == pytest.approx(lengths[1])
+    left = next(a for t, a in zip(pushing, entity.arrows, strict=True) if t.name == "l")
+    assert left.pose.position.y > 0.0  # port
+
+
+def test_same_bytes(heavy: VehicleModel) -> None:
+    """The same simulation gives the same bytes."""
+    result = recorded(heavy, 1.0, {"u_1": 0.3})
+    assert motion_mcap(heavy, result.time, result) == motion_mcap(heavy, result.time, result)
+
+
+def test_many_vehicles_are_refused(heavy: VehicleModel) -> None:
+    """A file holds one vehicle."""
+    result = heavy.simulate_many([0.0, 1.0], {"u_1": np.array([[0.1], [0.2]])})
+    with pytest.raises(InputError, match="result: must be the simulation of one vehicle"):
+        heavy.to_mcap(result)
+
+
+def test_without_the_library(heavy: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where foxglove-sdk is missing, a line says how to install it."""
+    monkeypatch.setitem(sys.modules, "foxglove", None)
+    with pytest.raises(InputError, match=r"pip install 'rov-fmu\[ros\]'"):
+        heavy.to_mcap(recorded(heavy, 0.1, {}))
+
+
+def test_command(tmp_path: Path) -> None:
+    """`rov-fmu simulate -o run.mcap` writes the commands and the motion."""
+    target = tmp_path / "a run.mcap"
+    assert main(["simulate", "videoray", "--set", "u_l=0.3", "--set", "u_r=0.3", "--stop", "2", "-o", str(target)]) == 0
+    found = messages(target.read_bytes())
+    assert found["/inputs"][0][1]["u_l"] == 0.3
+    assert 0.45 < found["/outputs"][-1][1]["u"] < 0.4729  # V_ss of the coefficients of Table 9
+    assert len(found["/outputs"]) == 201
+    assert len(found["/scene"]) == 51  # 25 a second
+
+
+def test_layouts(heavy: VehicleModel) -> None:
+    """The layouts of the examples name topics and variables that the file has."""
+    found = messages(heavy.to_mcap(recorded(heavy, 0.1, {})))
+    names = {f"/outputs.{name}" for name in found["/outputs"][0][1]}
+    foxglove = json.loads((LAYOUTS / "foxglove.json").read_text(encoding="utf-8"))
+    panels = foxglove["configById"]
+    assert {path["value"] for panel in panels.values() for path in panel.get("paths", ())} <= names
+    assert panels["3D!vehicle"]["topics"].keys() <= found.keys()
+    shown = json.dumps(foxglove["layout"])
+    assert all(panel in shown for panel in panels)
+    curves = etree.parse(LAYOUTS / "plotjuggler.xml").xpath("//curve/@name")
+    assert curves
+    assert {name.replace("/outputs/", "/outputs.") for name in curves} <= names
