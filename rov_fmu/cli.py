@@ -623,6 +623,13 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     metavar="REPORT.html",
     help="Report to write. A build from the vehicle file puts it into the FMU.",
 )
+@click.option(
+    "--mcap",
+    type=_FILE,
+    metavar="LOGS.mcap",
+    help="File for Foxglove and PlotJuggler to write: of each log the commands, what was measured and predicted, the "
+    "bands, and the unknown force.",
+)
 @click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
 @click.option(
     "--inspect",
@@ -637,7 +644,13 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     help="Write a draft of rov.toml as --inspect does. It is an error if there is one already.",
 )
 def _identify(
-    folder: Path, output: Path | None, report: Path | None, force: bool, inspects: bool, drafts: bool
+    folder: Path,
+    output: Path | None,
+    report: Path | None,
+    mcap: Path | None,
+    force: bool,
+    inspects: bool,
+    drafts: bool,
 ) -> None:
     """Identify a vehicle from a FOLDER with its tank tests or dive logs and its rov.toml.
 
@@ -650,15 +663,17 @@ def _identify(
     from rov_fmu.report.console_results import print_identification
     from rov_fmu.report.progress import parts
 
-    writes = output or report or force
+    writes = output or report or mcap or force
     if (inspects or drafts) and writes:
         option = "--draft" if drafts else "--inspect"
-        raise click.UsageError(f"identify: {option} writes only a draft of rov.toml: leave -o, --report, --force out")
+        raise click.UsageError(
+            f"identify: {option} writes only a draft of rov.toml: leave -o, --report, --mcap, --force out"
+        )
     if inspects or drafts or (not writes and lacks_description(folder)):
         _inspect(folder, inspects=inspects, drafts=drafts)
         return
     with parts() as shown:
-        identification, replaced = identify_folder(folder, output, report, force=force, begin=shown.begin)
+        identification, replaced = identify_folder(folder, output, report, mcap, force=force, begin=shown.begin)
     for line in replaced:
         paragraph(console(), line)
     print_identification(identification)
@@ -667,7 +682,7 @@ def _identify(
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
     if by_heading(identification.findings)["Warnings"]:
         following = f"check the warnings, then {following}"
-    print_end([path for path in (output, report) if path], following)
+    print_end([path for path in (output, report, mcap) if path], following)
 
 
 def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:

@@ -11,8 +11,9 @@ schemas; all other variables are JSON with the names and units of the FMU, with 
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.engine.simulation import Array
 from rov_fmu.io.messages import InputError
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import Declaration
 from rov_fmu.report.plots.drawing import place
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -47,45 +47,86 @@ _HULL, _JET = (0.93, 0.69, 0.13, 0.8), (0.34, 0.71, 0.91, 0.9)
 """The colours of the hull and of the jets: red, green, blue and opacity."""
 
 
+@dataclass(frozen=True)
+class Number:
+    """A number in the messages of a topic."""
+
+    unit: str
+    """The SI unit."""
+    words: str
+    """What it is."""
+
+
+class Recording:
+    """An MCAP file in memory. Raises InputError where foxglove-sdk is not installed."""
+
+    def __init__(self, about: Mapping[str, str]) -> None:
+        """Begin a file with metadata about the vehicle."""
+        try:
+            from foxglove import Context, open_mcap
+            from foxglove.mcap import MCAPWriteOptions
+        except ImportError as error:
+            raise InputError(MISSING) from error
+        self.context, self._stream = Context(), BytesIO()
+        options = MCAPWriteOptions(profile="", compression_threads=0)  # the bytes do not depend on the machine
+        self._writer = open_mcap(self._stream, context=self.context, writer_options=options)
+        self._writer.write_metadata("vehicle", dict(about))
+
+    def topic(self, name: str, numbers: Mapping[str, Number]) -> Callable[[int, Mapping[str, float]], None]:
+        """Return the function that writes a message of a topic with numbers by name, at a time in ns."""
+        from foxglove import Channel
+
+        schema = {
+            "title": name.removeprefix("/"),
+            "type": "object",
+            "properties": {
+                key: {"type": "number", "unit": number.unit, "description": f"{number.words} [{number.unit}]"}
+                for key, number in numbers.items()
+            },
+        }
+        channel = Channel(name, schema=schema, message_encoding="json", context=self.context)
+        return lambda stamp, values: channel.log(dict(values), log_time=stamp)
+
+    def content(self) -> bytes:
+        """End the file, and return its content."""
+        self._writer.close()
+        return self._stream.getvalue()
+
+
+def about(vehicle: Vehicle) -> dict[str, str]:
+    """Return what a file says about its vehicle."""
+    return {"name": vehicle.name, "version": vehicle.version, "source": vehicle.source}
+
+
 def motion_mcap(vehicle: Vehicle, time: Array, values: Mapping[str, Array]) -> bytes:
     """Return a motion of a vehicle as the content of an MCAP file.
 
     `time` has the times (s), and `values` the value of each variable at each of them, by the names of the FMU and in
     its units. The topics are `/tf`, `/pose` and `/scene` with Foxglove's schemas, and `/inputs` and `/outputs` with
-    numbers by name. A pose coordinate that the vehicle does not have, such as the depth without heave, is 0. Inputs
-    are held: each is written when it changes.
+    numbers by name. A coordinate of the pose that the vehicle does not have, such as the depth without heave, is 0.
+    Inputs are held, so they are written when one of them changes.
 
     Raises InputError where foxglove-sdk is not installed.
     """
-    try:
-        from foxglove import Channel, Context, open_mcap
-        from foxglove.mcap import MCAPWriteOptions
-    except ImportError as error:
-        raise InputError(MISSING) from error
-    context, stream = Context(), BytesIO()
-    declared = vehicle.layout.inputs | vehicle.layout.state | vehicle.layout.calculated
-    inputs = {name: declared[name] for name in vehicle.layout.inputs if name in values}
-    outputs = {name: declared[name] for name in values if name in declared and name not in inputs}
-    options = MCAPWriteOptions(profile="", compression_threads=0)
-    with open_mcap(stream, context=context, writer_options=options) as writer:
-        writer.write_metadata("vehicle", {"name": vehicle.name, "version": vehicle.version, "source": vehicle.source})
-        rows = {
-            topic: Channel(topic, schema=_schema(topic, kinds), message_encoding="json", context=context)
-            for topic, kinds in (("/inputs", inputs), ("/outputs", outputs))
-            if kinds
-        }
-        stamps = nanoseconds(time)
-        log_pose = _pose_logger(vehicle, values, context)
-        before: dict[str, float] | None = None
-        for n, stamp in enumerate(stamps):
-            log_pose(n, stamp)
-            now = {name: float(values[name][n]) for name in inputs}
-            if now and now != before:
-                rows["/inputs"].log(now, log_time=stamp)
-                before = now
-            if outputs:
-                rows["/outputs"].log({name: float(values[name][n]) for name in outputs}, log_time=stamp)
-    return stream.getvalue()
+    recording = Recording(about(vehicle))
+    layout = vehicle.layout
+    groups = {"/inputs": layout.inputs, "/outputs": layout.state | layout.calculated}
+    numbers = {
+        topic: {name: Number(of.unit, of.description) for name, of in declared.items() if name in values}
+        for topic, declared in groups.items()
+    }
+    write = {topic: recording.topic(topic, own) for topic, own in numbers.items() if own}
+    write_pose = _pose_writer(vehicle, values, recording.context)
+    before: dict[str, float] = {}
+    for n, stamp in enumerate(nanoseconds(time)):
+        write_pose(n, stamp)
+        row = {topic: {name: float(values[name][n]) for name in own} for topic, own in numbers.items()}
+        if row["/inputs"] != before:
+            before = row["/inputs"]
+            write["/inputs"](stamp, before)
+        if row["/outputs"]:
+            write["/outputs"](stamp, row["/outputs"])
+    return recording.content()
 
 
 def nanoseconds(time: Array) -> list[int]:
@@ -107,19 +148,7 @@ def poses(values: Mapping[str, Array]) -> tuple[Array, Rotation]:
     return np.stack([east, north, 0.0 - down], axis=-1), _TO_ENU * turned * _TO_FRD
 
 
-def _schema(topic: str, declared: Mapping[str, Declaration]) -> dict[str, Any]:
-    """Return the JSON schema of a topic with numbers by name. Each has its unit and its description."""
-    return {
-        "title": topic.removeprefix("/"),
-        "type": "object",
-        "properties": {
-            name: {"type": "number", "unit": of.unit, "description": f"{of.description} [{of.unit}]"}
-            for name, of in declared.items()
-        },
-    }
-
-
-def _pose_logger(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
+def _pose_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
     """Return the function that writes pose and picture of the vehicle at the n-th time, with its stamp in ns."""
     from foxglove.channels import FrameTransformsChannel, PoseInFrameChannel, SceneUpdateChannel
     from foxglove.messages import FrameTransform, FrameTransforms, Pose, PoseInFrame, SceneUpdate, Timestamp
@@ -132,7 +161,7 @@ def _pose_logger(vehicle: Vehicle, values: Mapping[str, Array], context: "Contex
     strongest = max((float(np.nanmax(np.abs(force))) for force in forces.values()), default=0.0)
     due = -1
 
-    def log(n: int, stamp: int) -> None:
+    def write(n: int, stamp: int) -> None:
         nonlocal due
         seconds, rest = divmod(stamp, 1_000_000_000)
         at = Timestamp(sec=seconds, nsec=rest)
@@ -154,7 +183,7 @@ def _pose_logger(vehicle: Vehicle, values: Mapping[str, Array], context: "Contex
             scene.log(SceneUpdate(entities=[_picture(vehicle, shares)]), log_time=stamp)
             due = stamp + round(1e9 * _SCENE_INTERVAL)
 
-    return log
+    return write
 
 
 def _picture(vehicle: Vehicle, shares: Mapping[str, float]) -> "SceneEntity":

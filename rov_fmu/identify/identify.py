@@ -17,7 +17,7 @@ from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Identification, Prediction, Slip
 from rov_fmu.identify.rows import HeldOut, held_out_rows, points_of
-from rov_fmu.identify.unexplained.disturbances import disturbances
+from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
@@ -46,7 +46,8 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
     on_progress("predicting what was left out", 0.85)
     predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior)]
-    unexplained = disturbances(fit.objective, fit.best, fit.posterior)
+    runs = followed(fit.objective, fit.best.z)
+    unexplained = disturbances(fit.objective, fit.best, fit.posterior, runs)
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
     vehicle, coefficients = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
@@ -74,6 +75,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         correlation=(names, correlation(names, vehicle.estimates)),
         objective=fit.best.value,
         agreement=fit.difference,
+        unknown_forces=tuple(unknown_forces(fit.objective, runs)),
         slips=wrong,
     )
     findings = findings_of(found)

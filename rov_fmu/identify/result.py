@@ -140,6 +140,20 @@ class Disturbance:
         return self.evidence > KEPT
 
 
+@dataclass(frozen=True, eq=False)
+class UnknownForce:
+    """The slow force along an axis that a log shows beside the forces of the model, as the filter follows it."""
+
+    axis: Axis
+    file: str
+    time: Array
+    """n: the times of the log, s."""
+    force: Array
+    """n: N or N m."""
+    deviation: Array
+    """n: its standard deviation."""
+
+
 @dataclass(frozen=True)
 class Logging:
     """How a log tells the time of its commands."""
@@ -288,6 +302,8 @@ class Identification:
     """J at its minimum."""
     agreement: float
     """How much larger J is at the end of the second start."""
+    unknown_forces: tuple[UnknownForce, ...] = ()
+    """The slow force along each moving axis of each log."""
     slips: tuple[Slip, ...] = ()
     """The mistakes that would explain a file better."""
     findings: tuple[Finding, ...] = ()

@@ -4,18 +4,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rov_fmu.bridges.mcap_logs import identification_mcap
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.result import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
-from rov_fmu.io.messages import Progress
+from rov_fmu.io.messages import InputError, Progress
 from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
 
 def identify_folder(
-    folder: Path, vehicle: Path | None, report: Path | None, *, force: bool, begin: Callable[[str], Progress]
+    folder: Path,
+    vehicle: Path | None,
+    report: Path | None,
+    mcap: Path | None = None,
+    *,
+    force: bool,
+    begin: Callable[[str], Progress],
 ) -> tuple[Identification, list[str]]:
-    """Identify a vehicle from a folder of tank tests, and write its vehicle file and its report if they are asked for.
+    """Identify a vehicle from a folder of tank tests, and write the files that are asked for.
+
+    These are the vehicle file, the report, and the MCAP file with what was measured and predicted.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. Returns the
@@ -25,10 +34,12 @@ def identify_folder(
     replaced: list[str] = []
     if vehicle and report:
         check_report(vehicle, report)
+    if mcap and mcap.suffix.lower() != ".mcap":
+        raise InputError(f"--mcap {mcap}: the name must end with .mcap")
 
     def check_outputs(inputs: Sequence[Path]) -> None:
         """Check the files to write as soon as the input files are known."""
-        targets = [path for path in (vehicle, report) if path]
+        targets = [path for path in (vehicle, report, mcap) if path]
         check_targets(targets, inputs)
         if vehicle:
             check_written(vehicle, VEHICLE_FILE)
@@ -44,6 +55,8 @@ def identify_folder(
         outputs.append(_report_output(identification, report, begin("drawing the report")))
     if vehicle:
         outputs.append(_vehicle_output(identification, vehicle, report))
+    if mcap:
+        outputs.append(Output(mcap, identification_mcap(identification)))
     write_whole(*outputs)
     return identification, replaced
 

@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from io import BytesIO
 from math import cos, pi, sin
 from pathlib import Path
@@ -16,10 +17,15 @@ from mcap_protobuf.decoder import DecoderFactory
 
 import rov_fmu
 from rov_fmu.bridges.mcap import motion_mcap, poses
+from rov_fmu.bridges.mcap_logs import identification_mcap
 from rov_fmu.cli import main
+from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
+from rov_fmu.model.layout import SURGE
+from tests.folders import small_folder
+from tests.report.results import example
 
 LAYOUTS = Path(__file__).parents[2] / "examples" / "mcap"
 
@@ -178,6 +184,43 @@ def test_command(tmp_path: Path) -> None:
     assert 0.45 < found["/outputs"][-1][1]["u"] < 0.4729  # V_ss of the coefficients of Table 9
     assert len(found["/outputs"]) == 201
     assert len(found["/scene"]) == 51  # 25 a second
+
+
+def test_identification() -> None:
+    """A log has its commands, the predictions with their 95 % bands, and the unknown force, all from its own time 0."""
+    result = example()
+    prediction = next(p for axis in result.axes for p in axis.predictions if p.is_judged)
+    unknown = UnknownForce(SURGE, prediction.file, np.array([1.0, 2.5]), np.array([0.5, -1.0]), np.array([0.1, 0.2]))
+    content = identification_mcap(replace(result, unknown_forces=(unknown,)))
+    found = messages(content)
+    log = "/" + prediction.file.replace(".", "_")
+    assert {topic.split("/")[1] for topic in found} == {one.file.replace(".", "_") for one in result.folder.logs}
+    assert found[f"{log}/unknown_force/surge"] == [
+        (1_000_000_000, {"force": 0.5, "low": pytest.approx(0.304, rel=1e-4), "high": pytest.approx(0.696, rel=1e-4)}),
+        (
+            2_500_000_000,
+            {"force": -1.0, "low": pytest.approx(-1.392, rel=1e-4), "high": pytest.approx(-0.608, rel=1e-4)},
+        ),
+    ]
+    written = found[f"{log}/{prediction.quantity.replace(' ', '_')}"]
+    assert [values["measured"] for _, values in written] == prediction.measured.tolist()
+    assert [values["predicted"] for _, values in written] == prediction.predicted.tolist()
+    inside = np.array([values["low"] <= values["measured"] <= values["high"] for _, values in written])
+    off = np.abs(prediction.measured - prediction.predicted)
+    assert inside.mean() == pytest.approx(np.mean(off <= 1.959964 * prediction.deviation))
+    commands = next(one.commands for one in result.folder.logs if one.file == prediction.file)
+    assert commands
+    assert [values["t"] for _, values in found[f"{log}/commands"]] == commands.value.tolist()
+
+
+def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`rov-fmu identify --mcap` writes the file; another suffix is refused before the work begins."""
+    folder = small_folder(tmp_path / "tests")
+    assert main(["identify", str(folder), "--mcap", str(tmp_path / "logs.bag")]) == 2
+    assert "--mcap" in (refusal := capsys.readouterr().err)
+    assert "must end with .mcap" in refusal
+    assert main(["identify", str(folder), "--mcap", str(tmp_path / "logs.mcap")]) == 0
+    assert make_reader(BytesIO((tmp_path / "logs.mcap").read_bytes())).get_header()
 
 
 def test_layouts(heavy: VehicleModel) -> None:

@@ -235,7 +235,7 @@ WRONG = {
     ),
     "a time that goes back": (["--input", "back.csv"], "back.csv: line 5: the time goes back\n"),
     "a cell that is not finite": (["--input", "nan.csv"], "nan.csv: line 3, column 'u_l' = 'nan': must be a finite nu"),
-    "another table": (["-o", "result.txt"], "--output result.txt: the name must end with .csv or .parquet"),
+    "another table": (["-o", "result.txt"], "--output result.txt: the name must end with .csv, .parquet or .mcap"),
     "another picture": (["--plot", "a.gif"], "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
     "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; put --plot without a file after VEH"),
     "a value after a blank": (["--set", "u_l", "0.3"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),

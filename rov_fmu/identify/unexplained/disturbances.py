@@ -11,7 +11,7 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum
-from rov_fmu.identify.result import Disturbance
+from rov_fmu.identify.result import Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.tank.arrays import Array
@@ -21,9 +21,15 @@ _LITTLE = 0.05
 _KINDS = {"slow force": "force", "slow gain": "gain", "slow velocity": "velocity"}
 
 
-def disturbances(objective: Objective, best: Minimum, posterior: Posterior) -> Iterator[Disturbance]:
+def followed(objective: Objective, z: Array) -> list[Run]:
+    """Return a run through each log with the states of the filter."""
+    return [objective.run(z, n, with_states=True) for n in range(len(objective.logs))]
+
+
+def disturbances(
+    objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[Run]
+) -> Iterator[Disturbance]:
     """Yield each slow process of the model as it is in the log where it is largest, with the evidence for it."""
-    runs = [objective.run(best.z, n, with_states=True) for n in range(len(objective.logs))]
     for place, p in enumerate(objective.table.parameters):
         if p.kind in _KINDS:
             evidence = _evidence(objective, best, posterior, place)
@@ -32,6 +38,14 @@ def disturbances(objective: Objective, best: Minimum, posterior: Posterior) -> I
             if present:
                 largest = max(present, key=lambda one: one.share)
                 yield replace(largest, cause=_cause(objective, best.z, p, runs, largest)) if largest.kept else largest
+
+
+def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[UnknownForce]:
+    """Yield the slow force along each axis of each log."""
+    for number, (one, run) in enumerate(zip(objective.logs, runs, strict=True)):
+        first, time = objective.filters[number].force, objective.records[number].time
+        for place, form in enumerate(one.layout.axes, first):
+            yield UnknownForce(form.axis, one.log.file, time, run.states[:, place], run.deviations[:, place])
 
 
 def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: int) -> float:

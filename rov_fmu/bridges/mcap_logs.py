@@ -1,0 +1,106 @@
+"""An identification as an MCAP file: what each log measured, what the model predicts, and what it cannot explain."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rov_fmu.bridges.mcap import Number, Recording, about, nanoseconds
+from rov_fmu.engine.simulation import Array
+from rov_fmu.identify.result import Identification, Prediction, UnknownForce
+from rov_fmu.tank.log import Channel, Commands, Log
+from rov_fmu.vehicle.uncertainty import NORMAL
+
+
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """Numbers over time: one topic of a log."""
+
+    topic: str
+    """The name of the topic behind that of the log."""
+    time: Array
+    """n: s."""
+    columns: Mapping[str, Array]
+    """The n values of each number."""
+    numbers: Mapping[str, Number]
+
+
+def identification_mcap(identification: Identification) -> bytes:
+    """Return the logs of an identification as the content of an MCAP file.
+
+    Each log begins at time 0, and its topics begin with its name: `commands`, by thruster, whenever one changes; each
+    measured quantity, with its prediction by a fit without this log and the 95 % band; and `unknown_force`, the slow
+    force along each axis that the model does not explain, with its 95 % interval. All values are in SI units.
+
+    Raises InputError where foxglove-sdk is not installed.
+    """
+    recording = Recording(about(identification.vehicle))
+    messages: list[tuple[int, Callable[[int, Mapping[str, float]], None], dict[str, float]]] = []
+    for log in identification.folder.logs:
+        series = [*_series_of(identification, log)]
+        begin = min((float(one.time[0]) for one in series if len(one.time)), default=0.0)
+        for one in series:
+            write = recording.topic(f"/{_name(log.file)}/{one.topic}", one.numbers)
+            rows = np.column_stack([*one.columns.values()]).tolist()
+            for stamp, row in zip(nanoseconds(one.time - begin), rows, strict=True):
+                messages.append((stamp, write, dict(zip(one.columns, row, strict=True))))
+    for stamp, write, values in sorted(messages, key=lambda message: message[0]):
+        write(stamp, values)
+    return recording.content()
+
+
+def _name(text: str) -> str:
+    """Return a text as a part of a topic, for which viewers need no quotation marks."""
+    return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
+
+
+def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:
+    """Yield all that is known about a log, each over its own times."""
+    if log.commands:
+        yield _commands(log.commands)
+    own = [p for axis in identification.axes for p in axis.predictions if p.file == log.file and p.is_judged]
+    yield from map(_prediction, own)
+    predicted = {p.quantity for p in own}
+    yield from (_measured(c) for c in log.channels if not c.unused and c.quantity.name not in predicted and c.count)
+    yield from (_unknown(force) for force in identification.unknown_forces if force.file == log.file)
+
+
+def _commands(commands: Commands) -> _Series:
+    time = np.unique(commands.time)
+    numbers = {name: Number("1", f"Command of {name}, a fraction of the full command") for name in commands.thrusters}
+    return _Series("commands", time, dict(zip(numbers, commands.at(time).T, strict=True)), numbers)
+
+
+def _measured(channel: Channel) -> _Series:
+    name, (time, values) = channel.quantity.name, channel.samples
+    numbers = {"measured": Number(channel.quantity.unit, f"Measured {name}")}
+    return _Series(_name(name), time, {"measured": values}, numbers)
+
+
+def _prediction(prediction: Prediction) -> _Series:
+    name, unit = prediction.quantity, prediction.unit
+    band = _band(prediction.predicted, prediction.deviation)
+    columns = {"measured": prediction.measured, "predicted": prediction.predicted, **band}
+    numbers = {
+        "measured": Number(unit, f"Measured {name}"),
+        "predicted": Number(unit, f"The prediction of the {name} by {prediction.by}"),
+        **_edges(unit, f"95 % band of the measured {name}"),
+    }
+    return _Series(_name(name), prediction.time, columns, numbers)
+
+
+def _unknown(unknown: UnknownForce) -> _Series:
+    axis = unknown.axis
+    columns = {"force": unknown.force, **_band(unknown.force, unknown.deviation)}
+    words = f"Slow {'torque' if axis.is_rotation else 'force'} in {axis.name} that the model does not explain"
+    numbers = {"force": Number(axis.load, f"{words}, positive {axis.positive}"), **_edges(axis.load, "95 % interval")}
+    return _Series(f"unknown_force/{axis.name}", unknown.time, columns, numbers)
+
+
+def _band(values: Array, deviation: Array) -> dict[str, Array]:
+    return {"low": values - NORMAL * deviation, "high": values + NORMAL * deviation}
+
+
+def _edges(unit: str, words: str) -> dict[str, Number]:
+    return {end: Number(unit, f"{end.capitalize()} end of the {words}") for end in ("low", "high")}
