@@ -1,0 +1,82 @@
+"""What a release contains: two equal builds, sums, and inventories that validate."""
+
+import hashlib
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+
+from rov_fmu.build import build
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE
+from verification import release
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An FMU that builds quickly."""
+    path = tmp_path_factory.mktemp("release") / "bare.fmu"
+    build(load_vehicle(BARE), path, platforms="host")
+    return path
+
+
+def test_the_inventory_of_an_fmu_names_every_file(fmu: Path) -> None:
+    text = release.fmu_inventory(fmu)
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
+    inventory = json.loads(text)
+    assert inventory["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(fmu.read_bytes()).hexdigest()
+    with zipfile.ZipFile(fmu) as archive:
+        expected = {name: hashlib.sha256(archive.read(name)).hexdigest() for name in archive.namelist()}
+    files = {c["name"]: c["hashes"][0]["content"] for c in inventory["components"] if c["type"] == "file"}
+    assert files == expected
+    assert {c["name"] for c in inventory["components"] if c["type"] == "library"} == {"rov-fmu", "ziglang"}
+    assert text == release.fmu_inventory(fmu)
+
+
+def test_the_inventory_of_a_wheel_names_what_it_requires(tmp_path: Path) -> None:
+    wheel = tmp_path / "rov_fmu-0-py3-none-any.whl"
+    lines = ["Metadata-Version: 2.4", "Name: rov-fmu", "Version: 0", "Requires-Dist: numpy>=2"]
+    lines += ["Requires-Dist: tomli>=2; python_version < '3'", "Requires-Dist: mcap>=1; extra == 'ros'", ""]
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("rov_fmu-0.dist-info/METADATA", "\n".join(lines))
+    text = release.wheel_inventory(wheel)
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
+    (numpy,) = json.loads(text)["components"]
+    assert numpy["purl"] == f"pkg:pypi/numpy@{numpy['version']}"
+
+
+def test_a_difference_of_two_builds_is_a_line(tmp_path: Path) -> None:
+    first, second = tmp_path / "a", tmp_path / "b"
+    for folder, files in ((first, {"same": b"1", "other": b"2", "one": b""}), (second, {"same": b"1", "other": b"3"})):
+        folder.mkdir()
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
+    assert release.differences(first, second) == [
+        "one: only one of the two builds wrote this file",
+        "other: the two builds have other bytes",
+    ]
+    assert release.differences(first, first) == []
+
+
+@pytest.mark.long
+def test_two_builds_have_the_same_bytes(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "the second"
+    for folder in (first, second):
+        folder.mkdir()
+        release.distributions(folder)
+        release.fmus(folder, ["videoray", "bluerov2_heavy"], "host")
+    assert release.differences(first, second) == []
+    release.inventories(first)
+    for path in first.glob("*.cdx.json"):
+        assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(path.read_text(encoding="utf-8")) is None
+    (first / "SHA256SUMS").write_text(release.sums(first), encoding="utf-8")
+    subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=first, check=True)
+    distributions, fmus, descriptions = 2, 5, 2
+    assert len([*first.iterdir()]) == distributions + fmus + descriptions + len(["wheel"]) + fmus + len(["SHA256SUMS"])
+    twine = [sys.executable, "-m", "twine", "check", "--strict", *first.glob("*.whl"), *first.glob("*.tar.gz")]
+    subprocess.run(twine, check=True)  # the long description renders

@@ -1,0 +1,161 @@
+"""python -m verification.release FOLDER: make everything that a release has, twice, and write what proves it.
+
+The wheel, the source distribution and the FMUs of all vehicles that ship are built in two folders, and the bytes of
+both are compared. Beside them stand SHA256SUMS, and for the wheel and for each FMU a list of what is in it or what it
+needs, in CycloneDX 1.6 (ECMA-424). These lists contain no time and no random number, so their bytes do not change.
+"""
+
+import hashlib
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from uuid import NAMESPACE_URL, uuid5
+
+import click
+from cyclonedx.model import HashAlgorithm, HashType
+from cyclonedx.model.bom import Bom, BomMetaData
+from cyclonedx.model.component import Component, ComponentType
+from cyclonedx.model.dependency import Dependency
+from cyclonedx.output.json import JsonV1Dot6
+from packageurl import PackageURL
+from packaging.requirements import Requirement
+
+from rov_fmu import __version__
+from rov_fmu.build import build
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+ROOT = Path(__file__).parent.parent
+_TOOLS = {"native": ("rov-fmu", "ziglang"), "pythonfmu": ("rov-fmu", "pythonfmu")}
+"""The packages that make an FMU of each kind, parts of which are in its binaries."""
+
+
+def distributions(folder: Path) -> None:
+    """Build the wheel and the source distribution of this checkout."""
+    for target in ("wheel", "sdist"):
+        subprocess.run(
+            [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(folder)], cwd=ROOT, check=True
+        )
+
+
+def fmus(folder: Path, vehicles: Iterable[str] = tuple(SHIPPED), platforms: str | None = None) -> None:
+    """Build the FMUs of vehicles that ship: FMI 2.0 with its OSP description, FMI 3.0, and the VideoRay's in Python."""
+    for name in vehicles:
+        vehicle = load_vehicle(SHIPPED[name])
+        build(vehicle, folder / f"{name}.fmu", platforms=platforms, osp=True)
+        build(vehicle, folder / f"{name}.fmi3.fmu", platforms=platforms, fmi=3)
+    if "videoray" in vehicles:
+        build(load_vehicle(SHIPPED["videoray"]), folder / "videoray.python.fmu", backend="pythonfmu")
+
+
+def differences(first: Path, second: Path) -> list[str]:
+    """Return a line about each file of two folders that is in one only, or has other bytes."""
+    names = sorted({path.name for folder in (first, second) for path in folder.iterdir()})
+    lines = []
+    for name in names:
+        both = [folder / name for folder in (first, second)]
+        if not all(path.is_file() for path in both):
+            lines.append(f"{name}: only one of the two builds wrote this file")
+        elif both[0].read_bytes() != both[1].read_bytes():
+            lines.append(f"{name}: the two builds have other bytes")
+    return lines
+
+
+def digest(content: bytes) -> str:
+    """Return the SHA-256 of some bytes."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def wheel_inventory(wheel: Path) -> str:
+    """Return the inventory of a wheel: the packages that it requires, with the versions that are installed here.
+
+    The requirements of extras are left out.
+    """
+    with zipfile.ZipFile(wheel) as archive:
+        name = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        declared = metadata.PathDistribution(zipfile.Path(archive, name.removesuffix("METADATA"))).requires or []
+    required = [Requirement(text) for text in declared]
+    needed = [one.name for one in required if one.marker is None or one.marker.evaluate({"extra": ""})]
+    return _inventory(wheel, [_package(name) for name in sorted(needed, key=str.lower)])
+
+
+def fmu_inventory(fmu: Path) -> str:
+    """Return the inventory of an FMU: each file with its SHA-256, and the packages that made them."""
+    with zipfile.ZipFile(fmu) as archive:
+        files = {info.filename: archive.read(info) for info in archive.infolist() if not info.is_dir()}
+    kind = "pythonfmu" if any(name.endswith("_slave.py") for name in files) else "native"
+    parts = [
+        Component(name=name, type=ComponentType.FILE, bom_ref=name, hashes=[_sha256(content)])
+        for name, content in sorted(files.items())
+    ]
+    return _inventory(fmu, [*parts, *map(_package, _TOOLS[kind])])
+
+
+def _package(name: str) -> Component:
+    """Return a Python package with the version that is installed."""
+    version = metadata.version(name)
+    url = PackageURL("pypi", name=name.lower().replace("_", "-"), version=version)
+    return Component(name=name, version=version, type=ComponentType.LIBRARY, purl=url, bom_ref=str(url))
+
+
+def _sha256(content: bytes) -> HashType:
+    return HashType(alg=HashAlgorithm.SHA_256, content=digest(content))
+
+
+def _inventory(path: Path, parts: list[Component]) -> str:
+    """Return the inventory of a file in CycloneDX 1.6 (JSON)."""
+    content = path.read_bytes()
+    whole = Component(
+        name=path.name,
+        version=__version__,
+        type=ComponentType.APPLICATION,
+        bom_ref=path.name,
+        hashes=[_sha256(content)],
+    )
+    bom = Bom(
+        components=parts,
+        serial_number=uuid5(NAMESPACE_URL, digest(content)),
+        metadata=BomMetaData(component=whole),
+        dependencies=[Dependency(whole.bom_ref, [Dependency(part.bom_ref) for part in parts])],
+    )
+    bom.metadata.timestamp = None  # type: ignore[assignment]
+    return JsonV1Dot6(bom).output_as_string(indent=1) + "\n"
+
+
+def inventories(folder: Path) -> None:
+    """Write the inventory of each wheel and FMU of a folder beside it, as `<name>.cdx.json`."""
+    for path in sorted(folder.iterdir()):
+        if path.suffix in (".whl", ".fmu"):
+            text = wheel_inventory(path) if path.suffix == ".whl" else fmu_inventory(path)
+            path.with_name(f"{path.name}.cdx.json").write_text(text, encoding="utf-8")
+
+
+def sums(folder: Path) -> str:
+    """Return the SHA-256 of each file of a folder, in the form that `sha256sum --check` reads."""
+    return "".join(f"{digest(path.read_bytes())}  {path.name}\n" for path in sorted(folder.iterdir()))
+
+
+@click.command(help=__doc__)
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+def main(folder: Path) -> None:
+    """Build a release twice, and write it with its proofs. The exit code is 1 if the two builds differ."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if any(folder.iterdir()):
+        raise click.UsageError(f"{folder}: must be empty or new")
+    with temporary_folder("release-") as again:
+        for target in (folder, Path(again)):
+            distributions(target)
+            fmus(target)
+        if found := differences(folder, Path(again)):
+            raise click.ClickException("\n".join(found))
+    inventories(folder)
+    (folder / "SHA256SUMS").write_text(sums(folder), encoding="utf-8")
+    click.echo(f"{folder}: two builds have the same bytes; {len([*folder.iterdir()])} files")
+
+
+if __name__ == "__main__":
+    main()
