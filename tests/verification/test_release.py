@@ -78,5 +78,12 @@ def test_two_builds_have_the_same_bytes(tmp_path: Path) -> None:
     subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=first, check=True)
     distributions, fmus, descriptions = 2, 5, 2
     assert len([*first.iterdir()]) == distributions + fmus + descriptions + len(["wheel"]) + fmus + len(["SHA256SUMS"])
-    twine = [sys.executable, "-m", "twine", "check", "--strict", *first.glob("*.whl"), *first.glob("*.tar.gz")]
+    twine = [
+        sys.executable,
+        "-m",
+        "twine",
+        "check",
+        "--strict",
+        *map(str, [*first.glob("*.whl"), *first.glob("*.tar.gz")]),
+    ]
     subprocess.run(twine, check=True)  # the long description renders
