@@ -1,0 +1,77 @@
+"""The folder for fmi-standard.org keeps its rules, and the check finds what breaks them."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.vehicle.shipped import SHIPPED
+from verification.compatibility import check, write
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of one vehicle."""
+    folder = tmp_path_factory.mktemp("compatibility")
+    write(folder, ["videoray"], "host")
+    return folder
+
+
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+def test_the_rules_are_kept_and_fmpy_agrees(written: Path, version: str) -> None:
+    folder = written / version / "videoray"
+    assert [*check(folder)] == []
+    assert (folder / "fmpy-validate.txt").read_text(encoding="utf-8").endswith(" 0 problems\n")
+    reference = np.genfromtxt(folder / "videoray_ref.csv", delimiter=",", names=True)
+    assert all(np.ptp(reference[name]) > 0.01 for name in ("u", "w", "r", "x", "z", "psi"))  # every axis moves
+
+
+def test_the_entry_of_the_list_of_tools(written: Path) -> None:
+    (entry,) = json.loads((written / "tools.json").read_text(encoding="utf-8"))
+    assert not entry["description"].endswith(".")
+    assert entry["fmuExport"] == ["CS", "ME"]
+
+
+BROKEN = {
+    "a missing file": ("videoray_in.csv", None, "this file is missing"),
+    "names without quotation marks": ("videoray_ref.csv", ('"u"', "u"), "all names must be in quotation marks"),
+    "an unknown variable": ("videoray_ref.csv", ('"u"', '"speed"'), "speed is no variable of the FMU"),
+    "another first column": ("videoray_in.csv", ('"time"', '"t"'), "the first column must be the time"),
+    "an input that is missing": ("videoray_in.csv", ('"u_l"', '"u_r"'), "must have all inputs of the FMU"),
+    "another time": ("videoray_ref.opt", ("StopTime, 30", "StopTime, 31"), "must run from StartTime to StopTime"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_what_breaks_a_rule_is_found(written: Path, case: str, tmp_path: Path) -> None:
+    file, change, expected = BROKEN[case]
+    folder = shutil.copytree(written / "fmi2" / "videoray", tmp_path / "videoray")
+    path = folder / file
+    if change:
+        path.write_text(path.read_text(encoding="utf-8").replace(*change, 1), encoding="utf-8")
+    else:
+        path.unlink()
+    lines = [*check(folder)]
+    assert any(expected in line for line in lines), lines
+
+
+def test_another_result_is_found(written: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(written / "fmi3" / "videoray", tmp_path / "videoray")
+    path = folder / "videoray_ref.csv"
+    rows = path.read_text(encoding="utf-8").splitlines()
+    time, u, *rest = rows[100].split(",")
+    rows[100] = ",".join([time, repr(float(u) + 1e-4), *rest])
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    (line,) = check(folder)
+    assert line.startswith("videoray_ref.csv: u differs by 0.0001")
+
+
+@pytest.mark.long
+def test_all_vehicles(tmp_path: Path) -> None:
+    write(tmp_path, platforms="host")
+    folders = sorted(tmp_path.glob("fmi*/*"))
+    assert len(folders) == 2 * len(SHIPPED)
+    for folder in folders:
+        assert [*check(folder)] == []
