@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.io.messages import InputError, brief, did_you_mean, only, shown
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import Declaration, Layout
+from rov_fmu.model.layout import AXES, Declaration, Layout
 from rov_fmu.vehicle.quantity import within
 
 if TYPE_CHECKING:
@@ -20,10 +20,32 @@ Array = NDArray[np.float64]
 Inputs: TypeAlias = "Mapping[str, Any] | pd.DataFrame"
 """The values of the inputs by name: numbers, arrays or functions of time."""
 
+STEP = 0.01
+"""The default time between two results, s, as in the FMU's default experiment."""
+_LONGEST = 1e4
+"""The longest duration for which a result every STEP is a sensible default, s."""
 TIME = "time"
 """The name of the column that holds the times of the inputs themselves."""
+_PERCENT = 2.0
+"""A command beyond this is probably meant in percent."""
 _ONE_LINE = 60
 """The most characters of a value in a message."""
+
+
+def result_times(stop: float, step: float) -> Array:
+    """Return the times of the results, s: round multiples of the step, and the end."""
+    time = np.round(step * np.arange(int(stop / step) + 2), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
+    return np.append(time[time < stop - 1e-9], stop)
+
+
+def duration_times(duration: Any) -> Array:
+    """Return the times of the results for a duration (s). Raises InputError."""
+    stop = float(_numbers("time", duration))
+    if not STEP <= stop <= _LONGEST:
+        raise InputError(
+            f"time = {stop:g}: a duration must be within {STEP:g} ... {_LONGEST:g} s; pass the output times"
+        )
+    return result_times(stop, STEP)
 
 
 def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_repeat: bool = False) -> Array:
@@ -97,12 +119,11 @@ class Commands:
         if own is not None:
             self.time = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
         middles = np.append(0.5 * (self.time[:-1] + self.time[1:]), self.time[-1])
-        self.values: dict[str, Array] = {}
-        """The inputs by name: numbers, or arrays whose last axis is time. Each value is held up to the next time."""
+        given: dict[str, Array] = {}
         for name in names:
             if name == TIME:
                 continue
-            _check_name("inputs", name, layout.inputs)
+            _check_name("inputs", name, layout.inputs, layout.kinds)
             value = inputs[name]
             key = f"inputs[{name!r}]"
             if callable(value):
@@ -113,10 +134,35 @@ class Commands:
                 _check_shape(key, found, len(time if own is None else own), many)
                 if own is not None and found.ndim and found.shape[-1] == len(own):
                     place = np.searchsorted(own, self.time, side="right") - 1
-                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], layout.inputs[name].start)
+                    before = layout.inputs[name].start if name in layout.inputs else 0.0
+                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], before)
+            given[name] = found
+        self.values: dict[str, Array] = {}
+        """The inputs by name: numbers, or arrays whose last axis is time. Each value is held up to the next time."""
+        for name, found in with_axes(layout, given).items():
             self.values[name] = found
             for beyond in _beyond(found, layout.commands[name]) if name in layout.commands else ():
                 warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
+
+
+def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the values of inputs, in which commands along axes have become commands of thrusters.
+
+    The name of an axis, such as `surge`, stands for all commands that drive it. Its value is the fraction of the full
+    command in its positive direction: -0.3 in heave is 30 % up. Where two axes share a command, their fractions add up.
+    Raises InputError if no thruster drives the axis, or if one of its commands is given, too.
+    """
+    found = {name: value for name, value in values.items() if name in layout.inputs}
+    fractions: dict[str, Array] = {}
+    for name in (axis for axis in layout.kinds if axis in values):
+        if not (signs := layout.signs(AXES[name])):
+            raise InputError(f"inputs[{name!r}]: no thruster drives this axis")
+        for command, sign in signs.items():
+            if command in found:
+                raise InputError(f"inputs[{command!r}]: {name} drives this input, too")
+            fractions[command] = fractions.get(command, np.array(0.0)) + sign * values[name]
+    command_of = np.vectorize(layout.command_of, otypes=[np.float64])
+    return found | {command: command_of(fraction) for command, fraction in fractions.items()}
 
 
 def _beyond(values: Array, command: Declaration) -> Iterator[str]:
@@ -130,7 +176,8 @@ def _beyond(values: Array, command: Declaration) -> Iterator[str]:
         return
     value = values.flat[np.argmax(excess)]
     if command.unit == "1":
-        yield f"{value:.6g}, which acts as {copysign(1.0, value):g}: commands saturate at ±1"
+        percent = " (30 % is 0.3)" if abs(value) > _PERCENT else ""
+        yield f"{value:.6g}, which acts as {copysign(1.0, value):g}: commands saturate at ±1{percent}"
     else:
         yield f"{value:.6g}: commands are pulse widths, and saturate at {low:g} and {high:g} {command.unit}"
 
@@ -144,11 +191,12 @@ def _names(what: str, given: Any) -> list[str]:
     return list(given.keys())
 
 
-def _check_name(what: str, name: str, declarations: Mapping[str, Declaration]) -> None:
-    """Raise InputError if no variable of this kind has the name."""
-    if name not in declarations:
+def _check_name(what: str, name: str, declarations: Mapping[str, Declaration], also: Collection[str] = ()) -> None:
+    """Raise InputError if no variable of this kind has the name, and it is not one of the others."""
+    if name not in declarations and name not in also:
         kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
-        known = only(str(name), declarations) if len(declarations) < 20 else did_you_mean(str(name), declarations)
+        names = [*declarations, *also]
+        known = only(str(name), names) if len(names) < 20 else did_you_mean(str(name), names)
         raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{known}")
 
 

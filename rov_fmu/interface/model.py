@@ -22,6 +22,7 @@ from rov_fmu.interface.arguments import (
     checked_times,
     checked_values,
     checked_workers,
+    duration_times,
     number_of_vehicles,
 )
 from rov_fmu.interface.result import Result
@@ -63,15 +64,17 @@ class VehicleModel(Vehicle):
     ) -> Result:
         """Simulate the vehicle with the C code of the FMU; the results are equal to the last bit.
 
-        `time` holds the output times (s), which rise. Each step from one to the next is exact, whatever its length.
+        `time` holds the output times (s), which rise, or is the duration (s), which gives a result every 0.01 s from 0
+        on. Each step from one time to the next is exact, whatever its length.
 
         `inputs` maps names of inputs to values. All other inputs have their usual values: no command, no load, no
-        current, and the usual voltage. A value is one of three things. A number holds at all times. An array has a
-        value for each time, which is held up to the next time. A function of an array of times is evaluated in the
-        middle of each step and held over the step. Beyond ±1 a command saturates, with a warning. `inputs` may also be
-        a data frame. If there is a column `time` among the inputs, the other arrays have a value for each of its times
-        instead. Each value is held from its time up to the next, also between output times. Before the first time the
-        inputs have their usual values.
+        current, and the usual voltage. The name of an axis, such as `surge`, stands for all commands that drive it: 0.3
+        is 30 % of the full command in its positive direction. A value is one of three things. A number holds at all
+        times. An array has a value for each time, which is held up to the next time. A function of an array of times is
+        evaluated in the middle of each step and held over the step. Beyond ±1 a command saturates, with a warning.
+        `inputs` may also be a data frame. If there is a column `time` among the inputs, the other arrays have a value
+        for each of its times instead. Each value is held from its time up to the next, also between output times.
+        Before the first time the inputs have their usual values.
 
         `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
         pitch begins at the Euler angles phi_0, theta_0 and psi_0 (rad), which `start` may contain, too. They are 0 by
@@ -211,7 +214,7 @@ class VehicleModel(Vehicle):
     ) -> Result:
         layout = self.layout
         check_coefficients(layout, self.rov.coefficients)  # `dataclasses.replace` does not check them
-        times = checked_times("time", time)
+        times = checked_times("time", duration_times(time) if np.ndim(time) == 0 else time)
         commands = Commands(layout, times, inputs, many=many)
         values: dict[str, Array] = {
             **commands.values,

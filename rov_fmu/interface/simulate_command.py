@@ -7,9 +7,7 @@ from math import ceil, floor, isfinite, log10, nan
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from rov_fmu.interface.arguments import TIME, Array
+from rov_fmu.interface.arguments import STEP, TIME, Array, result_times
 from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
@@ -18,8 +16,8 @@ from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.model.layout import Layout
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
 
-_STOP, _STEP = 10.0, 0.01
-"""The default end of a simulation and the default time between two results, s, as in the FMU's default experiment."""
+_STOP = 10.0
+"""The default end of a simulation, s, as in the FMU's default experiment."""
 _SHORTEST = 1e-6
 """The shortest simulation, s."""
 _MOST_RESULTS = 1_000_000
@@ -65,10 +63,10 @@ def run(
     for name in given.inputs:
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
-    if stop is not None and step is None and stop / _STEP > _MOST_RESULTS:
+    if stop is not None and step is None and stop / STEP > _MOST_RESULTS:
         ends = f"--stop {stop:g}" if commands is None or stop != inputs[TIME][-1] else f"{commands}, up to {stop:g} s,"
-        raise InputError(f"{ends} needs a longer --step than {_STEP:g} s: at least {_least_step(stop):g} s")
-    time = _result_times(_STOP if stop is None else stop, _STEP if step is None else step)
+        raise InputError(f"{ends} needs a longer --step than {STEP:g} s: at least {_least_step(stop):g} s")
+    time = _result_times(_STOP if stop is None else stop, STEP if step is None else step)
     layout = vehicle.layout
     record = [*layout.inputs, *layout.state, *layout.calculated] if with_inputs else None
     changed = vehicle.with_(**given.coefficients)
@@ -76,11 +74,10 @@ def run(
 
 
 def _result_times(stop: float, step: float) -> Array:
-    """Return the times of the results: round multiples of the step, and the end. Raises InputError."""
+    """Return the times of the results. Raises InputError if there are too many."""
     if stop / step > _MOST_RESULTS:
         raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
-    time = np.round(step * np.arange(int(stop / step) + 2), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
-    return np.append(time[time < stop - 1e-9], stop)
+    return result_times(stop, step)
 
 
 def _least_step(stop: float) -> float:
@@ -96,6 +93,7 @@ class Settings:
     """The values of the options --set, by name."""
 
     inputs: dict[str, float]
+    """The inputs; the name of an axis stands for the commands that drive it."""
     start: dict[str, float]
     coefficients: dict[str, float]
 
@@ -105,7 +103,7 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     at_start = {*layout.state, *layout.initial}
     found = _read_values(settings, layout)
     return Settings(
-        {name: value for name, value in found.items() if name in layout.inputs},
+        {name: value for name, value in found.items() if name in layout.inputs or name in layout.kinds},
         {name: value for name, value in found.items() if name in at_start},
         {name: value for name, value in found.items() if name in layout.coefficients},
     )
@@ -113,7 +111,8 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
 
 def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
     """Return the values of the options --set by name. Raises InputError."""
-    names = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
+    variables = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
+    names = [*variables, *layout.kinds]
     found: dict[str, float] = {}
     for text in settings:
         name, _, value = (part.strip() for part in text.partition("="))
@@ -129,7 +128,7 @@ def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
         except ValueError:
             found[name] = nan
         if not isfinite(found[name]):
-            percent = _percent(value) if names[name].unit == "1" else ""
+            percent = _percent(value) if name in layout.kinds or variables[name].unit == "1" else ""
             raise InputError(f"--set {text}: {shown(value)} must be a finite number{percent}")
     return found
 

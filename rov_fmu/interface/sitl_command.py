@@ -1,15 +1,17 @@
 """The command `rov-fmu sitl`: the meaning of its options, and what it prints."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, socket
 
+import numpy as np
+
 from rov_fmu.bridges.sitl import Connection, Setup
 from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
-from rov_fmu.interface.arguments import checked_start, checked_values
+from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings
 from rov_fmu.io.interrupts import cleaned_up
@@ -55,7 +57,8 @@ def serve(path: Path, options: Options) -> None:
             ) from error
         connection = Connection(setup, lambda words: print_message(f"rov-fmu: {words}"))
         address, port = server.getsockname()
-        paragraph(console(), _listed(setup.servos))
+        for line in _listed(setup.servos, setup.rov.layout):
+            paragraph(console(), line)
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
 
         def end() -> None:
@@ -84,13 +87,14 @@ def _setup(path: Path, options: Options) -> Setup:
             raise InputError(f"--log {options.log}: the file exists; choose another name, or replace it with --force")
     given = read_settings(options.settings, vehicle.layout)
     vehicle = vehicle.with_(**given.coefficients)
-    checked_values("inputs", given.inputs, vehicle.layout.inputs, many=False)
+    inputs = with_axes(vehicle.layout, {name: np.array(value) for name, value in given.inputs.items()})
+    checked_values("inputs", inputs, vehicle.layout.inputs, many=False)
     checked_start(given.start, vehicle.layout, many=False)
     servos = servos_of(vehicle.layout, options.frame, _table(options.servos, vehicle.layout))
-    for name in given.inputs:
+    for name in inputs:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
-    start = given.inputs | given.start
+    start = {name: float(value) for name, value in inputs.items()} | given.start
     currents, interval = vehicle.electric_currents, 1.0 / options.log_rate
     return Setup(vehicle.rov, servos, start, currents, options.bottom, options.log, interval, options.force)
 
@@ -109,13 +113,11 @@ def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:
     return found
 
 
-def _listed(servos: Servos) -> str:
-    """Return a line with the servos and what each drives."""
-    ordered = sorted(servos.items(), key=lambda item: item[1])
-    drives = (
-        f"{number} {name.removeprefix('u_')}{' reversed' if sign < 0 else ''}" for name, (number, sign) in ordered
-    )
-    return f"servo and what it drives: {', '.join(drives)}"
+def _listed(servos: Servos, layout: Layout) -> Iterator[str]:
+    """Yield a line about what each servo drives, by the words of the input: `servo 1 drives u_l: left thruster ...`."""
+    for name, (number, sign) in sorted(servos.items(), key=lambda item: item[1]):
+        words = layout.commands[name].description.removeprefix("Command ").partition(";")[0]
+        yield f"servo {number} drives {words}{', reversed' if sign < 0 else ''}"
 
 
 def _summary(connection: Connection) -> str:

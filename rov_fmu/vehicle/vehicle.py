@@ -178,12 +178,18 @@ def check_coefficients(layout: Layout, values: Mapping[str, float]) -> None:
     """Raise InputError about the first value that is out of its bounds or belongs to no coefficient of the vehicle."""
     for name, value in values.items():
         if name not in layout.coefficients:
-            hint = did_you_mean(name, layout.coefficients)
+            hint = did_you_mean(name, layout.coefficients) or _by_words(name, layout)
             raise InputError(f"{name}: there is no such coefficient of this vehicle{hint}")
         try:
             within(value, layout.coefficients[name])
         except ValueError as error:
             raise InputError(f"{name} = {shown(value)}: {error}") from error
+
+
+def _by_words(word: str, layout: Layout) -> str:
+    """Return the coefficient that a word describes, as the end of a message: `mass` is m_rov."""
+    described = (name for name, of in layout.coefficients.items() if word.lower() in of.description.lower().split())
+    return f"; did you mean {name}?" if (name := next(described, "")) else ""
 
 
 def _number(name: str, value: object) -> float:

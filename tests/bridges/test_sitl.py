@@ -408,7 +408,8 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
     command = [sys.executable, "-u", "-m", "rov_fmu", "sitl", "bluerov2_heavy", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout
-        assert process.stdout.readline().startswith("servo and what it drives: 1 1, 2 2,")
+        for number in range(1, 9):
+            assert process.stdout.readline().startswith(f"servo {number} drives u_{number}: ")
         found = re.search(r"UDP port (\d+)", process.stdout.readline())
         assert found
         autopilot = ArduSub(int(found[1]), rate=200, sticks=lambda t: (0.4 if t % 3 < 1.5 else -0.4, 0.2))

@@ -21,6 +21,7 @@ from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import FileError, InputError
 from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.layout import HEAVE
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
@@ -248,7 +249,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     "no thrust": (lambda v: v.with_(a_t_rear=-100), "curve rear: must give a force above 0 at full command, "),
     "no arm": (lambda v: v.with_(gamma=0), "R, gamma: must both be more than 0"),
     "time stands": (lambda v: v.simulate([0, 1, 1]), r"time\[2\] = 1: must be greater than the time before it, 1"),
-    "one time": (lambda v: v.simulate(3), r"time: must be a sequence of 2 or more times \(s\), .* shape \(\)"),
+    "one time": (lambda v: v.simulate([3.0]), r"time: must be a sequence of 2 or more times \(s\), .* shape \(1,\)"),
     "times in words": (lambda v: v.simulate(["a"]), r"time = \['a'\]: must be a number, or an array of numbers"),
     "endless time": (lambda v: v.simulate([0, np.inf]), r"time\[1\] = inf: must be a finite number"),
     "unknown input": (
@@ -344,3 +345,53 @@ def test_a_vehicle_that_cannot_be_is_neither_built_nor_simulated(videoray: Vehic
     with pytest.raises(InputError, match=r"^names: must name a variable$"):
         Result(np.zeros(2), {}, {}, (), np.zeros(0, np.intp)).plot()
     assert not list(tmp_path.iterdir())
+
+
+# ---- Commands along axes, and durations ------------------------------------------------------------------------------
+
+
+def test_a_command_along_an_axis_is_that_of_its_thrusters(videoray: VehicleModel) -> None:
+    times = np.array(TIMES)
+    expected = videoray.simulate(times, {"u_l": 0.3 + 0.1, "u_r": 0.3 - 0.1, "u_t": 0.02 * times})
+    result = videoray.simulate(times, {"surge": 0.3, "yaw": 0.1, "heave": 0.02 * times})
+    assert all(np.array_equal(result[name], expected[name]) for name in result)
+    heavy = rov_fmu.load("bluerov2_heavy")
+    signs = {"u_5": -1.0, "u_6": 1.0, "u_7": 1.0, "u_8": -1.0}
+    by_thrusters = heavy.simulate(times, {name: heavy.layout.signs(HEAVE)[name] * 0.1 for name in signs})
+    assert np.array_equal(heavy.simulate(times, {"heave": 0.1})["w"], by_thrusters["w"])
+    assert by_thrusters["w"][-1] > 0.0  # down
+
+
+def test_a_command_along_an_axis_is_a_pulse_width_where_commands_are(tmp_path: Path) -> None:
+    path = tmp_path / "pulses.toml"
+    path.write_text(BARE.read_text(encoding="utf-8") + "\n[commands]\npulse = [1100, 1500, 1900]\n", encoding="utf-8")
+    vehicle = rov_fmu.load(path)
+    axis = next(iter(vehicle.layout.kinds))
+    recorded = vehicle.simulate([0.0, 1.0], {axis: -0.5}, record=[*vehicle.layout.commands])
+    assert {float(values[0]) for values in recorded.values()} <= {1300.0, 1700.0}
+
+
+def test_a_wrong_command_along_an_axis_is_a_line(videoray: VehicleModel) -> None:
+    with pytest.raises(InputError, match=r"^inputs\['u_l'\]: surge drives this input, too$"):
+        videoray.simulate(TIMES, {"surge": 0.3, "u_l": 0.1})
+    with pytest.raises(
+        InputError, match=r"^inputs\['sway'\]: the vehicle has no such input, only u_l, .*, surge, heave, yaw"
+    ):
+        videoray.simulate(TIMES, {"sway": 0.3})
+    with pytest.warns(UserWarning, match=r"u_l reaches 30, .* \(30 % is 0\.3\)$"):
+        videoray.simulate(TIMES, {"u_l": 30})
+
+
+def test_a_duration_gives_a_result_every_hundredth_of_a_second(videoray: VehicleModel) -> None:
+    result = videoray.simulate(2, {"surge": 0.3})
+    assert np.array_equal(result.time, np.round(0.01 * np.arange(201), 12))
+    at_once = videoray.simulate([0.0, 2.0], {"surge": 0.3})["u"][-1]
+    assert result["u"][-1] == pytest.approx(at_once, rel=1e-14)
+    for wrong in (0.0, -1.0, 1e9):
+        with pytest.raises(InputError, match=r"^time = .*: a duration must be within 0\.01 \.\.\. 10000 s"):
+            videoray.simulate(wrong)
+
+
+def test_a_word_for_a_coefficient_is_understood(videoray: VehicleModel) -> None:
+    with pytest.raises(InputError, match=r"^mass: there is no such coefficient of this vehicle; did you mean m_rov\?$"):
+        videoray.with_(mass=5.0)
