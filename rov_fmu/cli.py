@@ -268,8 +268,8 @@ def _print_built(built: "Built", seconds: float) -> None:
     multiple=True,
     type=_setting,
     metavar="NAME=VALUE",
-    help="Set an input that is held, a coefficient, or a state at the start, in SI units. The name of an axis is a command "
-    "to all thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
+    help="Set an input that is held, a coefficient, or a state at the start, in SI units. The name of an axis is a "
+    "command to all thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
 )
 @click.option(
     "--input",
