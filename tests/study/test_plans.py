@@ -35,7 +35,7 @@ WHOLE = {
     + VARY
     + TAIL: "stop_time = 0.95: must be a whole number of steps of 0.1 s after the st",
     HEAD.replace("1.0", "-1.0") + VARY + TAIL: "stop_time = -1.0: must be after start_time = 0",
-    HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be within 1 ... 1e+08",
+    HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be greater than or equal to 1",
 }
 """Plans and the beginnings of the messages about them."""
 HEADS = {
