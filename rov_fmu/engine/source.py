@@ -378,12 +378,17 @@ def generated_sources(layout: Layout) -> dict[str, str]:
 
 def unused_sources(layout: Layout) -> list[str]:
     """Return the shared C files that a vehicle does not need."""
-    return [*([] if layout.has_attitude else ["heading.c"]), *([] if layout.has_dead_time else ["delay.c"])]
+    needed = {
+        "heading.c": layout.has_attitude,
+        "delay.c": layout.has_dead_time,
+        "lag.c": bool(layout.lagging),
+        "table.c": bool(equation_of(layout).tables),
+    }
+    return [name for name, is_needed in needed.items() if not is_needed]
 
 
 def sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    unused = unused_sources(layout)
-    names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused]
-    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in names}
+    names = {"series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"} - {*unused_sources(layout)}
+    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in sorted(names)}
     return generated_sources(layout) | shared
