@@ -338,9 +338,9 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         for (int i = 0; i < N_USED; i++) {
             m.scale[i] *= 0.25;
         }
-        if (HAS_LAG) {
-            model_arrive(at, n, &m.q, m.y, m.scale);
-        }
+#if HAS_LAG
+        model_arrive(at, n, &m.q, m.y, m.scale);
+#endif
         if (length * s.unit >= rest) {
             break;
         }
