@@ -177,9 +177,10 @@ def _net_weight(rov: Rov) -> float:
     """Return the load that acts downwards in the earth frame, N: weight less buoyancy, and F_0 of a level vehicle."""
     if not rov.layout.has(HEAVE):
         return 0.0
+    weight = rov["W"] - rov["B"] if rov.layout.restoring else 0.0
     if rov.layout.has_attitude:
-        return rov["W"] - rov["B"] if rov.layout.restoring else 0.0
-    return rov.load(rov.layout.kinds[HEAVE.name])
+        return weight
+    return weight + rov.coefficients.get(HEAVE.coefficient("F_0"), 0.0)
 
 
 def _gravity(rov: Rov) -> float:

@@ -16,8 +16,8 @@ from functools import cached_property, lru_cache
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .expression import Expression, Name, Names, call, directed, of, product, scaled, total
-from .forces import Force, forces_of
-from .layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, ThrustTable, VehicleAxis, cross_name
+from .forces import COUPLING, Effect, Force, forces_of, thrusts
+from .layout import HEAVE, SURGE, SWAY, YAW, Layout, ThrustTable, cross_name
 from .mass import MassMatrix
 from .thrust import steady_name, thrust_formulas
 
@@ -29,8 +29,8 @@ class Term:
     coefficient: Expression
     factors: tuple[str, ...] = ()
     """The states that are multiplied with the coefficient."""
-    effect: str = ""
-    """The name of the effect of a force, as in forces.py, or "coupling"."""
+    effect: Effect | None = None
+    """The effect of the force that the term belongs to; None for a term of the kinematics or of a lag."""
 
     @property
     def formula(self) -> Expression:
@@ -241,7 +241,8 @@ def equation_of(layout: Layout) -> Equation:
             first = forces[0][1]
             ahead, astern = (total(f.along(one, reverse=reverse) for one, f in forces) for reverse in (False, True))
             coefficient: Expression = name
-            if first.velocity and first.is_held:
+            is_constant = ahead.names <= layout.coefficients.keys() | parameters.keys()
+            if first.velocity and not is_constant:
                 held[name.identifier] = ahead
                 direction = names("direction", first.velocity)
                 by_direction[direction.identifier] = Directed(first.velocity, ONE, -ONE)
@@ -249,13 +250,13 @@ def equation_of(layout: Layout) -> Equation:
             elif first.velocity:
                 by_direction[name.identifier] = Directed(first.velocity, ahead, astern)
             else:
-                (held if first.is_held else parameters)[name.identifier] = ahead
+                (parameters if is_constant else held)[name.identifier] = ahead
             terms.append(Term(coefficient, first.factors, first.effect))
         coriolis = mass.coriolis(v) if layout.coupled else {}
         for factors, formula in coriolis.items():
             name = names("coupling", v, *([] if len(coriolis) == 1 else ["".join(factors)]))
             parameters[name.identifier] = formula
-            terms.append(Term(name, factors, "coupling"))
+            terms.append(Term(name, factors, COUPLING))
         rows[v] = tuple(terms)
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
@@ -296,18 +297,15 @@ def _accelerations(layout: Layout, mass: MassMatrix, axis: str, names: Names) ->
     """Return the forces that accelerate an axis, by the names of their coefficients, each with its inverse mass.
 
     A force along another axis accelerates this one through the inverse of the mass matrix. Forces with the same effect
-    and the same factors are added. They must agree in `velocity` and `is_held`.
+    and the same factors are added. They must agree in `velocity`.
     """
     inverse = mass.inverse(axis)
     found: dict[Name, list[tuple[Name, Force]]] = {}
     for force in forces_of(layout, names):
-        if force.axis in inverse:
-            others = dict.fromkeys(factor for factor in force.factors if factor != axis or force.effect not in _DRAG)
-            found.setdefault(names(force.effect, axis, *others), []).append((inverse[force.axis], force))
+        if force.factors and force.axis in inverse:
+            others = () if set(force.factors) == {axis} else dict.fromkeys(force.factors)
+            found.setdefault(names(force.effect.name, axis, *others), []).append((inverse[force.axis], force))
     return found
-
-
-_DRAG = ("linear", "quadratic")
 
 
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
@@ -372,58 +370,27 @@ def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Ex
 
     For each curve with a lag, an axis has another formula: the change of acceleration until the thrust is steady.
     """
-    found = {f"tau_{curve.name}": total(_thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves}
-    loads = {form.axis.velocity: load_along(layout, form, names) for form in layout.axes}
+    found = {f"tau_{curve.name}": total(thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves}
+    loads: dict[str, list[Expression]] = {v: [] for v in layout.velocities}
+    for force in forces_of(layout, names):
+        if not force.factors:
+            loads[force.axis].append(force.formula)
     lagging = [curve for curve in layout.curves if curve.has_lag]
     for form in layout.axes:
         v = form.axis.velocity
         inverse = mass.inverse(v)
-        found[names("held", v).identifier] = total(gain * loads[other] for other, gain in inverse.items())
+        found[names("held", v).identifier] = total(gain * total(loads[other]) for other, gain in inverse.items())
         for curve in lagging:
             changes = []
             for other, gain in inverse.items():
                 axis = layout.by_velocity[other].axis
-                if thrusts := _thrusts(layout, axis, names, curve, remaining=True):
-                    changes.append(gain * (Name(axis.coefficient("alpha")) * total(thrusts)))
+                if arriving := thrusts(layout, axis, names, curve, arriving=True):
+                    changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
             if changes:
                 found[names("remaining", v, curve.name).identifier] = total(changes)
     for name, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
         if name in layout.pose and current in layout.inputs:
             found[names("held", name).identifier] = Name(current)
-    return found
-
-
-def load_along(layout: Layout, form: VehicleAxis, names: Names) -> Expression:
-    """Return the force along an axis, or the moment about it, that is constant while the inputs are held."""
-    axis = form.axis
-    if axis is YAW:
-        thrust: list[Expression] = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
-    else:
-        thrust = _thrusts(layout, axis, names)
-    parts: list[Expression] = [Name(axis.coefficient("alpha")) * total(thrust)] if thrust else []
-    parts += [Name(axis.external), *([Name(form.coefficient("F_0"))] if "F_0" in form.keys else [])]
-    if axis is HEAVE and layout.restoring and not layout.has_attitude:
-        parts.append(names("net_weight"))
-    return total(parts)
-
-
-def _thrusts(
-    layout: Layout, axis: Axis, names: Names, curve: Curve | None = None, *, remaining: bool = False
-) -> list[Expression]:
-    """Return the thrusts along an axis, or their moments about it: all of them, or only those of a curve.
-
-    `remaining` gives the changes of these thrusts until they are steady.
-    """
-    found = []
-    for t in layout.drivers(axis):
-        own = layout.curve_of[t.name]
-        if curve in (None, own):
-            force: Expression = Name(f"F_{t.name}")
-            if remaining:
-                force = steady_name(t.name, own, names) - force
-            if axis is YAW and t.position is None and t.arm:
-                force = names("arm") * force
-            found.append(scaled(t.effect(axis), force))
     return found
 
 
