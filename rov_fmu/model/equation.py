@@ -77,11 +77,11 @@ class Equation:
     starts: Mapping[str, Expression]
     """Formulas from the states of the vehicle to the states of the table at the start of a step, and `square_length`,
     which some of them use. States without a formula start at 0. These are the integrals, which no term contains, and
-    the progress of the lags. A state that a term contains must have a formula."""
+    the arrived fractions of the lags. A state that a term contains must have a formula."""
     lags: Mapping[str, Mapping[str, str]]
-    """For the progress of each lag: the forces that lag, each with the name of the steady thrust that it approaches.
+    """For the arrived fraction of each lag: the forces that lag, each with the steady thrust that it approaches.
 
-    The progress p rises from 0 towards 1 during a piece of a step, and each force is then F + (steady - F) p."""
+    The arrived fraction p rises from 0 towards 1 during a piece of a step. Each force is then F + (steady - F) p."""
 
     outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas."""
@@ -107,10 +107,10 @@ class Equation:
         """For each force that lags: the formulas of its rate, and of its value after a piece of a step."""
         return {
             force: (
-                self.rows[progress][0].coefficient * (Name(steady) - Name(force)),
-                Name(force) + (Name(steady) - Name(force)) * Name(progress),
+                self.rows[arrived][0].coefficient * (Name(steady) - Name(force)),
+                Name(force) + (Name(steady) - Name(force)) * Name(arrived),
             )
-            for progress, forces in self.lags.items()
+            for arrived, forces in self.lags.items()
             for force, steady in forces.items()
         }
 
@@ -199,7 +199,7 @@ class Equation:
         return found
 
     def _is_lag(self, term: Term) -> bool:
-        """Return True for a term that contains the progress of a lag. Such a term is 0 at the start of a piece."""
+        """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
         return not self.lags.keys().isdisjoint(term.factors)
 
     @cached_property
@@ -229,28 +229,28 @@ def equation_of(layout: Layout) -> Equation:
     mass = mass_matrix(layout, names)
     parameters = _parameters(layout, mass, names)
     by_direction: dict[str, Directed] = {}
-    held = _held_forces(layout, mass, names)
+    forces = _constant_forces(layout, mass, names)
     rows: dict[str, tuple[Term, ...]] = {}
     for v in layout.velocities:
-        terms = [Term(names("held", v))]
+        terms = [Term(names("constant", v))]
         terms += [
-            Term(names("remaining", v, curve), (names("progress", curve).identifier,))
+            Term(names("arriving", v, curve), (names("arrived", curve).identifier,))
             for curve in _lagging(layout, mass, v)
         ]
-        for name, forces in _accelerations(layout, mass, v, names).items():
-            first = forces[0][1]
-            ahead, astern = (total(f.along(one, reverse=reverse) for one, f in forces) for reverse in (False, True))
+        for name, along in _accelerations(layout, mass, v, names).items():
+            first = along[0][1]
+            ahead, astern = (total(f.along(one, reverse=reverse) for one, f in along) for reverse in (False, True))
             coefficient: Expression = name
             is_constant = ahead.names <= layout.coefficients.keys() | parameters.keys()
             if first.velocity and not is_constant:
-                held[name.identifier] = ahead
+                forces[name.identifier] = ahead
                 direction = names("direction", first.velocity)
                 by_direction[direction.identifier] = Directed(first.velocity, ONE, -ONE)
                 coefficient = direction * name
             elif first.velocity:
                 by_direction[name.identifier] = Directed(first.velocity, ahead, astern)
             else:
-                (parameters if is_constant else held)[name.identifier] = ahead
+                (parameters if is_constant else forces)[name.identifier] = ahead
             terms.append(Term(coefficient, first.factors, first.effect))
         coriolis = mass.coriolis(v) if layout.coupled else {}
         for factors, formula in coriolis.items():
@@ -264,10 +264,10 @@ def equation_of(layout: Layout) -> Equation:
     lags: dict[str, dict[str, str]] = {}
     for curve in layout.curves:
         if curve.has_lag:
-            progress, rate = names("progress", curve.name).identifier, names("rate", curve.name)
-            rows[progress] = (Term(rate), Term(-rate, (progress,)))
+            arrived, rate = names("arrived", curve.name).identifier, names("rate", curve.name)
+            rows[arrived] = (Term(rate), Term(-rate, (arrived,)))
             own = [t.name for t in layout.thrusters if t.curve == curve.name]
-            lags[progress] = {f"F_{name}": steady_name(name, curve, names).identifier for name in own}
+            lags[arrived] = {f"F_{name}": steady_name(name, curve, names).identifier for name in own}
     rows |= attitude
     rows |= _kinematics(layout, names)
     starts: dict[str, Expression] = {v: Name(v) for v in layout.velocities}
@@ -279,7 +279,7 @@ def equation_of(layout: Layout) -> Equation:
         parameters,
         by_direction,
         thrust_formulas(layout, names),
-        held,
+        forces,
         rows,
         starts,
         lags,
@@ -365,8 +365,8 @@ def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Exp
     return found
 
 
-def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
-    """Return formulas for the torque of every curve, (4), and for the held accelerations of every axis, (18).
+def _constant_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
+    """Return formulas for the torque of every curve, (4), and for the constant accelerations of every axis, (18).
 
     For each curve with a lag, an axis has another formula: the change of acceleration until the thrust is steady.
     """
@@ -379,7 +379,7 @@ def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Ex
     for form in layout.axes:
         v = form.axis.velocity
         inverse = mass.inverse(v)
-        found[names("held", v).identifier] = total(gain * total(loads[other]) for other, gain in inverse.items())
+        found[names("constant", v).identifier] = total(gain * total(loads[other]) for other, gain in inverse.items())
         for curve in lagging:
             changes = []
             for other, gain in inverse.items():
@@ -387,10 +387,10 @@ def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Ex
                 if arriving := thrusts(layout, axis, names, curve, arriving=True):
                     changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
             if changes:
-                found[names("remaining", v, curve.name).identifier] = total(changes)
+                found[names("arriving", v, curve.name).identifier] = total(changes)
     for name, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
         if name in layout.pose and current in layout.inputs:
-            found[names("held", name).identifier] = Name(current)
+            found[names("constant", name).identifier] = Name(current)
     return found
 
 
@@ -423,14 +423,14 @@ def _kinematics(layout: Layout, names: Names) -> dict[str, tuple[Term, ...]]:
         for row, name in enumerate("xyz", 1):
             if name in layout.pose:
                 moving = [Term(ONE, (v, entry(row, n))) for n, v in enumerate("uvw", 1) if v in velocities]
-                rows[name] = (Term(names("held", name)), *moving)
+                rows[name] = (Term(names("constant", name)), *moving)
         return rows
     if layout.has(SURGE, SWAY):
         turns = layout.has(YAW)
         if turns:
             rows["cos_psi"] = (Term(-ONE, ("r", "sin_psi")),)
             rows["sin_psi"] = (Term(ONE, ("r", "cos_psi")),)
-        north, east = [Term(names("held", "x"))], [Term(names("held", "y"))]
+        north, east = [Term(names("constant", "x"))], [Term(names("constant", "y"))]
         if layout.has(SURGE):
             north.append(Term(ONE, ("u", "cos_psi") if turns else ("u",)))
             east += [Term(ONE, ("u", "sin_psi"))] if turns else []

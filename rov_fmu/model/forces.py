@@ -36,7 +36,7 @@ LIFT = Effect("lift", "lift of the hull")
 RESTORING = Effect("restoring", "weight and buoyancy")
 COUPLING = Effect("coupling", "Coriolis and Munk terms")
 LAG = Effect("lag", "the lag of the thrust (T)", "lag")
-DEAD_BAND = Effect("dead band", "the dead band of the thrust (c_0)", "dead band")
+DEAD_BAND = Effect("dead band", "the dead band (c_0)", "dead band")
 DEAD_TIME = Effect("dead time", "the dead time (T_d)", "delay")
 ADVANCE = Effect("advance", "the loss of thrust by the speed of advance (d)", "loss of thrust with speed")
 STEERING = Effect("steering", "the fins")
@@ -90,7 +90,7 @@ def effects_of(layout: Layout) -> list[Effect]:
     found = [force.effect for force in forces_of(layout, Names())]
     has = {
         LAG: bool(layout.lagging),
-        DEAD_BAND: any("c_0" in curve.keys for curve in layout.curves),
+        DEAD_BAND: any("c_0" in curve.keys or curve.tables for curve in layout.curves),  # a table may have one
         DEAD_TIME: layout.has_dead_time,
         COUPLING: layout.coupled,
     }

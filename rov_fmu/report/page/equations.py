@@ -205,7 +205,7 @@ def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
 def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     """Return the formulas that replace their names, because the page has no equation of these names."""
     names = equation.names
-    kinds = ("saturated", "command", "net_weight", "righting", "arm", "held")
+    kinds = ("saturated", "command", "net_weight", "righting", "arm", "constant")
     inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
     inlined -= {
         names("command", t.name).identifier
