@@ -6,8 +6,7 @@ Between reversals, and while the inputs are held, the motion is a quadratic syst
 
 `equation_of` derives this table from the layout of a vehicle: the states y, the terms in the rate of each state, and a
 formula for each coefficient. `step.py` computes a step from it in Python, and the C code is generated from it. A new
-effect is a new term with its formula. If the term contains a state that no other term contains, that state also needs
-an entry in `starts`, and its row must come before those of the states that no term contains.
+effect is a new force (forces.py).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -125,7 +124,7 @@ class Equation:
     def used(self) -> frozenset[str]:
         """The states that a term contains, and the orientation. The other states are integrals of these.
 
-        In `rows`, the used states must come first, because the C code knows only their number.
+        In `rows`, the used states come first, because the C code knows only their number.
         """
         return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
 
@@ -270,7 +269,8 @@ def equation_of(layout: Layout) -> Equation:
             lags[arrived] = {f"F_{name}": steady_name(name, curve, names).identifier for name in own}
     rows |= attitude
     rows |= _kinematics(layout, names)
-    starts: dict[str, Expression] = {v: Name(v) for v in layout.velocities}
+    used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
+    starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
     if "cos_psi" in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     if layout.has_attitude:
@@ -280,7 +280,7 @@ def equation_of(layout: Layout) -> Equation:
         by_direction,
         thrust_formulas(layout, names),
         forces,
-        rows,
+        {name: rows[name] for name in sorted(rows, key=lambda name: name not in used)},
         starts,
         lags,
         outputs=angle_formulas() if layout.has_attitude else {},
