@@ -14,8 +14,8 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rov_fmu.model.alone import AxisAlone
 from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout, delayed_name
-from rov_fmu.model.riccati import Riccati
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 
@@ -86,7 +86,7 @@ class Shapes:
         (acting,) = self.commands(curve.name, np.array([command])).tolist()
         return curve.together * rov.curve_force(curve, acting)
 
-    def motion(self, rov: Rov, axis: Axis, command: float) -> Riccati:
+    def motion(self, rov: Rov, axis: Axis, command: float) -> AxisAlone:
         """Return the equation of an axis alone under a held command, once the thrust is steady."""
         layout = rov.layout
         inputs = dict(layout.usual_inputs)
@@ -94,8 +94,7 @@ class Shapes:
             curve = layout.curve_of.get(name.removeprefix("u_"))
             acting = self.commands(curve.name, np.array([value])) if curve else [value]
             inputs[name] = inputs[delayed_name(name)] = float(acting[0])
-        F = rov.commanded(inputs)
-        return rov.acceleration_of(layout.kinds[axis.name], rov.along(axis, F), loss=rov.loss(axis, inputs))
+        return rov.alone(axis, inputs)
 
 
 NO_SHAPES = Shapes({})
