@@ -27,10 +27,10 @@ class EquationSource:
     def _in_c(self) -> dict[str, str]:
         """The C expression for every name that a formula may contain."""
         equation = self.equation
-        found = {name: f"at[REF_{name}]" for name in self.variables}
-        found |= {name: f"n->{name}" for name in equation.parameters}
-        found |= {name: f"q->{name}" for name in self.held_names()}
-        return found | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
+        in_c = {name: f"at[REF_{name}]" for name in self.variables}
+        in_c |= {name: f"n->{name}" for name in equation.parameters}
+        in_c |= {name: f"q->{name}" for name in self.held_names()}
+        return in_c | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
 
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
@@ -93,7 +93,7 @@ class EquationSource:
 
     def first_rotation(self) -> str:
         """Return the first angular velocity."""
-        return next(form.axis.velocity for form in self.layout.axes if form.axis.is_rotation)
+        return next(own.axis.velocity for own in self.layout.axes if own.axis.is_rotation)
 
     def _turns(self, name: str) -> bool:
         """Return True when the rate of a state depends on the heading."""
@@ -179,11 +179,11 @@ class EquationSource:
             level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
             last = 1 + len(self.equation.components)
             depth |= dict.fromkeys(group, level if used & set(group) else last)
-        found = []
+        blocks = []
         for level in sorted(set(depth.values())):
             neighbours = groupby(self.equation.states, key=lambda name: depth[name] == level)
-            found += [tuple(names) for is_level, names in neighbours if is_level]
-        return found
+            blocks += [tuple(names) for is_level, names in neighbours if is_level]
+        return blocks
 
     @cached_property
     def block_of(self) -> dict[str, int]:
@@ -348,8 +348,8 @@ def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], k
 
 def _with_changes(variables: Iterable[str]) -> dict[str, str]:
     """Return the C expressions of variables and of their changes, by their names."""
-    found = {name: f"at[REF_{name}]" for name in variables}
-    return found | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
+    places = {name: f"at[REF_{name}]" for name in variables}
+    return places | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
 
 
 def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> dict[str, Expression]:
