@@ -20,6 +20,8 @@ class EquationSource:
         self.layout = layout
         self.equation: Equation = equation_of(layout)
         self.variables = frozenset(layout.places)
+        dynamic = self.equation.dynamic
+        assert self.equation.components[: len(dynamic)] == dynamic, "the C code knows only the number of these"
 
     # ---- Names ----
 
@@ -59,10 +61,6 @@ class EquationSource:
         """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
         return _statements(self.equation.forces, self._in_c, self._in_c)
 
-    def directions(self) -> list[tuple[str, int]]:
-        """Return each coefficient that depends on a direction, with the index of its velocity in `monitored`."""
-        return [(name, self.equation.monitored.index(d.velocity)) for name, d in self.equation.directed.items()]
-
     def starts(self) -> list[str]:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
@@ -87,7 +85,7 @@ class EquationSource:
 
     def turning(self) -> list[str]:
         """Return the entries of the rotation matrix that still change while all velocities are steady."""
-        kinematic = self.equation.components[self.dynamic() :]
+        kinematic = self.equation.components[len(self.equation.dynamic) :]
         rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
         return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
 
@@ -108,12 +106,6 @@ class EquationSource:
         if self.layout.has_attitude:
             return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
-
-    def dynamic(self) -> int:
-        """Return the number of components that may settle. These come first, so the C code needs only their number."""
-        equation = self.equation
-        assert equation.components[: len(equation.dynamic)] == equation.dynamic
-        return len(equation.dynamic)
 
     def finish(self) -> list[str]:
         """Return statements that assign the states of the vehicle after a step."""
@@ -262,10 +254,6 @@ class EquationSource:
                 partners |= sum(1 << self.equation.states.index(other) for other in others)
         return partners
 
-    def n_used(self) -> int:
-        """Return the number of states that terms contain. These states come first."""
-        return len(self.equation.used)
-
     def lagging_ends(self) -> list[tuple[str, str]]:
         """Return each force that lags, and its formula in C after a piece that ends at y."""
         return [(name, self._by_states(end)) for name, (_, end) in self.equation.lagging.items()]
@@ -282,8 +270,7 @@ class EquationSource:
 
     def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
-        orientation = _needed(self.equation.orientation, formulas.values())
-        return _statements({**orientation, **formulas}, {place: place for place in formulas}, self._in_c)
+        return _assigned(self.equation.orientation, formulas, self._in_c)
 
     def beginning(self) -> list[str]:
         """Return statements for the start.
@@ -301,39 +288,51 @@ class EquationSource:
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
-        text = _with_changes(self.layout.initial)
-        lines: list[str] = []
-        for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            change = to_c(tangent(formula, change_of) or Number(0.0), text.__getitem__)
-            if name in self.layout.state:
-                lines.append(f"d[REF_{name}] += {change};")
-            else:
-                changed = change_of(name).identifier
-                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {changed} = {change};")
-                text |= {name: name, changed: changed}
-        return lines
+        if not self.layout.has_attitude:
+            return []
+        steps, changes = _tangents(start_formulas(), self.layout.initial)
+        states = [name for name in self.layout.state if name in changes]
+        results = {f"d[REF_{name}]": Name(f"d[REF_{name}]") + changes[name] for name in states}
+        return _assigned(steps, results, {**_with_changes(self.layout.initial), **{place: place for place in results}})
 
     def tangent_lines(self) -> list[str]:
         """Return statements that write the changes of the calculated variables to d.
 
         Before, d has the changes of all other variables.
         """
-        equation = self.equation
         given = self.variables - {*self.layout.calculated}
-        changes = {name: change_of(name) for name in given}
-        steps: dict[str, Expression] = {}
-        for name, formula in {**equation.program, **equation.outputs}.items():
-            steps[name] = formula
-            if change := tangent(formula, changes.get):
-                changes[name] = change_of(name)
-                steps[changes[name].identifier] = change
+        steps, changes = _tangents({**self.equation.program, **self.equation.outputs}, given)
         calculated = [name for name in self.layout.calculated if name in changes]
         results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
-            change = tangent(equation.rates[name], changes.get)
+            change = tangent(self.equation.rates[name], changes.get)
             results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
-        formulas = {**_needed(steps, results.values()), **results}
-        return _statements(formulas, {place: place for place in results}, _with_changes(given))
+        return _assigned(steps, results, _with_changes(given))
+
+
+def _tangents(
+    formulas: Mapping[str, Expression], given: Iterable[str]
+) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Return formulas, each with the formula of its change after it, and the changes by the names that change.
+
+    `given` are the variables whose changes are known.
+    """
+    changes: dict[str, Expression] = {name: change_of(name) for name in given}
+    steps: dict[str, Expression] = {}
+    for name, formula in formulas.items():
+        steps[name] = formula
+        if change := tangent(formula, changes.get):
+            changes[name] = change_of(name)
+            steps[change_of(name).identifier] = change
+    return steps, changes
+
+
+def _assigned(
+    steps: Mapping[str, Expression], results: Mapping[str, Expression], known: Mapping[str, str]
+) -> list[str]:
+    """Return statements that assign results to their places. Before them come the steps that they need."""
+    formulas = {**_needed(steps, results.values()), **results}
+    return _statements(formulas, {place: place for place in results}, known)
 
 
 def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], known: Mapping[str, str]) -> list[str]:
