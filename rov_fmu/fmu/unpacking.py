@@ -16,9 +16,9 @@ from xml.parsers import expat
 from rov_fmu.io.messages import FileError, brief, shown
 
 _MOST_UNPACKED = 2_000_000_000
-"""The size of all files together."""
+"""The size of all files."""
 _MOST_RATIO = 100
-"""The size of all files together, relative to that of the archive, if it is above _SMALL."""
+"""The size of all files, relative to that of the archive, if it is above _SMALL."""
 _SMALL = 100_000_000
 """Bytes that an archive may unpack to, however well it is compressed."""
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
@@ -33,7 +33,7 @@ _MOST_PARTS = 3_000_000
 _LONGEST = 1_000_000
 """The largest number of characters in an attribute."""
 _INDICES = ("derivative", "index", "dependencies", "clocks")
-"""The attributes that name other variables, beside the value references in the model structure and in dimensions."""
+"""The attributes that name other variables, besides the value references in the model structure and in dimensions."""
 _FINITE = ("nominal", "factor", "offset", "gain", "startTime", "stopTime", "tolerance", "stepSize")
 _COUNTS = ("numberOfEventIndicators", "numberOfContinuousStates")
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
