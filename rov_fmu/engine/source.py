@@ -7,7 +7,7 @@ from itertools import groupby
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
-from rov_fmu.model.alone import alone_formulas, closed_form
+from rov_fmu.model.alone import response_formulas
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.expression import (
@@ -16,7 +16,6 @@ from rov_fmu.model.expression import (
     Name,
     Number,
     change_of,
-    directed,
     tangent,
     to_c,
     total,
@@ -166,11 +165,8 @@ class EquationSource:
 
     def alone(self, velocity: str, number: int) -> list[str]:
         """Return statements that compute V_ss and Tau of an axis alone."""
-        found = alone_formulas(self.layout, velocity)
-        C = Name("C")
-        drag = {key: directed(C, found[key], found[f"{key}_reverse"]) for key in "AB"}
-        formulas = {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
-        return _statements(formulas, {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}, self._in_c)
+        places = {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}
+        return _statements(response_formulas(self.layout, velocity), places, self._in_c)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
