@@ -10,7 +10,7 @@ is straight motion, or circular motion whose whole turns are all alike.
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from math import atan2, copysign, floor, hypot, inf, isfinite, nan, sqrt, tau
+from math import atan2, copysign, hypot, inf, isfinite, nan, sqrt, tau
 from typing import Any, NamedTuple
 
 MOST_SUBSTEPS = 100_000
@@ -130,12 +130,11 @@ class Motion:
             before, heading = list(self.y), self.heading
             if self.substeps(turn) > 0.0:
                 return False
-            turns = floor((rest - turn) / turn)
-            rest = max(0.0, rest - turn - turns * turn)
+            turns, rest = divmod(rest - turn, turn)
             self.heading += turns * (self.heading - heading)
             for i in self.model.OFFSETS.values():
                 self.y[i] += turns * (self.y[i] - before[i])
-            for i in self.model.QUATERNION.values() if turns % 2 else ():
+            for i in self.model.QUATERNION.values() if turns % 2.0 else ():
                 self.y[i] *= -1.0
             self.begin()
         rest = self.substeps(rest)
@@ -143,8 +142,8 @@ class Motion:
 
     def substeps(self, rest: float) -> float:
         """Move for a time, or until nothing changes any more. Return the rest of the time."""
-        h = rest
-        while rest > 0.0 and h > _SHORTEST and self.tried < MOST_SUBSTEPS:
+        h, shortest = rest, min(_SHORTEST, _SHORTEST * rest)
+        while rest > 0.0 and h > shortest and self.tried < MOST_SUBSTEPS:
             self.tried += 1
             h = min(h, rest)
             y, error = self.trial(h)
