@@ -80,6 +80,9 @@ class Motion:
         self.settled: set[int] = set()
         """The places of the states that do not change any more."""
         self.hold()
+        for i, forces in model.LAGS.items():
+            if all(self.held[steady] == values[force] for force, steady in forces.items()):
+                self.settled.add(i)  # these forces have arrived already
         starts = {**self.held, **values, **dict.fromkeys(model.OFFSETS, 0.0)}
         self.y: State = [starts[name] for name in model.STATES]
         self.size = [0.0] * len(self.y)
