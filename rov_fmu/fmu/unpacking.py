@@ -53,6 +53,11 @@ _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 """The words that an attribute may have, by the version of FMI."""
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 """The types of FMI 1.0 and 2.0, each an element inside its variable."""
+_STORED_AS = {
+    **{(version, kind): "Int32" for version in "12" for kind in ("Integer", "Enumeration")},
+    ("3", "Enumeration"): "Int64",
+}
+"""The whole numbers that hold a value, by the version of FMI and the type."""
 
 
 def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
@@ -260,13 +265,9 @@ class _Description:
         elif self._type == "Boolean":
             if text not in ("true", "false", "1", "0"):
                 raise self._error(f"{place} = {shown(text)}: must be true or false")
-        elif self._type in ("Integer", "Enumeration"):
-            bits = 64 if self._version == "3" else 32
-            self._whole(place, text, -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-        elif size := re.fullmatch(r"(U?)Int(\d+)", self._type):
-            bits = int(size[2])
-            low, high = (0, 2**bits - 1) if size[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-            self._whole(place, text, low, high)
+        elif size := re.fullmatch(r"(U?)Int(\d+)", _STORED_AS.get((self._version, self._type), self._type)):
+            span = 2 ** int(size[2])
+            self._whole(place, text, *((0, span - 1) if size[1] else (-span // 2, span // 2 - 1)))
 
     def _number(self, place: str, text: str) -> None:
         try:
