@@ -332,4 +332,6 @@ def test_a_steady_turn_stays_on_its_circle(fmu: Fmu, number: int) -> None:
         assert end["psi"] - start["psi"] == pytest.approx(start["r"] * h, rel=1e-13)
         radius = start["u"] / start["r"]
         centres = [(s["x"] - radius * sin(s["psi"]), s["y"] + radius * cos(s["psi"])) for s in (start, end)]
-        assert centres[1] == pytest.approx(centres[0], abs=1e-9 * radius)  # psi of 1e6 rad has 1e-10 rad of rounding
+        # psi of 1e6 rad has 1e-10 rad of rounding; in Python, each whole turn has some of its own
+        room = (1e-8 if step is in_python else 1e-9) * radius
+        assert centres[1] == pytest.approx(centres[0], abs=room)
