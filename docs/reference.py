@@ -120,7 +120,10 @@ def filled(page: str) -> str:
         return f"{match[1]}\n\n{content}\n\n"
 
     return re.sub(
-        r"(<!-- (commands|drawings|equations|source|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL
+        r"(<!-- (commands|drawings|equations|source|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
+        text,
+        page,
+        flags=re.DOTALL,
     )
 
 

@@ -11,7 +11,6 @@ from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.layout import (
     AXES,
     AXIS,
-    CURVE,
     HEAVE,
     PITCH,
     RESTORING,
@@ -192,7 +191,7 @@ _BETWEEN = (("m_a", "u", "q"), ("m_a", "v", "r"), ("b_d", "q", "w"), ("a_d", "p"
 SIX = numbered(
     Layout(
         _axes("uvwpqr", _ALL),
-        (Curve("t200", tuple(key for key in CURVE if key not in ("k_t", "V_0", "n_V"))),),
+        (Curve("t200", tuple(key for key in _CURVE_NUMBERS if key not in ("k_t", "V_0", "n_V"))),),
         _SKEW,
         coupled=True,
         cross=_BETWEEN,

@@ -17,10 +17,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sin
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .attitude import INITIAL, QUATERNION
 from .expression import unused
+from .step import interpolated
 
 # ---- Axes ------------------------------------------------------------------------------------------------------------
 
@@ -310,11 +311,6 @@ LEAST_BETA = 1e-3
 # ---- Layout ----------------------------------------------------------------------------------------------------------
 
 
-def cubic(f: Any, g: Any, a: Any, b: Any, t: Any) -> Any:
-    """Return the cubic between 0 and 1 at t. Its values at the ends are f and g, and its slopes there are a and b."""
-    return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
-
-
 @dataclass(frozen=True)
 class ThrustTable:
     """Measured forces of one thruster, with a monotone cubic between the commands."""
@@ -339,8 +335,7 @@ class ThrustTable:
 
         It is the cubic that has the forces and the slopes at the ends of the interval of the command.
         """
-        f, g, a, b, _, t = self._interval(command)
-        return float(cubic(f, g, a, b, t))
+        return float(interpolated(command, (self.commands, self.forces, self.slopes)))
 
     def slope(self, command: float) -> float:
         """Return the derivative of `force` with respect to the command."""

@@ -21,7 +21,6 @@ from itertools import cycle
 from math import isfinite
 from pathlib import Path
 
-from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.layout import AXES
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -103,7 +102,7 @@ class Manoeuvre:
         """The time and the outputs at each communication point by `rov_fmu.model.rov`."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
         state: Mapping[str, float] = rov.layout.at_rest
-        line = DelayLine(rov.layout)
+        line = rov.delay_line()
         rows = []
         for time in TIMES:
             if time > 0.0:
