@@ -13,7 +13,8 @@ from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
 from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, Layout, VehicleAxis
+from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE
+from rov_fmu.model.layout import Layout, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED

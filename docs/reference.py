@@ -18,7 +18,7 @@ from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.io.toml_file import Strict
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Text
 from rov_fmu.report.page.pictures import diagram

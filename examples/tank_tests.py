@@ -12,7 +12,8 @@ from pathlib import Path
 import click
 import numpy as np
 
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from verification.references.pool import Array, swim
 

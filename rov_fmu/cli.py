@@ -32,7 +32,7 @@ from rov_fmu.io.messages import (
     shown,
 )
 from rov_fmu.io.output import check_targets, write_whole
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
 

@@ -5,7 +5,7 @@ from math import radians
 
 import numpy as np
 
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.vehicle.shipped import SHIPPED

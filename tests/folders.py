@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rov_fmu.identify import beginning
-from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.model.catalogue import YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.readers.tank_tables import Row

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from verification.references.closed_form import axis_of

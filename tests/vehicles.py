@@ -8,21 +8,8 @@ from math import hypot, prod, sqrt
 from pathlib import Path
 
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import (
-    AXES,
-    AXIS,
-    CURVE,
-    HEAVE,
-    PITCH,
-    RESTORING,
-    ROLL,
-    Curve,
-    Layout,
-    Thruster,
-    VehicleAxis,
-    cross_name,
-    cross_of,
-)
+from rov_fmu.model.catalogue import AXES, AXIS, CURVE, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

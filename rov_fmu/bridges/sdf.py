@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from rov_fmu import __version__
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.templates import render
-from rov_fmu.model.layout import AXES, BODY, FAINT, HEAVE, REVERSE, Thruster, VehicleAxis, cross_name
+from rov_fmu.model.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
+from rov_fmu.model.layout import FAINT, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 

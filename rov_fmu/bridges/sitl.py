@@ -18,7 +18,7 @@ from rov_fmu.engine.stepper import Stepper
 from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.thrust_table import CurrentTable
 

@@ -16,7 +16,8 @@ from rov_fmu.engine.compile import FILTER_FILE
 from rov_fmu.engine.library import load_library
 from rov_fmu.engine.simulation import places_of
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
+from rov_fmu.model.catalogue import HEAVE, YAW, Axis
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 
 Array = NDArray[np.float64]

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.catalogue import delayed_name
 from rov_fmu.model.equation import Equation, equation_of
 from rov_fmu.model.expression import Expression, Name, change_of, compiled, slope_name, tangent
-from rov_fmu.model.layout import Layout, delayed_name
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.model.step import ORDER, Motion, Series, Table, usable_time
 

@@ -8,9 +8,10 @@ from itertools import groupby
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
+from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.expression import PYTHON, Expression, Name, Number, change_of, scaled, tangent, to_c, total, written
-from rov_fmu.model.layout import HEAVE, Layout
+from rov_fmu.model.layout import Layout
 
 
 class EquationSource:

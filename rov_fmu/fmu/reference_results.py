@@ -12,10 +12,11 @@ from math import hypot, isfinite, sqrt
 from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, start_formulas
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
 from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.equation import Term, equation_of
 from rov_fmu.model.expression import Name, compiled
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration, Layout
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle

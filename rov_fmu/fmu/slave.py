@@ -15,7 +15,7 @@ from typing import Any
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.model import attitude, delay, expression, layout, rov
+from rov_fmu.model import attitude, catalogue, delay, expression, layout, rov
 
 _TOO_LATE = "must not be set after the initialization"
 
@@ -23,7 +23,7 @@ _TOO_LATE = "must not be set after the initialization"
 def layout_of(given: Any) -> layout.Layout:
     """Return the layout of a vehicle from the JSON of its dataclasses.asdict."""
     parts = {key: _tuples(value) for key, value in given.items()}
-    axes = ((layout.AXES[form["axis"]["name"]], form["keys"]) for form in parts["axes"])
+    axes = ((catalogue.AXES[form["axis"]["name"]], form["keys"]) for form in parts["axes"])
     parts["axes"] = tuple(layout.VehicleAxis(*form) for form in axes)
     parts["curves"] = tuple(
         layout.Curve(**{**curve, "tables": tuple(layout.ThrustTable(**table) for table in curve["tables"])})

@@ -9,13 +9,14 @@ The value reference of a variable is its place in this order: from 0 in FMI 2.0,
 from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from math import degrees, isfinite
+from math import isfinite
 from typing import Any
 
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration
 from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Declaration, Layout, cited
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 
 
@@ -30,8 +31,6 @@ class Unit:
     """The unit in SI units."""
 
 
-_KNOT = 1852.0 / 3600.0  # m/s
-
 _BASE = {
     "kg": {"kg": 1},
     "m": {"m": 1},
@@ -45,12 +44,6 @@ _BASE = {
 """The exponents of the FMI base units in each symbol of a unit."""
 _SIZES = {"us": 1e-6}
 """The sizes of the units that are not SI units."""
-_DISPLAYS = {
-    "1": ("%", 100.0),
-    "rad": ("deg", degrees(1.0)),
-    "m/s": ("knot", 1.0 / _KNOT),
-    "rad/s": ("deg/s", degrees(1.0)),
-}
 
 
 def unit_of(text: str) -> Unit:
@@ -63,7 +56,7 @@ def unit_of(text: str) -> Unit:
             for base, exponent in _BASE[name].items():
                 exponents[base] += sign * exponent * int(symbol[len(name) :] or 1)
     powers = {base: exponent for base, exponent in exponents.items() if exponent}
-    display, factor = _DISPLAYS.get(text, (None, 1.0))
+    display, factor = DISPLAYS.get(text, (None, 1.0))
     return Unit(powers, display, factor, _SIZES.get(text, 1.0))
 
 
@@ -120,9 +113,7 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
     """Return the unit and the description of the derivative of every state."""
     found: dict[str, Declaration] = {}
     for axis in (form.axis for form in layout.axes):
-        found[axis.velocity] = Declaration(
-            f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {cited(axis.equations[1])}"
-        )
+        found[axis.velocity] = Declaration(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration")
     if layout.has_attitude:
         for name, direction in (("x", "northward"), ("y", "eastward"), ("z", "downward")):
             found[name] = Declaration("m/s", f"Velocity over ground {direction}")
@@ -159,7 +150,7 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
         bounds = {
             end: x for end, x in (("minimum", declaration.minimum), ("maximum", declaration.maximum)) if isfinite(x)
         }
-        given = {"display_unit": unit_of(declaration.unit).display, **bounds, **rest}
+        given = {"display_unit": declaration.display_unit, **bounds, **rest}
         result.append(
             Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **given)
         )
@@ -196,7 +187,6 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             "output",
             "continuous",
             initial="calculated",
-            display_unit=None,
             dependencies=dependencies[name],
         )
     for name, declaration in layout.delayed.items():
@@ -209,7 +199,6 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             "tunable" if declaration.tunable else "fixed",
             initial="exact",
             start=rov[name],
-            display_unit=None if declaration.unit == "1" else unit_of(declaration.unit).display,
         )
     for name, declaration in layout.initial.items():
         add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)

@@ -21,7 +21,7 @@ from rov_fmu.identify.result import (
     Verdict,
     Word,
 )
-from rov_fmu.model.layout import Axis
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.riccati import Riccati
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

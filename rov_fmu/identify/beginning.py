@@ -15,7 +15,8 @@ from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorde
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import did_you_mean, first_of, lines_on
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import AXES, PITCH, REVERSE, ROLL, Axis, Curve, Layout, coefficient_name
+from rov_fmu.model.catalogue import AXES, PITCH, REVERSE, ROLL, Axis, coefficient_name
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE

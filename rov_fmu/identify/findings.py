@@ -24,7 +24,7 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
-from rov_fmu.model.layout import AXES, COUPLED_AXES
+from rov_fmu.model.catalogue import AXES, COUPLED_AXES
 from rov_fmu.tank import findings
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, SentenceForm

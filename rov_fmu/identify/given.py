@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import (
+from rov_fmu.model.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -16,10 +16,9 @@ from rov_fmu.model.layout import (
     YAW,
     Axis,
     CoefficientKind,
-    Curve,
-    Layout,
     coefficient_name,
 )
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import Description, Requests
 from rov_fmu.tank.findings import Finding

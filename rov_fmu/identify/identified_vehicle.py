@@ -12,7 +12,8 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
-from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout
+from rov_fmu.model.catalogue import REVERSE, Axis
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated

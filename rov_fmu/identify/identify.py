@@ -21,7 +21,7 @@ from rov_fmu.identify.unexplained.disturbances import disturbances
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
-from rov_fmu.model.layout import SURGE, SWAY, Axis
+from rov_fmu.model.catalogue import SURGE, SWAY, Axis
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

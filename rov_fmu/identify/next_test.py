@@ -11,7 +11,7 @@ from rov_fmu.identify.assess import COMMANDS
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import NextTest
-from rov_fmu.model.layout import Axis
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.riccati import Riccati
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

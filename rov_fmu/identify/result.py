@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf, nan
 from typing import Literal
 
-from rov_fmu.model.layout import Axis
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder

@@ -10,7 +10,8 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Point
-from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Curve
 from rov_fmu.model.rov import Rov
 
 _ROW_STEPS = 10

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rov_fmu.identify.result import Interval
-from rov_fmu.model.layout import Axis
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding

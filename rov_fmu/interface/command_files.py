@@ -11,7 +11,8 @@ from rov_fmu.io.csv_table import read_header
 from rov_fmu.io.messages import NO_FILE, FileError, lines_on, only, shown
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import series
-from rov_fmu.model.layout import Axis, Layout
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Layout
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, RovFile, read_description

@@ -10,7 +10,7 @@ from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import check_targets
-from rov_fmu.model.layout import TUNING, Axis
+from rov_fmu.model.catalogue import TUNING, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.columns import columns_of, refuse_slips
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -4,7 +4,8 @@ from copy import copy
 from math import isfinite
 from typing import NamedTuple
 
-from .layout import Layout, delayed_name
+from .catalogue import delayed_name
+from .layout import Layout
 from .rov import Rov, Values
 
 MOST_WAITING = 1024

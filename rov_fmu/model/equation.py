@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
+from .catalogue import HEAVE, SURGE, SWAY, YAW, Axis, cross_name
 from .expression import Expression, Name, Names, call, directed, of, product, scaled, total
 from .forces import Force, forces_of
-from .layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, ThrustTable, VehicleAxis, cross_name
+from .layout import Curve, Layout, ThrustTable, VehicleAxis
 from .mass import MassMatrix
 from .thrust import steady_name, thrust_formulas
 

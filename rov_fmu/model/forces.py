@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 from .attitude import entry
+from .catalogue import REVERSE, cross_name
 from .expression import Expression, Name, Names, call, directed, product, scaled, total
-from .layout import FAINT, REVERSE, Layout, cross_name, effect_along
+from .layout import FAINT, Layout, effect_along
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from functools import cache, cached_property, lru_cache
 from math import inf
 
 from .attitude import unwrapped_heading
+from .catalogue import ARM, HEAVE, YAW, Axis, delayed_name
 from .equation import equation_of
 from .expression import compiled
-from .layout import ARM, HEAVE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm, delayed_name
+from .layout import Curve, Layout, Thruster, VehicleAxis, arm
 from .riccati import Riccati
 from .step import Table, step
 from .thrust import curve_formulas, steady_name

@@ -27,18 +27,8 @@ from rov_fmu.io.toml_file import (
     read_toml,
     validate,
 )
-from rov_fmu.model.layout import (
-    AXES,
-    AXIS,
-    CURVE,
-    PITCH,
-    REVERSE,
-    ROLL,
-    Declaration,
-    Layout,
-    VehicleAxis,
-    coefficient_name,
-)
+from rov_fmu.model.catalogue import AXES, AXIS, CURVE, PITCH, REVERSE, ROLL, Declaration, coefficient_name
+from rov_fmu.model.layout import Layout, VehicleAxis
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity

@@ -10,7 +10,8 @@ from typing import Any
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.layout import PITCH, ROLL, SWAY, YAW, Axis, Layout, cross_name
+from rov_fmu.model.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 
 _RIGHTED = (ROLL, PITCH)

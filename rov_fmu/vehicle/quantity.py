@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from rov_fmu.io.toml_file import Strict, as_tuple, table_of
-from rov_fmu.model.layout import AXES, Axis, Declaration, cross_name
+from rov_fmu.model.catalogue import AXES, Axis, Declaration, cross_name
 
 
 def _printable(text: str) -> str:

@@ -15,7 +15,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.paths import inside_or_shipped
 from rov_fmu.io.toml_file import DOCUMENTED, Strict, as_tuple, folder_of, table_of
 from rov_fmu.model import layout
-from rov_fmu.model.layout import (
+from rov_fmu.model.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -23,15 +23,17 @@ from rov_fmu.model.layout import (
     COMMANDS,
     CURVE,
     FIN,
+    REPLACED_BY_TABLE,
     RESTORING,
     TUNING,
     Axis,
     CoefficientKind,
     Declaration,
-    Layout,
-    ThrustTable,
-    VehicleAxis,
+    cross_name,
+    cross_of,
+    declarations_of,
 )
+from rov_fmu.model.layout import Layout, ThrustTable, VehicleAxis
 from rov_fmu.vehicle.description import FileHead, Made, Validity
 from rov_fmu.vehicle.quantity import (
     CrossSymbol,
@@ -153,7 +155,7 @@ class Arm(_coefficients("Arm", {key: kind.declaration() for key, kind in ARM.ite
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.declaration(curve="curve", equation=layout.cited("(2)")) for key, kind in CURVE.items()}
+_CURVE = {key: kind.declaration(curve="curve", equation="") for key, kind in CURVE.items()}
 
 
 _Read = TypeVar("_Read", ThrustFile, CurrentTable)
@@ -216,7 +218,7 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
 
     description: Name | None = None
     """A short description of the thrusters with this curve, for example "rear pair"."""
-    equation: Name = "(2)"
+    equation: Name | None = None
     """The equation or table in which the curve is published. A bare number, (9), is of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
     """The number of thrusters that gave the force together when the curve was measured."""
@@ -251,16 +253,16 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
             rows = enumerate(self.tables, 1)
             measured = tuple(row.table.table(f"{n}_{name}", row.voltage) for n, row in rows)
         if measured:
-            keys = ("k_t", *(key for key in keys if key not in ("k_t", *layout.REPLACED_BY_TABLE)))
+            keys = ("k_t", *(key for key in keys if key not in ("k_t", *REPLACED_BY_TABLE)))
         words = self.description or ""
-        return layout.Curve(name, keys, self.together, words, self.equation, measured)
+        return layout.Curve(name, keys, self.together, words, self.equation or "", measured)
 
 
 _AXIS_DESCRIPTION = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
 _tables = {
     axis.name: _coefficients(
         axis.name.capitalize(),
-        layout.declarations_of(axis),
+        declarations_of(axis),
         AXIS,
         _AXIS_DESCRIPTION.format(axis),
         {key: f"; give -{derivative(key, axis)} as a positive {key}" for key in ("m_a", "a_d", "b_d")},
@@ -469,7 +471,7 @@ class Hardware(Strict):
         curves = tuple(curve.for_model(name) for name, curve in self.curves.items())
         coupled = bool(self.body and self.body.coupling)
         thrusters = tuple(t.for_model() for t in self.thruster)
-        cross = tuple(filter(None, map(layout.cross_of, self.cross)))
+        cross = tuple(filter(None, map(cross_of, self.cross)))
         restoring = tuple(key for key in RESTORING if self.body and getattr(self.body, key) is not None)
         fins = tuple(fin.for_model() for fin in self.fin)
         voltage = self.battery.voltage.value if self.battery else None
@@ -555,4 +557,4 @@ def keys_in_file(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
         for vehicle_axis in of.axes:
             present = keys if keys is TUNING else (key for key in keys if key in vehicle_axis.keys)
             yield from ((vehicle_axis.coefficient(key), ("axes", vehicle_axis.axis.name, key)) for key in present)
-    yield from ((name, ("cross", name)) for name in (layout.cross_name(*row) for row in of.cross))
+    yield from ((name, ("cross", name)) for name in (cross_name(*row) for row in of.cross))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import ndtri, stdtrit
 
-from rov_fmu.model.layout import TUNING, Declaration
+from rov_fmu.model.catalogue import TUNING, Declaration
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.schema import Estimated
 

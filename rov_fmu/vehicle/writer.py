@@ -14,7 +14,8 @@ from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
+from rov_fmu.model.catalogue import Declaration
+from rov_fmu.model.layout import Curve, Fin, Thruster
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, keys_in_file
 from rov_fmu.vehicle.thrust_table import CurrentTable

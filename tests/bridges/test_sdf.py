@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.model.riccati import RISE
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED

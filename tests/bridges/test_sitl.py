@@ -25,7 +25,7 @@ from rov_fmu.cli import main
 from rov_fmu.engine.simulation import Array
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -17,7 +17,7 @@ from rov_fmu.identify.likelihood import objective, records
 from rov_fmu.identify.likelihood.parameters import OPTIONAL
 from rov_fmu.identify.result import KEPT, MOST_UNKNOWN, Answer, Disturbance, Prediction, Verdict
 from rov_fmu.identify.unexplained import causes, slips
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.catalogue import HEAVE
 from tests.commands import ROOT
 from tests.folders import FORCE, RATE, SPEED, TAU, read
 

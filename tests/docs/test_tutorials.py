@@ -18,7 +18,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Effect, Identification
-from rov_fmu.model.layout import SURGE
+from rov_fmu.model.catalogue import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.steps import tables_by_axis
 from rov_fmu.study import Results, study

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from rov_fmu.engine.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.identify.given import with_axis_alone
-from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -78,6 +78,7 @@ def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
             for name in (
                 "__init__",
                 "attitude",
+                "catalogue",
                 "delay",
                 "dependencies",
                 "equation",

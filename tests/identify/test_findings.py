@@ -19,7 +19,7 @@ from rov_fmu.identify.findings import (
     warnings,
 )
 from rov_fmu.identify.result import Coefficient, Disturbance, Effect, Identification, Logging, Point, Slip
-from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES

@@ -13,7 +13,8 @@ from scipy.stats import t
 from rov_fmu.cli import main
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.interface.tune_command import source
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import AXES
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, at_rest, pulsed, random_inputs, random_state

@@ -6,7 +6,7 @@ from math import copysign, cos, inf, pi, sin
 import pytest
 from mpmath import mp
 
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import (

@@ -13,8 +13,9 @@ from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.delay import MOST_WAITING, Change, DelayLine
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Curve, Fin, ThrustTable
+from rov_fmu.model.layout import Curve, Fin, ThrustTable
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -26,7 +26,7 @@ from rov_fmu.identify.result import (
     Sensor,
     Verdict,
 )
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.description import NO_ROV_FILE
 from rov_fmu.tank.findings import Finding

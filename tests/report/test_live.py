@@ -16,7 +16,8 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, Axis, Thruster
+from rov_fmu.model.catalogue import HEAVE, Axis
+from rov_fmu.model.layout import Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.tank.clocks import restart_rows

@@ -18,7 +18,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify.result import AxisResult, Effect, Identification, NextTest
 from rov_fmu.io.output import write_whole
-from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.report import report
 from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification

@@ -17,7 +17,7 @@ import pytest
 from rov_fmu.build import build
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.model.layout import SURGE
+from rov_fmu.model.catalogue import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.study import Results, study
 from rov_fmu.vehicle.vehicle import Vehicle

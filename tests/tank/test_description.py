@@ -11,7 +11,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding

@@ -10,7 +10,7 @@ import tomlkit
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.layout import ARM, AXES, AXIS, BODY, CURVE, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW
+from rov_fmu.model.catalogue import ARM, AXES, AXIS, BODY, CURVE, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS
@@ -45,7 +45,7 @@ def test_every_key_is_read(everything: Vehicle) -> None:
         "the maker's table",
         1,
     )
-    assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "(2)", 2)
+    assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "", 2)
     assert set(frame.keys) == {*_CURVE, "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse", "T"}
     assert (rov["F_0_w"], rov["a_d_w"], rov["a_d_w_reverse"], rov["T_frame"]) == (-1.0, 190.0, 210.0, 0.15)
     assert (rov["alpha_u"], rov["beta_u"], rov["alpha_r"], rov["beta_r"]) == (1.0, 1.0, 0.9, 0.8)

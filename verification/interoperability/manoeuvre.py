@@ -21,8 +21,8 @@ from itertools import cycle
 from math import isfinite
 from pathlib import Path
 
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.model.delay import DelayLine
-from rov_fmu.model.layout import AXES
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

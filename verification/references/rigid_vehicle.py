@@ -9,7 +9,7 @@ import gmpy2
 from gmpy2 import mpfr
 from mpmath import mp
 
-from rov_fmu.model.layout import cross_name
+from rov_fmu.model.catalogue import cross_name
 from rov_fmu.model.rov import Rov
 
 from . import equations, rigid_body

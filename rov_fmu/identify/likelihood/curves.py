@@ -14,7 +14,8 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout, delayed_name
+from rov_fmu.model.catalogue import REVERSE, Axis, delayed_name
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.riccati import Riccati
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

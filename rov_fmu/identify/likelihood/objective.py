@@ -26,7 +26,8 @@ from rov_fmu.engine.simulation import usable_cores
 from rov_fmu.identify.likelihood.curves import Shapes
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.model.layout import Axis, Curve, Layout
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from rov_fmu.engine.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.io.messages import MOST, first_of
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding

@@ -18,7 +18,8 @@ from rov_fmu.fmu.archive import REPORT
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
-from rov_fmu.model.layout import ARM, Axis, Layout
+from rov_fmu.model.catalogue import ARM, Axis
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live

@@ -15,7 +15,8 @@ from markupsafe import Markup
 
 from rov_fmu.engine.compile import MODULE_SOURCES
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import Axis, Layout, Thruster
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Layout, Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, PathPatch, Wedge
 from matplotlib.path import Path
 
-from rov_fmu.model.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
+from rov_fmu.model.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.model.layout import Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.labels import AROUND, Place, Space
 from rov_fmu.report.plots.svg import LIGHT, with_formulas

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, check_targets, folder_made, write_whole
-from rov_fmu.model.layout import SURGE
+from rov_fmu.model.catalogue import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text, with_formulas

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Curve
 from rov_fmu.model.riccati import RISE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.svg import LIGHT, with_formulas

@@ -18,7 +18,7 @@ from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED

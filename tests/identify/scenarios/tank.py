@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
+from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

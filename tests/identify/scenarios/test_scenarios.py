@@ -22,7 +22,7 @@ from rov_fmu.identify.result import (
     Prediction,
     Verdict,
 )
-from rov_fmu.model.layout import HEAVE, YAW, Axis
+from rov_fmu.model.catalogue import HEAVE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.folder import read_folder
 from rov_fmu.vehicle.vehicle import load_vehicle
