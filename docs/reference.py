@@ -122,7 +122,7 @@ def filled(page: str) -> str:
 
 def drawings() -> dict[Path, str]:
     """The drawings of the vehicles, those of the FMU's diagram, by their paths."""
-    return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one.rov) for name, one in DRAWN.items()}
+    return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one) for name, one in DRAWN.items()}
 
 
 def _gallery() -> str:

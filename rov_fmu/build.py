@@ -82,7 +82,7 @@ def build(
     """
     if not isinstance(vehicle, Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
-    check_coefficients(vehicle.layout, vehicle.rov.coefficients)
+    check_coefficients(vehicle.layout, vehicle.coefficients)
     if backend not in BACKENDS:
         raise OptionError(f"there is no backend {shown(backend)}, only {', '.join(BACKENDS)}")
     native = backend == "native"

@@ -10,7 +10,7 @@ import numpy as np
 
 from rov_fmu.bridges.rates import Functions, force_names, forces_of_commands, rates_of
 from rov_fmu.io.messages import InputError, did_you_mean
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class _Library:
     """Makes one vector of its components, each a number or an array."""
 
 
-def rates(rov: Rov, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
+def rates(rov: Vehicle, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
     """Return the time derivatives of the states, as described in `VehicleModel.rates`."""
     layout = rov.layout
     library = _library_of((x, forces, *p.values()))
@@ -32,7 +32,7 @@ def rates(rov: Rov, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
     return library.stack(rates_of(layout, values, library.functions))
 
 
-def forces(rov: Rov, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
+def forces(rov: Vehicle, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
     """Return the forces for the inputs, as described in `VehicleModel.forces`."""
     layout = rov.layout
     _check_names("inputs", inputs, layout.inputs)
@@ -41,7 +41,7 @@ def forces(rov: Rov, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
     return library.stack(forces_of_commands(layout, values, library.functions))
 
 
-def _coefficients(rov: Rov, p: Mapping[str, Any]) -> dict[str, Any]:
+def _coefficients(rov: Vehicle, p: Mapping[str, Any]) -> dict[str, Any]:
     _check_names("p", p, rov.layout.coefficients)
     return {**rov.coefficients, **p}
 

@@ -24,7 +24,6 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.io.templates import render
 from rov_fmu.model.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
 from rov_fmu.model.layout import FAINT, Thruster, VehicleAxis
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -111,14 +110,13 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
     Raises InputError about a vehicle that Gazebo cannot have at all.
     """
-    rov = vehicle.rov
-    if mistake := next(_impossible(rov), None):
+    if mistake := next(_impossible(vehicle), None):
         raise InputError(f"{vehicle.identifier}: {mistake}")
-    gravity, volume = _gravity(rov), _volume(rov)
-    link = _link(rov, volume)
-    added = _added_mass(rov, link.matrix)
-    propellers = [propeller for propeller in (_propeller(rov, t) for t in rov.layout.thrusters) if propeller]
-    notes = tuple(_notes(rov, added, propellers, explicit=explicit))
+    gravity, volume = _gravity(vehicle), _volume(vehicle)
+    link = _link(vehicle, volume)
+    added = _added_mass(vehicle, link.matrix)
+    propellers = [propeller for propeller in (_propeller(vehicle, t) for t in vehicle.layout.thrusters) if propeller]
+    notes = tuple(_notes(vehicle, added, propellers, explicit=explicit))
     small, radius = _PROPELLER
     text = render(
         "model.sdf.j2",
@@ -136,15 +134,15 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
         body=_Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
         propeller=_Link(link.mass * small, np.zeros(3), link.mass * small * radius**2 * np.eye(3)),
         fluid_added_mass={} if explicit else dict(_in_link(added)),
-        disable_coriolis=explicit and not rov.layout.coupled,
-        buoyancy={"centre": _centre(rov, "B"), "size": [volume ** (1.0 / 3.0)] * 3},
-        hydrodynamics=_damping(rov, link) | (dict(_in_plugin(added)) if explicit else {}),
+        disable_coriolis=explicit and not vehicle.layout.coupled,
+        buoyancy={"centre": _centre(vehicle, "B"), "size": [volume ** (1.0 / 3.0)] * 3},
+        hydrodynamics=_damping(vehicle, link) | (dict(_in_plugin(added)) if explicit else {}),
         thrusters=propellers,
     )
     return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
 
 
-def _impossible(rov: Rov) -> Iterator[str]:
+def _impossible(rov: Vehicle) -> Iterator[str]:
     """Yield a line about each reason why Gazebo cannot have the vehicle."""
     if "m_rov" not in rov.coefficients:
         yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
@@ -174,7 +172,7 @@ def _of_point(mass: float, position: Array) -> Array:
     return mass * _cross(position).T @ _cross(position)
 
 
-def _net_weight(rov: Rov) -> float:
+def _net_weight(rov: Vehicle) -> float:
     """Return the load that acts downwards in the earth frame, N: weight less buoyancy, and F_0 of a level vehicle."""
     if not rov.layout.has(HEAVE):
         return 0.0
@@ -183,24 +181,24 @@ def _net_weight(rov: Rov) -> float:
     return rov.load(rov.layout.kinds[HEAVE.name])
 
 
-def _gravity(rov: Rov) -> float:
+def _gravity(rov: Vehicle) -> float:
     """Return the gravity of the world, m/s2: that of the vehicle file's weight."""
     return rov.coefficients.get("W", 0.0) / rov["m_rov"] or _GRAVITY
 
 
-def _volume(rov: Rov) -> float:
+def _volume(rov: Vehicle) -> float:
     """Return the volume of the displaced water, m3, which gives the net weight."""
     return (rov["m_rov"] - _net_weight(rov) / _gravity(rov)) / DENSITY
 
 
-def _centre(rov: Rov, of: str) -> Array:
+def _centre(rov: Vehicle, of: str) -> Array:
     """Return the centre of mass (G) or of buoyancy (B) in Gazebo's frame; the origin if the vehicle stays level."""
     if not rov.layout.has_attitude:
         return np.zeros(3)
     return _SIGNS[:3] * [rov.coefficients.get(f"{axis}_{of}", 0.0) for axis in "xyz"]
 
 
-def _link(rov: Rov, volume: float) -> _Link:
+def _link(rov: Vehicle, volume: float) -> _Link:
     """Return the body of a vehicle, without added mass.
 
     About an axis that the vehicle lacks, its moment of inertia is so large that it hardly turns.
@@ -216,7 +214,7 @@ def _link(rov: Rov, volume: float) -> _Link:
     return _Link(mass, centre, inertia)
 
 
-def _added_mass(rov: Rov, rigid: Array) -> Array:
+def _added_mass(rov: Vehicle, rigid: Array) -> Array:
     """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
     found = np.zeros((6, 6))
     forms = rov.layout.by_velocity
@@ -229,7 +227,7 @@ def _added_mass(rov: Rov, rigid: Array) -> Array:
     return np.where(np.abs(found) < FAINT * np.outer(size, size), 0.0, found)
 
 
-def _off_diagonal(rov: Rov, a: str, b: str) -> float:
+def _off_diagonal(rov: Vehicle, a: str, b: str) -> float:
     """Return an entry of the effective mass matrix."""
     return rov.parameters.get(f"mass_{a}{b}", rov.parameters.get(f"mass_{b}{a}", 0.0))
 
@@ -270,7 +268,7 @@ def _divergence(added: Array, rigid: Array) -> Iterator[str]:
 # ---- Damping ---------------------------------------------------------------------------------------------------------
 
 
-def _damping(rov: Rov, link: _Link) -> dict[str, float]:
+def _damping(rov: Vehicle, link: _Link) -> dict[str, float]:
     """Return the terms of the Hydrodynamics plugin: xU of U, xUabsU of U|U|, xUU of U U, yUR of U R.
 
     U|U| and U U together give quadratic drag that depends on the direction.
@@ -304,7 +302,7 @@ def _damping(rov: Rov, link: _Link) -> dict[str, float]:
     return found
 
 
-def _both_ways(rov: Rov, form: VehicleAxis, key: str) -> tuple[float, float]:
+def _both_ways(rov: Vehicle, form: VehicleAxis, key: str) -> tuple[float, float]:
     """Return a drag coefficient for positive and for negative velocities."""
     return rov[form.coefficient(key)], rov[form.coefficient(key + REVERSE)]
 
@@ -312,7 +310,7 @@ def _both_ways(rov: Rov, form: VehicleAxis, key: str) -> tuple[float, float]:
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
 
 
-def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
+def _propeller(rov: Vehicle, thruster: Thruster) -> _Propeller | None:
     """Return a thruster with alpha folded in, or None if it has no force.
 
     Its force along each axis is multiplied by alpha of the axis, so is its moment about each axis, and a moment about
@@ -346,14 +344,14 @@ def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
 # ---- What Gazebo does otherwise --------------------------------------------------------------------------------------
 
 
-def _notes(rov: Rov, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+def _notes(rov: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield what the vehicle file says and Gazebo does otherwise, and how alpha and beta were folded in."""
     yield from _notes_of_tuning(rov, added, propellers, explicit=explicit)
     yield from _notes_of_commands(rov)
     yield from _notes_of_motion(rov, propellers, explicit=explicit)
 
 
-def _notes_of_tuning(rov: Rov, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+def _notes_of_tuning(rov: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield how alpha and beta were folded in."""
     scaled = [
         f"{propeller.scale:.4g} F_{propeller.name}" for propeller in propellers if abs(propeller.scale - 1.0) > FAINT
@@ -373,7 +371,7 @@ def _notes_of_tuning(rov: Rov, added: Array, propellers: list[_Propeller], *, ex
             )
 
 
-def _notes_of_commands(rov: Rov) -> Iterator[str]:
+def _notes_of_commands(rov: Vehicle) -> Iterator[str]:
     """Yield what stands between a command and the thrust, which the Thruster plugin takes in newtons."""
     layout = rov.layout
     keys = {key for curve in layout.curves for key in curve.keys}
@@ -397,7 +395,7 @@ def _notes_of_commands(rov: Rov) -> Iterator[str]:
         yield f"left out: {effect}"
 
 
-def _notes_of_motion(rov: Rov, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+def _notes_of_motion(rov: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield what the plugins and Gazebo's rigid body do otherwise with the motion."""
     layout = rov.layout
     for form in layout.axes:

@@ -22,8 +22,8 @@ from rov_fmu.model.catalogue import delayed_name
 from rov_fmu.model.equation import Equation, equation_of
 from rov_fmu.model.expression import Expression, Name, change_of, compiled, slope_name, tangent
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.model.step import ORDER, Motion, Series, Table, usable_time
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class StepJacobian:
 
 
 def step_jacobian(
-    rov: Rov,
+    rov: Vehicle,
     inputs: Mapping[str, float],
     state: Mapping[str, float],
     h: float,
@@ -128,7 +128,9 @@ class _Tangents(Motion):
     No state settles.
     """
 
-    def __init__(self, formulas: _Formulas, rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float]) -> None:
+    def __init__(
+        self, formulas: _Formulas, rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float]
+    ) -> None:
         layout = formulas.layout
         self.formulas = formulas
         delayed = {delayed_name(name): inputs[name] for name in layout.commands} if layout.has_dead_time else {}

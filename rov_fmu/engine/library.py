@@ -16,14 +16,14 @@ from rov_fmu.engine.compile import ENGINE_FILE, BuildError, compile_engine, engi
 from rov_fmu.engine.source import sources
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _LOADED: dict[str, ctypes.CDLL] = {}
 """The libraries that this process has loaded, by the file and the layout of the vehicle."""
 _LOADING = Lock()
 
 
-def load_library(rov: Rov, file: Path = ENGINE_FILE) -> ctypes.CDLL:
+def load_library(rov: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     """Return the library of a vehicle made from a file of the engine. It does not depend on the coefficients.
 
     Raises BuildError when it cannot be compiled or loaded.

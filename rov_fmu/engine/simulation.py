@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.engine.library import load_library
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 _POLL = 0.5
@@ -60,7 +60,7 @@ def usable_cores() -> int:
 
 
 def simulate(
-    rov: Rov,
+    rov: Vehicle,
     time: ArrayLike,
     values: Mapping[str, Any] = MappingProxyType({}),
     record: Sequence[str] | None = None,

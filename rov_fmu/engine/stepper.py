@@ -10,7 +10,7 @@ import numpy as np
 
 from rov_fmu.engine.library import load_library
 from rov_fmu.engine.simulation import places_of, tables_of
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 class Stepper:
@@ -19,7 +19,7 @@ class Stepper:
     All arrays and pointers are made once, so a step costs little more than its computation.
     """
 
-    def __init__(self, rov: Rov, start: Mapping[str, float], record: Sequence[str]) -> None:
+    def __init__(self, rov: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
         """Begin at time 0 s. `start` contains inputs and states in SI units, and Euler angles at the start, by name.
 
         Others have their usual values. `record` names the variables that each step returns. The arguments are not
@@ -29,7 +29,7 @@ class Stepper:
         self._commands = tuple(layout.commands)
         self._dead_time = rov["T_d"] if layout.has_dead_time else 0.0
         # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
-        rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)
+        rov = Vehicle(replace(layout, has_dead_time=False), rov.coefficients)
         places, states = places_of(rov.layout), [*rov.layout.state]
         self._numbers = np.zeros(len(places))
         continued = [f"{name}_0" for name in rov.layout.continued]  # the heading of a vehicle with an attitude

@@ -47,7 +47,7 @@ def native_content(
     vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2, interface: str = "both"
 ) -> Content:
     """Return the FMU in C for one of INTERFACES. `pages` are further files, by their paths."""
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
     left_out = (other_version, *unused_sources(vehicle.layout))
     paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
@@ -57,7 +57,7 @@ def native_content(
     interfaces = {name: NATIVE[fmi][name] for name in INTERFACES[interface]}
     describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi, [*interfaces])
+    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, [*interfaces])
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:
@@ -68,7 +68,7 @@ def native_content(
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
     """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     sources = python_sources(vehicle, declared)
     describe = partial(model_description, vehicle, declared, interfaces=PYTHON, note=PYTHON_NOTE)
     guid = _guid(describe(guid=""), sources)

@@ -17,7 +17,6 @@ from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.equation import Term, equation_of
 from rov_fmu.model.expression import Name, compiled
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -65,9 +64,9 @@ class ExperimentFiles:
 
 def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     """Return the files by their path in the FMU. Raises DataFileError."""
-    sets = {"tuned": vehicle.rov}
-    if any(vehicle.rov[name] != 1.0 for name in _tunable(vehicle.rov)):
-        sets["untuned"] = untuned(vehicle.rov)
+    sets = {"tuned": vehicle}
+    if any(vehicle[name] != 1.0 for name in _tunable(vehicle)):
+        sets["untuned"] = untuned(vehicle)
     files: dict[str, str] = {}
     experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files), *_attitude(vehicle, files)]
     descriptions = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
@@ -106,14 +105,14 @@ def _related(source: str, kind: str, role: str, description: str) -> dict[str, s
     return {"type": kind, "source": source, "role": role, "description": description}
 
 
-def _tunable(rov: Rov) -> list[str]:
+def _tunable(rov: Vehicle) -> list[str]:
     return [name for name, declaration in rov.layout.coefficients.items() if declaration.tunable]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
 
 
-def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[ExperimentFiles]:
+def _step_responses(vehicle: Vehicle, sets: Mapping[str, Vehicle], files: dict[str, str]) -> Iterator[ExperimentFiles]:
     """Write the experiments in which one axis steps to a constant command from rest."""
     tables = {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
     for axis in (form.axis for form in vehicle.layout.axes if vehicle.layout.signs(form.axis)):
@@ -123,7 +122,7 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
             rows = {float(row.command): row for row in table.rows}
         for percent, row in rows.items():
             stem = f"{axis.name}_{percent:g}".replace("-", "minus_")
-            inputs = vehicle.rov.held_inputs(axis, percent / 100.0)
+            inputs = vehicle.held_inputs(axis, percent / 100.0)
             time_units = {name: _time_unit(rov, axis, percent / 100.0, inputs) for name, rov in sets.items()}
             longest = max(time_units.values()) * _MULTIPLES[-1]
             for name, rov in sets.items():
@@ -151,14 +150,14 @@ def _commands(vehicle: Vehicle) -> list[float]:
     return [round(share * largest, 6) for share in (0.4, 1.0, -1.0)]
 
 
-def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
+def _time_unit(rov: Vehicle, axis: Axis, command: float, inputs: Values) -> float:
     """Return Tau plus the longest lag, but at most _LONGEST_TAU and `_horizon`, to three digits (s)."""
     lag = max((rov[curve.coefficient("T")] for curve in rov.layout.curves if curve.has_lag), default=0.0)
     Tau = min(rov.response(axis, command)[1] + lag, _LONGEST_TAU, _horizon(rov, inputs))
     return float(f"{Tau:.3g}")
 
 
-def _horizon(rov: Rov, inputs: Values) -> float:
+def _horizon(rov: Vehicle, inputs: Values) -> float:
     """Return the longest time of an experiment, s.
 
     It is _HORIZON times the shortest time constant, or the time in which the vehicle turns by _HORIZON radians if that
@@ -184,13 +183,13 @@ def _horizon(rov: Rov, inputs: Values) -> float:
     return horizon / max(rates) if any(rates) else _LONGEST_TAU
 
 
-def _swings(rov: Rov) -> list[float]:
+def _swings(rov: Vehicle) -> list[float]:
     """Return the angular frequencies of the oscillations by restoring forces (1/s)."""
     rotations = [form.axis.velocity for form in rov.layout.axes if form.axis.is_rotation]
     return [sqrt(abs(k)) for _, k in _terms(rov, rotations, "restoring")]
 
 
-def _terms(rov: Rov, velocities: Iterable[str], *effects: str) -> Iterator[tuple[Term, float]]:
+def _terms(rov: Vehicle, velocities: Iterable[str], *effects: str) -> Iterator[tuple[Term, float]]:
     """Yield the terms of some effects in the accelerations along axes, and the values of their coefficients."""
     rows = equation_of(rov.layout).rows
     for term in (term for v in velocities for term in rows[v]):
@@ -198,7 +197,7 @@ def _terms(rov: Rov, velocities: Iterable[str], *effects: str) -> Iterator[tuple
             yield term, rov.parameters[term.coefficient.identifier]
 
 
-def _coupling_rate(rov: Rov, inputs: Values) -> float:
+def _coupling_rate(rov: Vehicle, inputs: Values) -> float:
     """Return how fast axes of a vehicle with an attitude change each other's velocities near the steady ones (1/s).
 
     Velocities are multiplied by the roots of their effective masses, as in the kinetic energy, to compare all axes.
@@ -218,7 +217,7 @@ def _coupling_rate(rov: Rov, inputs: Values) -> float:
 
 
 def _description(
-    rov: Rov, axis: Axis, percent: float, name: str, table: ResponseTable | None, row: ResponseRow | None
+    rov: Vehicle, axis: Axis, percent: float, name: str, table: ResponseTable | None, row: ResponseRow | None
 ) -> str:
     """Describe an experiment, with its V_ss and Tau beside those of the tables."""
     V_ss, Tau = rov.response(axis, percent / 100.0)
@@ -253,7 +252,7 @@ _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
 
 def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFiles]:
     """Write an experiment in which all axes move, with loads, a current and reversals, until all inputs are zero."""
-    rov, layout = vehicle.rov, vehicle.layout
+    rov, layout = vehicle, vehicle.layout
     phases = []
     for shares, load in _PHASES:
         fractions = dict.fromkeys(layout.commands, 0.0)
@@ -293,7 +292,7 @@ _ATTITUDE = {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0}
 
 def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFiles]:
     """Write an experiment in which a vehicle with roll or pitch starts tilted and turned, with all inputs zero."""
-    rov, layout = vehicle.rov, vehicle.layout
+    rov, layout = vehicle, vehicle.layout
     if not layout.has_attitude:
         return
     still = layout.usual_inputs
@@ -324,7 +323,7 @@ def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFil
 # ---- Trajectories ----------------------------------------------------------------------------------------------------
 
 
-def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
+def _trajectory(rov: Vehicle, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
     """Return the states from rest at the times of each phase, during which the inputs are held."""
     line = DelayLine(rov.layout)
     found: list[_Row] = [(0.0, rov.layout.at_rest)]

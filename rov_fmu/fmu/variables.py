@@ -17,7 +17,7 @@ from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration
 from rov_fmu.model.dependencies import dependencies_of
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
     )
 
 
-def variables(rov: Rov) -> tuple[Variable, ...]:
+def variables(rov: Vehicle) -> tuple[Variable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
     layout = rov.layout
     result: list[Variable] = []
@@ -217,7 +217,7 @@ LOG_CATEGORIES = {
 """The log categories by the standard's names (2.2.4), each with its description."""
 
 
-def interface_header(rov: Rov, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
+def interface_header(rov: Vehicle, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
     """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
     declared = variables(rov)
     return render(

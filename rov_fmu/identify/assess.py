@@ -23,9 +23,9 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.riccati import Riccati
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import NORMAL
+from rov_fmu.vehicle.vehicle import Vehicle
 
 COMMANDS = (0.3, -0.3, 0.5, -0.5)
 """The commands of the answers."""
@@ -186,7 +186,7 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 # ---- Answers ---------------------------------------------------------------------------------------------------------
 
 
-def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...]:
+def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
     The values are those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the
@@ -194,11 +194,11 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...
     """
     table = posterior.table
 
-    def values(rov: Rov, shapes: Shapes) -> Array:
+    def values(rov: Vehicle, shapes: Shapes) -> Array:
         return np.array([_response(shapes.motion(rov, axis, c)) for c in COMMANDS])
 
     def logarithms(z: Array) -> Array:
-        fitted = values(Rov(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
+        fitted = values(Vehicle(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(np.abs(fitted)).ravel()
 

@@ -17,14 +17,13 @@ from rov_fmu.io.messages import did_you_mean, first_of, lines_on
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.catalogue import AXES, PITCH, REVERSE, ROLL, Axis, coefficient_name
 from rov_fmu.model.layout import Curve, Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from rov_fmu.tank.folder import KINDS, Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
-from rov_fmu.vehicle.vehicle import VehicleFileError
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _QUADRATIC = 0.7
 """The share of the quadratic drag at a large velocity, where nothing else is known."""
@@ -56,7 +55,7 @@ class Tests:
 
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
-        layout = self.given.rov.layout
+        layout = self.given.vehicle.layout
         names = {curve.name for curve in layout.curves} if kind == "thrust" else {*layout.kinds}
         for (other, subject), some in self.folder.rows.items():
             if other == kind and subject in names:
@@ -202,7 +201,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
     given = tests.given
     deviations = given.description.tables.priors
-    rov = _extended(given.rov, given.base, tests, deviations)
+    rov = _extended(given.vehicle, given.base, tests, deviations)
     logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, rov.layout)))]
     fitted = [form.axis for form in rov.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in rov.layout.drivers(axis)}
@@ -219,7 +218,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     for name, rows in tests.rows("thrust"):
         rough = _rough_thrust(rov, next(c for c in rov.layout.curves if c.name == name), rows)
         values |= {key: value for key, value in rough.items() if key not in given.known}
-    rov = Rov(rov.layout, values)
+    rov = Vehicle(rov.layout, values)
     full = {form.axis.name: rov.strongest(form.axis) for form in rov.layout.axes}
     guessed = []
     for axis in fitted:
@@ -257,10 +256,10 @@ def _is_fitted(axis: Axis, tests: Tests) -> bool:
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
-def _extended(rov: Rov, base: Mapping[str, float], tests: Tests, deviations: Mapping[str, float]) -> Rov:
+def _extended(rov: Vehicle, base: Mapping[str, float], tests: Tests, deviations: Mapping[str, float]) -> Vehicle:
     """Return the vehicle with every coefficient that a parameter may change, where each effect is absent."""
     values = {name: base.get(name, value) for name, value in rov.coefficients.items()}
-    rov = Rov(
+    rov = Vehicle(
         replace(rov.layout, mix={}, pulse=None, has_dead_time=False), rov.coefficients
     )  # a log tells thrusters' commands
     layout = rov.layout
@@ -287,7 +286,7 @@ def _extended(rov: Rov, base: Mapping[str, float], tests: Tests, deviations: Map
     return rov.extended(more | values)
 
 
-def _with_voltage(rov: Rov, base: Mapping[str, float], tests: Tests) -> Rov:
+def _with_voltage(rov: Vehicle, base: Mapping[str, float], tests: Tests) -> Vehicle:
     """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it."""
     requests = tests.given.requests
     values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
@@ -303,11 +302,11 @@ def _with_voltage(rov: Rov, base: Mapping[str, float], tests: Tests) -> Rov:
             measured_at = tests.given.description.measured_at.get(curve.name, mean)
             more[coefficient_name("V_0", curve.name)] = base.get(coefficient_name("V_0", curve.name), measured_at)
             more[coefficient_name("n_V", curve.name)] = USUAL_EXPONENT if is_exact else 0.0
-    powered = Rov(replace(rov.layout, voltage=round(mean, 3)), rov.coefficients)
+    powered = Vehicle(replace(rov.layout, voltage=round(mean, 3)), rov.coefficients)
     return powered.extended(more)
 
 
-def _rough_thrust(rov: Rov, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:
+def _rough_thrust(rov: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:
     """Return the coefficients of a curve that fit its forces roughly, as the centre of their prior.
 
     Both directions share the ratio of a_t to b_t, which are not negative. What else the forces tell is the shape that
@@ -336,7 +335,7 @@ def _rough_thrust(rov: Rov, curve: Curve, rows: Sequence[Row]) -> dict[str, floa
     return found
 
 
-def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
+def _rough_drag(rov: Vehicle, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
     """Return drag and β from a large velocity and the thrust in the tests, as the centre of their prior."""
     points = [(abs(row.value), row.command) for name, rows in tests.rows("steady") if name == axis.name for row in rows]
     V = max((value for value, _ in points), default=0.0) or typical(logs, axis) or 1.0
@@ -354,14 +353,14 @@ def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) 
     }
 
 
-def _forces(rov: Rov, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
+def _forces(rov: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
     """Yield the sizes of the thrust along an axis for some rows of the logs."""
     for one in (one for one in logs if axis.name in one.layout.kinds):
         some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]
         yield from filter(None, np.abs(one.thrust(rov.coefficients, axis, some)).tolist())
 
 
-def _table_rows(tests: Tests, rov: Rov) -> Iterator[TableRow]:
+def _table_rows(tests: Tests, rov: Vehicle) -> Iterator[TableRow]:
     """Yield all rows of tables that count."""
     curves = {curve.name: curve for curve in rov.layout.curves}
     for kind in KINDS:

@@ -14,7 +14,6 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.model.catalogue import REVERSE, Axis
 from rov_fmu.model.layout import Curve, Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
@@ -37,7 +36,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     values |= {  # a file has no smaller exponent
         c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
     }
-    rov = Rov(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
+    rov = Vehicle(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in given.known.items() if name in layout.coefficients}
     changed = _changed(fit, rov)
     coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
@@ -71,9 +70,9 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
             )
     validity = given.description.tables.validity
     made = Provenance(f"rov-fmu {__version__} identify", METHOD, tests.inputs, data=_data(fit))
-    vehicle = Vehicle(
+    vehicle = replace(
+        rov,
         **dict(given.head),
-        rov=rov,
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
         alternatives={},
@@ -114,7 +113,7 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
     """
     table, (low, high) = fit.kept.table, fit.command_range
     coefficients = table.coefficients(z.tolist())
-    shapes, rov = table.shapes(z.tolist()), Rov(table.layout, coefficients)
+    shapes, rov = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
     for curve in fit.known.curves:
         if curve.name in shapes.of:
             c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
@@ -126,7 +125,7 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
     return coefficients | {name: table.base[name] for name in table.exact}
 
 
-def _changed(fit: Fit, rov: Rov) -> list[str]:
+def _changed(fit: Fit, rov: Vehicle) -> list[str]:
     """Return the names of the coefficients of the vehicle that the parameters change."""
     z, changed = fit.posterior.z, dict[str, None]()
     before = _in_file(fit, z)
@@ -179,13 +178,13 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
-    with_voltage = tests.given.rov.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    with_voltage = tests.given.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
     return replace(
         layout,
         voltage=layout.voltage if with_voltage else None,
-        mix=tests.given.rov.layout.mix,
-        pulse=tests.given.rov.layout.pulse,
-        has_dead_time=tests.given.rov.layout.has_dead_time,
+        mix=tests.given.vehicle.layout.mix,
+        pulse=tests.given.vehicle.layout.pulse,
+        has_dead_time=tests.given.vehicle.layout.has_dead_time,
         axes=tuple(replace(f, keys=tuple(k for k in f.keys if has_axis_key(f.axis, k))) for f in layout.axes),
         curves=tuple(replace(c, keys=tuple(k for k in c.keys if has_curve_key(c, k))) for c in layout.curves),
     )
@@ -204,7 +203,7 @@ def _data(fit: Fit) -> str:
     return " and ".join(parts) or "given values"
 
 
-def _coefficients(fit: Fit, rov: Rov, changed: Sequence[str]) -> Iterator[Coefficient]:
+def _coefficients(fit: Fit, rov: Vehicle, changed: Sequence[str]) -> Iterator[Coefficient]:
     """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
     names = [name for name in changed if not name.startswith("alpha_")]
     if not names:
@@ -222,7 +221,7 @@ def _coefficients(fit: Fit, rov: Rov, changed: Sequence[str]) -> Iterator[Coeffi
         yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
 
 
-def _interval(rov: Rov, name: str, error: float) -> Interval:
+def _interval(rov: Vehicle, name: str, error: float) -> Interval:
     """Return the 95 % interval of a coefficient within its bounds."""
     declaration = rov.layout.coefficients[name]
     if name.startswith("c_0"):

@@ -50,7 +50,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
     vehicle, coefficients = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
-        if mistake := next(no_thrust(curve, vehicle.rov.coefficients, f"thrust_{curve.name}*.csv"), None):
+        if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = slips(tests, known, fit.objective, fit.best.z)
     held_out = held_out_rows(fit)
@@ -66,7 +66,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         against=against,
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, map(curve.coefficient, curve.keys)) for curve in known.curves},
-        forces=tuple(points_of(tests, held_out, vehicle.rov, "thrust")),
+        forces=tuple(points_of(tests, held_out, vehicle, "thrust")),
         effects=tuple(effects_of(fit)),
         disturbances=tuple(slow),
         logging=tuple(loggers_of(fit)),
@@ -95,13 +95,13 @@ def _axis(
     held_out: HeldOut,
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
-    answers = assess.answers(fit.averaged, axis, vehicle.rov)
+    answers = assess.answers(fit.averaged, axis, vehicle)
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
     points = [
-        *points_of(tests, held_out, vehicle.rov, "steady", axis.name),
-        *points_of(tests, held_out, vehicle.rov, "time_constant", axis.name),
+        *points_of(tests, held_out, vehicle, "steady", axis.name),
+        *points_of(tests, held_out, vehicle, "time_constant", axis.name),
     ]
     return AxisResult(
         axis=axis,

@@ -13,9 +13,9 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import NextTest
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.riccati import Riccati
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _STRENGTHS = (0.2, 0.4, 0.6, 0.8, 1.0)
 _HOLD, _REST = 8.0, 4.0
@@ -32,7 +32,7 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
 
     def motion(z: Array, command: float) -> Riccati:
         table = posterior.table
-        rov = Rov(table.layout, table.coefficients(z.tolist()))
+        rov = Vehicle(table.layout, table.coefficients(z.tolist()))
         return table.shapes(z.tolist()).motion(rov, axis, command)
 
     def speed(z: Array, command: float) -> float:

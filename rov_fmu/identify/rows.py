@@ -12,7 +12,7 @@ from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Point
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.layout import Curve
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _ROW_STEPS = 10
 """The steps of a fit without the rows of one command."""
@@ -21,7 +21,7 @@ HeldOut = Mapping[tuple[str, str, float], float]
 """The value of a row by a fit without it, by the quantity, the curve or axis, and the command."""
 
 
-def points_of(tests: Tests, held_out: HeldOut, rov: Rov, kind: str, only: str | None = None) -> Iterator[Point]:
+def points_of(tests: Tests, held_out: HeldOut, rov: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
     """Yield the rows of tables with what the vehicle says about them, also held out."""
     quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
     for subject, rows in tests.rows(kind):
@@ -57,7 +57,7 @@ def held_out_rows(fit: Fit) -> HeldOut:
             most=_ROW_STEPS,
             with_noise=False,
         ).z
-        rov = Rov(objective.table.layout, objective.table.coefficients(z.tolist()))
+        rov = Vehicle(objective.table.layout, objective.table.coefficients(z.tolist()))
         shapes = objective.table.shapes(z.tolist())
         for row in (rows[n] for n in members):
             found[row.quantity, row.subject.name, row.command] = row.model(rov, shapes)

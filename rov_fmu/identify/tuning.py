@@ -13,10 +13,10 @@ from scipy.optimize import least_squares
 
 from rov_fmu.identify.result import Interval
 from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.uncertainty import quantile
+from rov_fmu.vehicle.vehicle import Vehicle
 
 ALPHA = 0.5, 2.0
 """The range of a plausible α. Thrust that is measured in a tank is known to better than a factor of 2; the paper has α
@@ -39,7 +39,7 @@ class Target:
     command: float
     value: float
 
-    def by(self, rov: Rov, axis: Axis) -> float:
+    def by(self, rov: Vehicle, axis: Axis) -> float:
         """Return the V_ss or the Tau of a vehicle at the command."""
         V_ss, Tau = rov.response(axis, self.command)
         return V_ss if self.quantity == "V_ss" else Tau
@@ -50,13 +50,13 @@ class Tuning:
     """A vehicle with the α and β of one axis that suit the wanted points best."""
 
     axis: Axis
-    rov: Rov
+    vehicle: Vehicle
     points: Sequence[Target]
     intervals: Mapping[str, Interval | None]
     """The 95 % interval of each tuned coefficient, by its name; None if there are not more points than coefficients."""
 
 
-def tune(rov: Rov, axis: Axis, points: Sequence[Target]) -> Tuning:
+def tune(rov: Vehicle, axis: Axis, points: Sequence[Target]) -> Tuning:
     """Find α and β for wanted points. Without any Tau, β stays. Raises TuningError.
 
     The intervals of many points follow from their scatter, by Student's distribution.
@@ -66,7 +66,7 @@ def tune(rov: Rov, axis: Axis, points: Sequence[Target]) -> Tuning:
     names = [axis.coefficient(kind) for kind in kinds]
     highest = [log(rov.layout.coefficients[name].maximum) for name in names]
 
-    def tuned(logs: Array) -> Rov:
+    def tuned(logs: Array) -> Vehicle:
         return start.replaced(dict(zip(names, np.exp(logs).tolist(), strict=True)))
 
     def errors(logs: Array) -> list[float]:
@@ -83,7 +83,7 @@ def tune(rov: Rov, axis: Axis, points: Sequence[Target]) -> Tuning:
     return Tuning(axis, tuned(fit.x), points, intervals)
 
 
-def _closed_form(rov: Rov, axis: Axis, points: Sequence[Target]) -> Rov:
+def _closed_form(rov: Vehicle, axis: Axis, points: Sequence[Target]) -> Vehicle:
     """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
     if rov.loss(axis, rov.held_inputs(axis, 1.0)):
         raise TuningError(
@@ -102,7 +102,7 @@ def _closed_form(rov: Rov, axis: Axis, points: Sequence[Target]) -> Rov:
     return _with(tuned, beta, betas) if betas else tuned
 
 
-def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
+def _with(rov: Vehicle, name: str, wanted: Sequence[float]) -> Vehicle:
     """Set a coefficient to the median of the wanted values, each of which must be possible. Raises TuningError."""
     maximum = rov.layout.coefficients[name].maximum
     for value in wanted:
@@ -111,13 +111,13 @@ def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
     return rov.replaced({name: float(np.median(wanted))})
 
 
-def _holding(rov: Rov, axis: Axis, V: float) -> float:
+def _holding(rov: Vehicle, axis: Axis, V: float) -> float:
     """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
     plain, form = rov.replaced({axis.coefficient("beta"): 1.0}), rov.layout.kinds[axis.name]
     return -plain.inertia(form) * plain.acceleration_of(form, 0.0).acceleration(V)
 
 
-def impossible(rov: Rov, axis: Axis, point: Target) -> str | None:
+def impossible(rov: Vehicle, axis: Axis, point: Target) -> str | None:
     """Return the reason why no tuning gives the point, or None."""
     c, value = point.command, point.value
     if not 0.0 < abs(c) <= 1.0:
@@ -141,9 +141,9 @@ def impossible(rov: Rov, axis: Axis, point: Target) -> str | None:
 
 def implausible(tuning: Tuning) -> Iterator[Finding]:
     """Yield a finding about each tuned coefficient that is implausible."""
-    axis, has_added = tuning.axis, "m_a" in tuning.rov.layout.kinds[tuning.axis.name].keys
+    axis, has_added = tuning.axis, "m_a" in tuning.vehicle.layout.kinds[tuning.axis.name].keys
     for kind, (low, high) in {"alpha": ALPHA, "beta": BETA_WITH_ADDED_MASS if has_added else BETA}.items():
-        value = tuning.rov[name := axis.coefficient(kind)]
+        value = tuning.vehicle[name := axis.coefficient(kind)]
         if name in tuning.intervals and not low <= value <= high:
             inertia = f"{1.0 / value:.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
             names = {kind: name, "push": axis.push, "unit": axis.unit, "inertia": inertia, "mass": axis.inertia}

@@ -152,7 +152,7 @@ def _axes(signals: Collection[str]) -> list[str]:
 def _body(vehicle: Vehicle) -> list[tuple[str, str, str]]:
     """Return the names, values and units of the coefficients of a vehicle's body."""
     units = {key: declaration.unit for key, declaration in vehicle.layout.coefficients.items()}
-    return [(key, f"{vehicle.rov[key]:g}", units[key]) for key in BODY if key in units]
+    return [(key, f"{vehicle[key]:g}", units[key]) for key in BODY if key in units]
 
 
 def _effects(vehicle: Vehicle | None, signals: Collection[str]) -> list[str]:

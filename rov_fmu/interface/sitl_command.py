@@ -92,7 +92,7 @@ def _setup(path: Path, options: Options) -> Setup:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = given.inputs | given.start
     currents, interval = vehicle.electric_currents, 1.0 / options.log_rate
-    return Setup(vehicle.rov, servos, start, currents, options.bottom, options.log, interval, options.force)
+    return Setup(vehicle, servos, start, currents, options.bottom, options.log, interval, options.force)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

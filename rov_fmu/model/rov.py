@@ -4,9 +4,10 @@ Inputs, states and coefficients have the names that rov_fmu/model/layout.py decl
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from math import inf
+from typing import TypeVar
 
 from .attitude import unwrapped_heading
 from .catalogue import ARM, HEAVE, YAW, Axis, delayed_name
@@ -18,6 +19,7 @@ from .step import Table, step
 from .thrust import curve_formulas, steady_name
 
 Values = Mapping[str, float]
+Self = TypeVar("Self", bound="Rov")
 
 
 class _Formulas:
@@ -50,13 +52,13 @@ class Rov:
         """Return a coefficient."""
         return self.coefficients[name]
 
-    def replaced(self, values: Values) -> "Rov":
-        """Return the vehicle with other values of some coefficients."""
-        return Rov(self.layout, {**self.coefficients, **values})
+    def replaced(self: Self, values: Values) -> Self:
+        """Return the vehicle with other values of some coefficients, which are not checked. It is cheap."""
+        return replace(self, coefficients={**self.coefficients, **values})
 
-    def extended(self, values: Values) -> "Rov":
+    def extended(self: Self, values: Values) -> Self:
         """Return the vehicle with other or additional coefficients."""
-        return Rov(self.layout.extended(values), {**self.coefficients, **values})
+        return replace(self, layout=self.layout.extended(values), coefficients={**self.coefficients, **values})
 
     @cached_property
     def _formulas(self) -> _Formulas:
@@ -209,3 +211,8 @@ class Rov:
         """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""
         motion = self.held(axis, command)
         return motion.steady_velocity(), motion.time_constant()
+
+
+def parameters_of(layout: Layout, coefficients: Values) -> dict[str, float]:
+    """Return the numbers that follow from the coefficients alone, by their names in rov_fmu/model/equation.py."""
+    return _formulas_of(layout).parameters(coefficients)

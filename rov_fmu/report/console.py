@@ -155,7 +155,7 @@ def _deviation(f: "Finding") -> tuple[str, str]:
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
     """Return a published table with the printed, computed and measured values side by side."""
-    values = ", ".join(f"{name} = {vehicle.rov[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
+    values = ", ".join(f"{name} = {vehicle[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
     compared = [f"{model}\nprinted|\nmodel|\ndev." for model in ("non-linear", "scaled")]
     headers = "|".join([*compared, "\ntest|\ndev."]).split("|")
     title = f"Table {t.number}. {t.axis.name.capitalize()}, {values}; V_ss in {t.axis.unit}, Tau in s"

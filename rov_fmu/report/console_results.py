@@ -128,19 +128,19 @@ def print_tuning(tuning: Tuning) -> None:
     for kind in ("alpha", "beta"):
         name = tuning.axis.coefficient(kind)
         interval = tuning.intervals.get(name)
-        value, low, high = with_interval(tuning.rov[name], interval, digits=6)
+        value, low, high = with_interval(tuning.vehicle[name], interval, digits=6)
         out.print(f"{name} = {value}" + (f"   95 %: {low} ... {high}" if interval else ""))
     result = table("", "command", ("quantity", "wanted", "model", "dev."))
     for p in tuning.points:
         result.add_row(
-            f"{p.command:.0%}", p.quantity, f"{p.value:.4g}", *_against(p.by(tuning.rov, tuning.axis), p.value)
+            f"{p.command:.0%}", p.quantity, f"{p.value:.4g}", *_against(p.by(tuning.vehicle, tuning.axis), p.value)
         )
     print_table(result)
-    layout = tuning.rov.layout
+    layout = tuning.vehicle.layout
     for command in dict.fromkeys(p.command for p in tuning.points):
         inputs = ", ".join(f"{name} = {value:g}" for name, value in layout.driving(tuning.axis, command).items())
         paragraph(out, f"A command of {command:.0%} of {tuning.axis.name}: {inputs}")
     for curve in {thruster.curve: layout.curve_of[thruster.name] for thruster in layout.drivers(tuning.axis)}.values():
         if curve.has_lag:
-            T = tuning.rov[curve.coefficient("T")]
+            T = tuning.vehicle[curve.coefficient("T")]
             out.print(f"Tau is that of steady thrust; the lag of curve {curve.name}, T = {T:g} s, comes on top")

@@ -367,7 +367,7 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
     declarations = vehicle.layout.coefficients
     return {
         name: Quantity(
-            value=vehicle.rov[name], unit=declarations[name].unit, source=source, interval=vehicle.intervals.get(name)
+            value=vehicle[name], unit=declarations[name].unit, source=source, interval=vehicle.intervals.get(name)
         )
         for name, source in vehicle.sources.items()
         if source != NOT_GIVEN

@@ -63,24 +63,26 @@ class Alternative:
 
 
 @dataclass(frozen=True, repr=False)
-class Vehicle:
-    """A vehicle: its model, and where its numbers come from."""
+class Vehicle(Rov):
+    """A vehicle: its layout, its coefficients, where these come from, and its motion.
 
-    name: str
-    identifier: str
+    `vehicle["a_d_u"]` is a coefficient, and `vehicle.layout` has the axes, curves, thrusters and variables. A vehicle
+    that is not from a file, `Vehicle(layout, coefficients)`, needs no texts and no sources.
+    """
+
+    name: str = ""
+    identifier: str = ""
     """A C identifier, which becomes modelIdentifier and modelName of the FMU."""
-    version: str
-    description: str
-    source: str
-    rov: Rov
-    """The model of the vehicle: its layout and its coefficients."""
-    sources: Mapping[str, str]
+    version: str = ""
+    description: str = ""
+    source: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict)
     """The sources of the coefficients by name."""
-    command_range: tuple[float, float]
+    command_range: tuple[float, float] = (0.0, 1.0)
     """The weakest and the strongest thruster command for which the model was identified."""
-    alternatives: Mapping[str, Alternative]
+    alternatives: Mapping[str, Alternative] = field(default_factory=dict)
     """Other sets of published coefficients, by a name for each set."""
-    data: Path | None
+    data: Path | None = None
     """The folder with the published tables."""
     pictures: Path | None = None
     """The folder with the vehicle's own PICTURES, any of which may be missing."""
@@ -116,8 +118,7 @@ class Vehicle:
         """
         values = {name: _number(name, value) for name, value in coefficients.items()}
         check_coefficients(self.layout, values)
-        rov = self.rov.replaced(values)
-        if mistake := next(_contradictions(rov), None):
+        if mistake := next(_contradictions(self.layout, {**self.coefficients, **values}), None):
             raise InputError(mistake)
         estimates = {}
         for name, estimated in self.estimates.items():
@@ -125,8 +126,7 @@ class Vehicle:
                 kept = {other: r for other, r in estimated.correlation.items() if other not in values}
                 estimates[name] = estimated.model_copy(update={"correlation": kept})
         return replace(
-            self,
-            rov=rov,
+            self.replaced(values),
             sources={**self.sources, **dict.fromkeys(values, BY_HAND)},
             intervals={name: interval for name, interval in self.intervals.items() if name not in values},
             estimates=estimates,
@@ -141,15 +141,10 @@ class Vehicle:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
         items = []
         for name, declaration in self.layout.coefficients.items():
-            if self.sources[name] == BY_HAND:
+            if self.sources.get(name) == BY_HAND:
                 unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-                items.append(f"{name} = {self.rov[name]:.12g}{unit}")
+                items.append(f"{name} = {self[name]:.12g}{unit}")
         return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
-
-    @property
-    def layout(self) -> Layout:
-        """The axes, curves, thrusters and inputs of the vehicle."""
-        return self.rov.layout
 
     @property
     def files(self) -> list[Path]:
@@ -166,7 +161,7 @@ class Vehicle:
         """The joint distribution of the coefficients that have a confidence interval."""
         from rov_fmu.vehicle.uncertainty import uncertainty  # NumPy and SciPy: few need it
 
-        return uncertainty(self.rov, self.intervals, self.estimates)
+        return uncertainty(self.layout, self.coefficients, self.intervals, self.estimates)
 
     def picture(self, name: str) -> Path | None:
         """Return the path of the vehicle's own picture with this name, or None."""
@@ -193,13 +188,13 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _contradictions(rov: Rov) -> Iterator[str]:
+def _contradictions(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line for each set of coefficients that are possible alone but not together."""
-    for curve in (curve for curve in rov.layout.curves if not curve.tables):
-        yield from no_thrust(curve, rov.coefficients, f"curve {curve.name}")
-    if rov.layout.has_arm and rov["R"] * sin(rov["gamma"]) == 0.0:
+    for curve in (curve for curve in layout.curves if not curve.tables):
+        yield from no_thrust(curve, coefficients, f"curve {curve.name}")
+    if layout.has_arm and coefficients["R"] * sin(coefficients["gamma"]) == 0.0:
         yield "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"
-    yield from check_mass(rov)
+    yield from check_mass(layout, coefficients)
 
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
@@ -225,10 +220,10 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(*lines_on(path, mistakes))
     head, made, layout = file.vehicle, file.provenance, file.layout
     folders, found = head.folders_from(path.parent), file.quantities(layout)
-    rov = Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()})
-    if mistakes := [*check_mass(rov)]:
+    coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
+    if mistakes := [*check_mass(layout, coefficients)]:
         raise VehicleFileError(*lines_on(path, mistakes))
-    for doubt in doubts(rov):
+    for doubt in doubts(layout, coefficients):
         warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
     provenance = None
     if made:
@@ -236,12 +231,13 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
             made.tool, made.method, made.inputs, made.warnings, made.facts, made.report_in(path.parent)
         )
     return Vehicle(
+        layout,
+        coefficients,
         name=head.name,
         identifier=head.identifier,
         version=head.version,
         description=head.description,
         source=head.source,
-        rov=rov,
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
         alternatives={

@@ -164,7 +164,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
     document, vehicle = _read_document(source), load_vehicle(source)
     places = dict(keys_in_file(vehicle.layout))
     for name, exact in values.items():
-        if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
+        if (value := _rounded(exact)) == _rounded(vehicle[name]):
             continue
         *above, key = places[name]
         table = _fin_of(document, above[1]) if above[0] == "fin" else _table_at(document, above)
@@ -285,7 +285,7 @@ def _alternative(vehicle: Vehicle, alternative: Alternative) -> dict[str, Any]:
 
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
     """Return the table of a coefficient, with rounded numbers, and an interval that includes the rounded value."""
-    value, interval = _rounded(vehicle.rov[name]), vehicle.intervals.get(name)
+    value, interval = _rounded(vehicle[name]), vehicle.intervals.get(name)
     ends = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)] if interval else None
     return _quantity_table(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
 

@@ -49,7 +49,7 @@ def test_the_complete_rov_toml_makes_a_vehicle(tmp_path: Path) -> None:
     }
     found = identify(read(tmp_path, example, tables))
     assert [result.axis.name for result in found.axes] == ["surge", "heave", "yaw"]
-    assert found.vehicle.rov["m_rov"] == 8.2
+    assert found.vehicle["m_rov"] == 8.2
     assert found.vehicle.layout.drivers(found.axes[2].axis)
 
 

@@ -20,7 +20,6 @@ from rov_fmu.identify.findings import (
 )
 from rov_fmu.identify.result import Coefficient, Disturbance, Effect, Identification, Logging, Point, Slip
 from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.findings import Finding
@@ -59,9 +58,9 @@ def disturbance(kind: Any = "force", **changes: Any) -> Identification:
 def with_channels(*names: str) -> Identification:
     channels = tuple(Channel(QUANTITIES[name], Source(name), TIME, TIME) for name in names)
     base = load_vehicle(SHIPPED["bluerov2"])
-    rov = Rov(replace(base.layout, coupled=False), base.rov.coefficients)
+    vehicle = replace(base, layout=replace(base.layout, coupled=False))
     one = replace(log("dive.csv"), channels=channels)
-    return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=replace(base, rov=rov))
+    return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)
 
 
 def unidentified(*names: str) -> tuple[Coefficient, ...]:

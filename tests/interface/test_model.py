@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +56,7 @@ def test_a_vehicle_is_loaded_by_its_name_or_path(videoray: VehicleModel) -> None
 
 def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleModel) -> None:
     changed = videoray.with_(a_d_u=10, beta_w=np.float64(0.5))
-    assert (changed.rov["a_d_u"], changed.rov["beta_w"]) == (10.0, 0.5)
+    assert (changed["a_d_u"], changed["beta_w"]) == (10.0, 0.5)
     assert {name for name, source in changed.sources.items() if source == BY_HAND} == {"a_d_u", "beta_w"}
     expected = "set by hand: a_d_u = 10 N.s2/m2, beta_w = 0.5"
     assert repr(changed).endswith(f"; {expected}>")
@@ -66,14 +65,14 @@ def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleM
     page = documentation_page(changed)
     assert page.count(expected) == 2
     assert page.count("<td>set by hand</td>") == 2
-    assert videoray.rov["a_d_u"] != 10.0
+    assert videoray["a_d_u"] != 10.0
     assert "set by hand" not in videoray.summary
 
 
 def test_a_coefficient_that_is_set_by_hand_is_no_estimate() -> None:
     refit = rov_fmu.load(REFIT)
     name, other = next((n, o) for n, e in refit.estimates.items() for o in e.correlation)
-    changed = refit.with_(**{other: refit.rov[other] * 1.01})
+    changed = refit.with_(**{other: refit[other] * 1.01})
     assert other in refit.uncertainty.names
     assert other not in {*changed.intervals, *changed.estimates, *changed.uncertainty.names}
     assert other not in changed.estimates[name].correlation
@@ -94,7 +93,7 @@ def test_a_result_is_a_mapping_of_arrays(videoray: VehicleModel) -> None:
     assert result.names == ("u", "w", "r", "x", "y", "z", "psi", "F_l", "F_r", "F_t", "tau_rear")
     assert result["u"].shape == (3,)
     at_rest, inputs = (dict.fromkeys(names, 0.0) for names in (videoray.layout.state, videoray.layout.inputs))
-    assert result["u"][-1] == pytest.approx(videoray.rov.step({**inputs, **AHEAD}, at_rest, 2.0)["u"], rel=1e-12)
+    assert result["u"][-1] == pytest.approx(videoray.step({**inputs, **AHEAD}, at_rest, 2.0)["u"], rel=1e-12)
     assert result.units["r"] == "rad/s"
     assert repr(result) == f"<Result: 3 times from 0 to 2 s; {', '.join(result.names)}>"
     with pytest.raises(KeyError) as error:
@@ -206,7 +205,7 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
 
 
 def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = replace(videoray, rov=pulsed(videoray.rov, (1100.0, 1500.0, 1900.0)))
+    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
     expected = r"^u_l reaches 0\.3: commands are pulse widths, and saturate at 1100 and 1900 us$"
     with pytest.warns(UserWarning, match=expected):
         found = pulses.simulate(TIMES, {"u_l": [0.3, 1500.0, 1950.0]})
@@ -214,7 +213,7 @@ def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleMode
 
 
 def test_a_pulse_of_zero_is_no_signal_and_acts_as_neutral_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = replace(videoray, rov=pulsed(videoray.rov, (1100.0, 1500.0, 1900.0)))
+    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
     assert pulses.layout.fraction_of(0.0) == 0.0
     expected = "^u_l reaches 0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as"
     with pytest.warns(UserWarning, match=expected) as caught:
@@ -333,8 +332,7 @@ def test_a_mistake_is_one_line(case: str, videoray: VehicleModel) -> None:
 def test_a_vehicle_that_cannot_be_is_neither_built_nor_simulated(videoray: VehicleModel, tmp_path: Path) -> None:
     """However it came about."""
     for name, value in (("a_du", 1.0), ("a_d_u", float("nan"))):
-        rov = videoray.rov.replaced({name: value})
-        wrong = VehicleModel(**{**vars(videoray), "rov": rov})
+        wrong = videoray.replaced({name: value})
         with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):
             build(wrong, tmp_path / "x.fmu")
         with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.interop
 
 @pytest.fixture(scope="module")
 def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
-    return variables(vehicle.rov)
+    return variables(vehicle)
 
 
 # ---- documentation/index.html ----------------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ def test_the_web_app_offers_the_declared_values_simulates_and_describes_the_mode
         " plot.layout['yaxis' + (n ? n + 1 : '')].title.text)])(document.querySelector('.js-plotly-plot'))"
     )
     rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
-    end = vehicle.rov.step(rest | COMMANDS, rest, 10.0)
+    end = vehicle.step(rest | COMMANDS, rest, 10.0)
     assert titles == [f"{name} [{unit_of(unit).display or unit}]" for name, unit in SHOWN.items()]
     assert titles[0] == "u [knot]"
     assert last == pytest.approx([end[name] * unit_of(unit).factor for name, unit in SHOWN.items()], abs=1e-4)

@@ -53,7 +53,7 @@ def pilchard(vehicle: Vehicle) -> Vehicle:
         identifier="pilchard",
         description="An ROV",
         source="A tank test",
-        rov=vehicle.rov.replaced({"a_t_rear": 100.3, "b_t_rear": -27.09}),
+        coefficients={**vehicle.coefficients, "a_t_rear": 100.3, "b_t_rear": -27.09},
         command_range=(0.0, 1.0),
         data=None,
         pictures=None,
@@ -133,7 +133,7 @@ def test_what_flies_for_another_vehicle_is_the_same_twice(heavy: Vehicle) -> Non
 def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
     heavy: Vehicle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    declared = [replace(v, start=500.0) if v.name == "Z_ext" else v for v in variables(heavy.rov)]
+    declared = [replace(v, start=500.0) if v.name == "Z_ext" else v for v in variables(heavy)]
     monkeypatch.setattr("rov_fmu.report.page.live.variables", lambda _: declared)
     root = html.fromstring(fly_page([Flown(heavy, b"")]))
     letters = re.findall(r"<kbd>([A-Z])</kbd>", html.tostring(root, encoding="unicode"))
@@ -146,11 +146,11 @@ def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
 
 def test_every_variable_and_coefficient_has_its_row(page: str, vehicle: Vehicle) -> None:
     table = rows(page)
-    for v in variables(vehicle.rov):
+    for v in variables(vehicle):
         assert row_of(v) in table
     coefficients = {row[0]: row for row in table if len(row) == 5}  # the last table with five columns
     for name, source in vehicle.sources.items():
-        assert coefficients[name][2::2] == [number(vehicle.rov[name]), source]
+        assert coefficients[name][2::2] == [number(vehicle[name]), source]
 
 
 def test_published_tables_side_by_side(page: str, vehicle: Vehicle) -> None:
@@ -202,7 +202,7 @@ def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
 def test_any_coefficients_and_any_range_of_commands(
     vehicle: Vehicle, changes: dict[str, float], limits: tuple[float, float]
 ) -> None:
-    changed = replace(vehicle, rov=vehicle.rov.replaced(changes), command_range=limits, data=None)
+    changed = replace(vehicle.replaced(changes), command_range=limits, data=None)
     assert "The rear thrust is negative" not in documentation_page(changed)
 
 
@@ -296,7 +296,7 @@ def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_p
     """Both directions where they differ, by the equation of the steady state: a_d V^2 + b_d V = F + F_0."""
     table = {row[0]: row for row in rows(heavy_page) if row and row[0].startswith(("Surge (", "Heave "))}
     assert table["Heave up (m/s)"][1] == "u_5 = −c, u_6 = −c, u_7 = −c, u_8 = −c"
-    k = heavy.rov
+    k = heavy
     for name, end, sign in (("Heave down (m/s)", "", 1.0), ("Heave up (m/s)", "_reverse", -1.0)):
         V = sign * float(table[name][-2].replace("−", "-"))  # at full command, to three digits
         m = 1.0 - k["c_0_t200"]
@@ -357,7 +357,7 @@ def test_the_files_of_two_vehicles_have_their_folders_if_their_names_are_the_sam
 
 def test_keys_leave_the_other_axes_at_rest() -> None:
     """Each key of a vehicle with six axes pushes along its own axis only, where thrust is linear in the commands."""
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
     (script,) = html.fromstring(fly_page([Flown(a_vehicle(rov), b"")])).xpath("//script[@id='live-vehicles']")
     (data,) = json.loads(script.text)
     assert [axis["keys"] for axis in data["axes"]] == ["WS", "EQ", "FR", "LJ", "IK", "DA"]
@@ -377,7 +377,7 @@ def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
     turns = ["psi", "ψ"] if "yaw" in kind else []
     for name in ("Z_ext", "u_l", "F_t", "tau_rear", "m_a_w", "rear", "top thruster", *turns):
         assert name not in text, name
-    for v in variables(vehicle.rov):
+    for v in variables(vehicle):
         assert v.name in text
 
 

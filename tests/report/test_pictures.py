@@ -32,7 +32,7 @@ SIZES = {"diagram": 8_500, "icon": 3_000, "signal": 500}
 @cache
 def shipped(name: str) -> Mapping[str, bytes]:
     """Return the pictures of a vehicle that ships, by their path in the FMU."""
-    return pictures(load_vehicle(SHIPPED[name]).rov)
+    return pictures(load_vehicle(SHIPPED[name]))
 
 
 def decoded(png: bytes) -> Any:
@@ -172,7 +172,7 @@ def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehi
     """An arrow begins at the thruster and points along its direction; in pixels y is down."""
     figure = Figure(figsize=(6.0, 6.0))
     ax = figure.subplots()
-    draw_thrusters(ax, heavy.rov, scenes(heavy.rov)["from above"])
+    draw_thrusters(ax, heavy, scenes(heavy)["from above"])
     arrows = {(round(a.xyann[0], 2), round(a.xyann[1], 2)): a.xy for a in ax.texts if isinstance(a, Annotation)}
     names = {text.get_text() for text in ax.texts}
     for thruster in heavy.layout.thrusters:
@@ -188,7 +188,7 @@ def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehi
 
 def test_the_arm_of_the_paper_stands_where_its_torque_says(vehicle: Vehicle) -> None:
     """(4): x F_y - y F_x of a force ahead is ±R sin γ, behind the centre of mass."""
-    k = vehicle.rov
+    k = vehicle
     for thruster, side in zip(vehicle.layout.thrusters[:2], (1.0, -1.0), strict=True):
         x, y, _ = place(k, thruster)
         assert x < 0.0

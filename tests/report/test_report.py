@@ -156,14 +156,14 @@ def test_coefficients_have_their_prior_and_interval(page: str) -> None:
     assert ["top thrust".capitalize()] in table
     given = {row[0]: row for row in table if len(row) == 5}
     vehicle = example().vehicle
-    assert given["m_rov"][2:] == [number(vehicle.rov["m_rov"], 5), "kg", vehicle.sources["m_rov"]]
+    assert given["m_rov"][2:] == [number(vehicle["m_rov"], 5), "kg", vehicle.sources["m_rov"]]
     assert "a_d_u" not in given
 
 
 def test_inertia_and_added_mass_follow_from_beta(page: str) -> None:
     """The inertia is m/β, and the smallest β is that of the largest inertia."""
     table = {row[0]: row for row in rows(page) if len(row) == 8 and row[7] in ("kg", "kg·m²")}
-    mass = example().vehicle.rov["m_rov"]
+    mass = example().vehicle["m_rov"]
     total, low, high = mass / 0.8, mass / 0.9, mass / 0.7
     assert table["Surge"][1:4] == with_interval(total, (low, high))
     assert table["Surge"][4:7] == with_interval(total - mass, (low - mass, high - mass))

@@ -34,7 +34,7 @@ def test_the_files_have_every_possible_key() -> None:
 
 
 def test_every_key_is_read(everything: Vehicle) -> None:
-    layout, rov = everything.layout, everything.rov
+    layout, rov = everything.layout, everything
     assert [form.axis for form in layout.axes] == [SURGE, SWAY, HEAVE, YAW]
     assert layout.coupled
     assert layout.kinds["heave"].keys == ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0")
@@ -515,7 +515,7 @@ def test_a_valid_vehicle_can_be_simulated(case: str, tmp_path: Path) -> None:
     path.write_text(changed(VALID[case]), encoding="utf-8")
     vehicle = load_vehicle(path)
     start = dict.fromkeys(vehicle.layout.state, 0.0)
-    moved = vehicle.rov.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)
+    moved = vehicle.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)
     assert list(moved) == list(start)
     assert any(moved.values())
 
@@ -570,7 +570,7 @@ def test_the_command_line_prints_a_warning_on_one_line(tmp_path: Path, capsys: p
 def test_a_vehicle_without_weight_is_neutral(tmp_path: Path) -> None:
     path = tmp_path / "rov.toml"
     path.write_text(changed(_SINK, SIX), encoding="utf-8")
-    rov = load_vehicle(path).rov
+    rov = load_vehicle(path)
     tilted = {**rov.layout.at_rest, "eta": sqrt(0.5), "epsilon_1": sqrt(0.5)}
     after = rov.step(dict.fromkeys(rov.layout.inputs, 0.0), tilted, 10.0)
     assert {name: after[name] for name in tilted} == pytest.approx(tilted, abs=1e-12)

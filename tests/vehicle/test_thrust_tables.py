@@ -165,9 +165,9 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     write_vehicle(load_vehicle(here), folder / "written.toml")
     write_tuned(here, folder / "tuned.toml", {"lift_rudder": 10.0, "T_d": 0.2, "k_t_main": 1.1}, "by hand")
     written, tuned = (load_vehicle(folder / f"{name}.toml") for name in ("written", "tuned"))
-    assert (written.layout, written.rov.coefficients) == (vehicle.layout, dict(vehicle.rov.coefficients))
+    assert (written.layout, written.coefficients) == (vehicle.layout, dict(vehicle.coefficients))
     assert written.sources == vehicle.sources
-    assert {name: tuned.rov[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
+    assert {name: tuned[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
         "lift_rudder": 10.0,
         "T_d": 0.2,
         "k_t_main": 1.1,

@@ -17,8 +17,8 @@ from scipy.interpolate import CubicSpline
 from rov_fmu.model.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.riccati import Riccati
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
 
 KNOTS = (0.1, 0.25, 0.45, 0.7)
 """The commands at which eta is a parameter."""
@@ -82,12 +82,12 @@ class Shapes:
             found[:, place] = self.commands(curve.name, inputs[:, place])
         return found
 
-    def force(self, rov: Rov, curve: Curve, command: float) -> float:
+    def force(self, rov: Vehicle, curve: Curve, command: float) -> float:
         """Return the steady thrust of all thrusters that a curve describes together, N."""
         (acting,) = self.commands(curve.name, np.array([command])).tolist()
         return curve.together * rov.curve_force(curve, acting)
 
-    def motion(self, rov: Rov, axis: Axis, command: float) -> Riccati:
+    def motion(self, rov: Vehicle, axis: Axis, command: float) -> Riccati:
         """Return the equation of an axis alone under a held command, once the thrust is steady."""
         layout = rov.layout
         inputs = dict(layout.usual_inputs)

@@ -28,8 +28,8 @@ from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.layout import Curve, Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
@@ -60,7 +60,7 @@ class TableRow:
         curves = {thruster.curve for thruster in layout.drivers(self.subject)}
         return parameter.of in {"", self.subject.name, *curves}
 
-    def model(self, rov: Rov, shapes: Shapes) -> float:
+    def model(self, rov: Vehicle, shapes: Shapes) -> float:
         """Return the value by the model, in the unit of the row."""
         if isinstance(self.subject, Curve):
             return shapes.force(rov, self.subject, self.command)
@@ -153,7 +153,7 @@ class Objective:
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
         """Return the innovations of all or some rows of tables and their variances."""
         rows = self.rows if rows is None else rows
-        rov = Rov(self.table.layout, self.table.coefficients(z.tolist()))
+        rov = Vehicle(self.table.layout, self.table.coefficients(z.tolist()))
         shapes = self.table.shapes(z.tolist())
         off = np.array([row.measured - row.model(rov, shapes) for row in rows])
         noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])

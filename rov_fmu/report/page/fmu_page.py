@@ -20,7 +20,6 @@ from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
 from rov_fmu.model.catalogue import ARM, Axis
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
 from rov_fmu.report.page.pictures import pictures
@@ -56,7 +55,7 @@ def documentation(
 ) -> dict[str, bytes]:
     """Return the page and the pictures by their path in the FMU. Raises FileError."""
     text = documentation_page(vehicle, native=native, fmi=fmi, interface=interface, module=module)
-    return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
+    return {"documentation/index.html": text.encode(), **pictures(vehicle)}
 
 
 def documentation_page(
@@ -68,7 +67,7 @@ def documentation_page(
     model as WebAssembly; without it the page has no live section. The page of a vehicle without a data folder has no
     tables and no measurements. Raises FileError.
     """
-    rov, layout = vehicle.rov, vehicle.layout
+    rov, layout = vehicle, vehicle.layout
     tables = tables_by_axis(vehicle)
     held = held_commands(vehicle, tables.values())
     axes = [form.axis for form in layout.axes]
@@ -147,7 +146,7 @@ class Motion:
     """The other axes that the last command pushes too, and the force or torque along them."""
 
 
-def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
+def _motions(rov: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
     """Yield the motion along an axis, for each direction if they differ. The commands are in percent."""
     directions = [(1.0, "")]
     if differs_by_direction(rov, axis):
@@ -159,7 +158,7 @@ def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Moti
         yield Motion(axis, words, signs, responses, list(_side_effects(rov, axis, fractions[-1])))
 
 
-def _side_effects(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
+def _side_effects(rov: Vehicle, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
     """Yield the other axes that a command of an axis pushes, for example because thrust in reverse is weaker."""
     F = rov.commanded(rov.held_inputs(axis, command))
     for other in (form.axis for form in rov.layout.axes if form.axis is not axis):
@@ -168,7 +167,7 @@ def _side_effects(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, 
             yield other, sum(pushes)
 
 
-def differs_by_direction(rov: Rov, axis: Axis) -> bool:
+def differs_by_direction(rov: Vehicle, axis: Axis) -> bool:
     """Return True if the motion under a negative command is not the mirror image of that under a positive one."""
     for c in (0.1, 0.3, 0.6, 1.0):
         (V, Tau), (back, Tau_back) = rov.response(axis, c), rov.response(axis, -c)
@@ -229,7 +228,7 @@ def _mirrored(layout: Layout) -> str:
     return " and ".join(found)
 
 
-def _is_tuned(rov: Rov) -> bool:
+def _is_tuned(rov: Vehicle) -> bool:
     """Return True unless each alpha and beta is 1."""
     return any(rov[name] != 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable)
 
@@ -239,7 +238,7 @@ def _is_tuned(rov: Rov) -> bool:
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
     """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
-    rov, (low, high) = vehicle.rov, (100.0 * end for end in vehicle.command_range)
+    rov, (low, high) = vehicle, (100.0 * end for end in vehicle.command_range)
     least = -100 if differs_by_direction(rov, axis) else 0
     ax.axvspan(low, high, label="range of the model", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     if least:
@@ -259,7 +258,7 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     ax.set_xlim(least, 100)
 
 
-def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
+def plot_steps(ax: Axes, rov: Vehicle, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
     """Plot the velocity after steps of the command from rest, with the measured V_ss and Tau."""
     steps = [measured_step(table, c) for c in commands]
     if differs_by_direction(rov, axis):

@@ -17,7 +17,6 @@ from rov_fmu.engine.compile import MODULE_SOURCES
 from rov_fmu.fmu.variables import variables
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.layout import Layout, Thruster
-from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import number, page, pretty_unit
@@ -89,10 +88,10 @@ def live(flown: Sequence[Flown]) -> Live:
         policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
         keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
-        places=_places(pilot.rov),
+        places=_places(pilot),
         start=start,
-        loads=list(_loads(pilot.rov, start)),
-        tunable=list(_tunable(pilot.rov)),
+        loads=list(_loads(pilot, start)),
+        tunable=list(_tunable(pilot)),
         title=" beside ".join(names),
         other=names[1] if len(flown) > 1 else None,
     )
@@ -118,7 +117,7 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False) -> str:
 
 def _data(flown: Flown) -> dict[str, Any]:
     """Return the data of a vehicle for the scripts."""
-    vehicle, rov, layout = flown.vehicle, flown.vehicle.rov, flown.vehicle.layout
+    vehicle, rov, layout = flown.vehicle, flown.vehicle, flown.vehicle.layout
     return {
         "identifier": vehicle.identifier,
         "name": vehicle.name,
@@ -169,7 +168,7 @@ def _keys(layout: Layout) -> list[str]:
     return [_KEYS[form.axis.name] if form.axis.name in _KEYS else next(spare) for form in layout.axes]
 
 
-def _axis(rov: Rov, axis: Axis, keys: str) -> dict[str, Any]:
+def _axis(rov: Vehicle, axis: Axis, keys: str) -> dict[str, Any]:
     position = {"heave": "z", "roll": "phi", "pitch": "theta", "yaw": "psi"}.get(axis.name)
     return {
         "name": axis.name,
@@ -185,7 +184,7 @@ def _axis(rov: Rov, axis: Axis, keys: str) -> dict[str, Any]:
     }
 
 
-def _shares(rov: Rov, axis: Axis) -> dict[str, float]:
+def _shares(rov: Vehicle, axis: Axis) -> dict[str, float]:
     """Return the commands by which a key drives an axis, the largest of them ±1.
 
     Those of a vehicle that rolls or pitches leave the other axes at rest, as far as thrust is linear in the commands.
@@ -207,7 +206,7 @@ def _shares(rov: Rov, axis: Axis) -> dict[str, float]:
     return {name: share for name, share in found.items() if share}
 
 
-def _thruster(rov: Rov, thruster: Thruster, label: str) -> dict[str, Any]:
+def _thruster(rov: Vehicle, thruster: Thruster, label: str) -> dict[str, Any]:
     curve = rov.layout.curve_of[thruster.name]
     most = max(abs(rov.curve_force(curve, command)) for command in (1.0, -1.0))
     return {
@@ -219,14 +218,14 @@ def _thruster(rov: Rov, thruster: Thruster, label: str) -> dict[str, Any]:
     }
 
 
-def _places(rov: Rov) -> dict[str, str]:
+def _places(rov: Vehicle) -> dict[str, str]:
     """Return the label of the thruster for each command that drives only one."""
     if rov.layout.mix:
         return {}
     return {f"u_{one.name}": label for one, label in zip(rov.layout.thrusters, _labels(rov), strict=True)}
 
 
-def _labels(rov: Rov) -> list[str]:
+def _labels(rov: Vehicle) -> list[str]:
     """Return where each thruster is ("left rear"). Thrusters at the same place also have their names."""
     found = [_label(rov, thruster) for thruster in rov.layout.thrusters]
     return [
@@ -235,7 +234,7 @@ def _labels(rov: Rov) -> list[str]:
     ]
 
 
-def _label(rov: Rov, thruster: Thruster) -> str:
+def _label(rov: Vehicle, thruster: Thruster) -> str:
     x, y, _ = place(rov, thruster)
     least = 0.2 * size_of(rov)
     words = [
@@ -257,7 +256,7 @@ def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
             yield {"axis": n, "command": step.command, "V": V, "Tau": Tau}
 
 
-def _loads(rov: Rov, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:
+def _loads(rov: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:
     """Yield the sliders of the inputs that are not commands.
 
     Loads end at the strongest thrust, and others at 1, or at twice their start value if that is more.
@@ -268,7 +267,7 @@ def _loads(rov: Rov, start: Mapping[str, float]) -> Iterator[tuple[str, float, s
             yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(declaration.unit)
 
 
-def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:
+def _tunable(rov: Vehicle) -> Iterator[tuple[str, str, float, float, float]]:
     """Yield the sliders of the tunable coefficients."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
         for axis in (form.axis for form in rov.layout.axes):

@@ -11,9 +11,9 @@ from matplotlib.path import Path
 
 from rov_fmu.model.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.model.layout import Thruster
-from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.labels import AROUND, Place, Space
 from rov_fmu.report.plots.svg import LIGHT, with_formulas
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Point = tuple[float, float, float]
 
@@ -28,7 +28,7 @@ _WIDTH = 3.7
 """The width of a drawing, inches."""
 
 
-def place(rov: Rov, thruster: Thruster) -> Point:
+def place(rov: Vehicle, thruster: Thruster) -> Point:
     """Return the position of a thruster from the centre of mass, m.
 
     A thruster on an arm is at the distance R and the angle γ behind the centre of mass; one without a known position is
@@ -60,7 +60,7 @@ class _Mark:
         return self.at[0] + 0.5 * size * self.along[0], self.at[1] + 0.5 * size * self.along[1]
 
 
-def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
+def _marks(rov: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
     """Yield the marks of a view, which is one of VIEWS."""
     seen: dict[tuple[float, ...], list[str]] = {}
     for thruster in rov.layout.thrusters:
@@ -94,7 +94,7 @@ class Scene:
         return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
 
 
-def scenes(rov: Rov) -> dict[str, Scene]:
+def scenes(rov: Vehicle) -> dict[str, Scene]:
     """Return the scene of each view, at a common scale."""
     inch = 0.9 * size_of(rov)
     for _ in range(3):  # text takes part of the drawing, which changes the scale and so the size of text in metres
@@ -105,12 +105,12 @@ def scenes(rov: Rov) -> dict[str, Scene]:
     return {view: replace(scene, limits=(across, scene.limits[1])) for view, scene in found.items()}
 
 
-def size_of(rov: Rov) -> float:
+def size_of(rov: Vehicle) -> float:
     """Return the largest coordinate of a thruster from the centre of mass, m."""
     return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
 
 
-def _arranged(rov: Rov, view: str, inch: float) -> Scene:
+def _arranged(rov: Vehicle, view: str, inch: float) -> Scene:
     """Return a view with its labels placed, in a drawing in which an inch is `inch` metres."""
     down, sight, toward = VIEWS[view]
     size = size_of(rov)
@@ -144,7 +144,7 @@ def _arranged(rov: Rov, view: str, inch: float) -> Scene:
     return Scene(view, marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
 
 
-def _arm_labels(rov: Rov, space: Space, size: float) -> list[tuple[str, Place, str]]:
+def _arm_labels(rov: Vehicle, space: Space, size: float) -> list[tuple[str, Place, str]]:
     """Return the labels of R and γ, and reserve the space of the arm and of these labels."""
     x, y, _ = _armed(rov)
     space.line((0.0, 0.0), (x, y))
@@ -168,12 +168,12 @@ def _place_label(mark: _Mark, space: Space, size: float) -> Place:
     return space.name(mark.width, [near_thruster, near_tip])
 
 
-def _has_scale(rov: Rov) -> bool:
+def _has_scale(rov: Vehicle) -> bool:
     """Return True if the position of a thruster is known, so that the drawing has a scale."""
     return any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
 
 
-def _armed(rov: Rov) -> Point:
+def _armed(rov: Vehicle) -> Point:
     """Return the position of the first thruster on an arm."""
     return next(place(rov, t) for t in rov.layout.thrusters if t.position is None and t.arm)
 
@@ -184,7 +184,7 @@ def _turn(size: float) -> tuple[Place, Place]:
     return tail, tip
 
 
-def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
+def draw_thrusters(ax: Axes, rov: Vehicle, scene: Scene) -> None:
     """Draw the centre of mass, the body frame, the thrusters with their positive forces, and R and γ if they exist."""
     down, size = VIEWS[scene.view][0], scene.size
     _draw_frame(ax, size, turns=down is SWAY and rov.layout.has(YAW))
@@ -205,7 +205,7 @@ def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
     ax.set_title(scene.view.capitalize(), loc="left")
 
 
-def draw_icon(ax: Axes, rov: Rov) -> None:
+def draw_icon(ax: Axes, rov: Vehicle) -> None:
     """Draw the vehicle from above without text: its thrusters on a body with a round bow."""
     size, marks = size_of(rov), list(_marks(rov, *VIEWS["from above"]))
     x, y = 1.2 * size, max([0.5 * size, *(abs(mark.at[1]) for mark in marks)])

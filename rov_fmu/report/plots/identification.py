@@ -45,7 +45,7 @@ def plot_answers(figure: Figure, results: Identification, result: AxisResult, qu
     _curve(ax, factor, commands, found)
     _points(ax, factor, [p for p in result.points if p.quantity == quantity])
     if results.against and results.against.layout.has(axis):
-        other = [results.against.rov.response(axis, c)[0 if is_steady else 1] for c in commands.tolist()]
+        other = [results.against.response(axis, c)[0 if is_steady else 1] for c in commands.tolist()]
         ax.plot(100.0 * commands, factor * np.array(other), "--", color=LIGHT["grey"], label="compared")
     ax.set_xlabel("command (%)")
     symbol = "$V_{ss}$" if is_steady else "$Tau$"

@@ -13,7 +13,6 @@ from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.layout import Curve
 from rov_fmu.model.riccati import RISE
-from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -78,7 +77,7 @@ def finish(
         with_formulas(*ax.legend(loc=where).get_texts())
 
 
-def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
+def draw_curve(ax: Axes, rov: Vehicle, curve: Curve) -> None:
     """Plot the steady thrust of a thruster over its command, with reverse and the dead band."""
     commands = {n / 50.0 for n in range(-50, 51)}
     if "c_0" in curve.keys:
@@ -92,7 +91,7 @@ def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
     ax.set_xlim(-100, 100)
 
 
-def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
+def after_step(rov: Vehicle, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
     """Return the velocity along an axis at each time, the first 0, under a held command from rest.
 
     The other axes are left without a force, so that they stay at rest and do not act on this one.
@@ -109,7 +108,7 @@ def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> 
     return velocity
 
 
-def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
+def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Vehicle, str]]) -> None:
     """Plot the velocity after steps of the command for every model, and label the curve of the last model.
 
     A measured V_ss is a dotted line, and a measured Tau is a point at 1 - 1/e of it.

@@ -23,8 +23,8 @@ from rov_fmu.model.catalogue import (
     cross_of,
 )
 from rov_fmu.model.layout import Curve, Fin, Layout, Thruster, ThrustTable, VehicleAxis, arm, effect_along
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import SIX
 
 WORDS = {
@@ -64,7 +64,7 @@ def test_variables_are_described_in_the_terms_of_the_vehicle(name: str) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_only_the_vehicle_of_the_paper_cites_the_paper(name: str) -> None:
-    described = [v.description for v in variables(rov_fmu.load(name).rov)]
+    described = [v.description for v in variables(rov_fmu.load(name))]
     assert all(re.findall(r"(?<=, )\(\d+\w?\)", text) == [] for text in described)
     with_number = [text for text in described if re.search(r"equations? \(\d", text)]
     assert all("of Enevoldsen et al. 2018" in text for text in with_number)
@@ -74,7 +74,7 @@ def test_only_the_vehicle_of_the_paper_cites_the_paper(name: str) -> None:
 
 def test_angles_are_shown_in_degrees_and_only_shares_in_percent() -> None:
     shown = {v.name: v.display_unit for v in variables(SIX)}
-    expected = dict.fromkeys(("phi", "theta", "psi", "phi_0", "theta_0", "psi_0"), "deg")
+    expected: dict[str, str | None] = dict.fromkeys(("phi", "theta", "psi", "phi_0", "theta_0", "psi_0"), "deg")
     expected |= dict.fromkeys((*QUATERNION, "alpha_u", "c_0_t200", "x", "X_ext", "F_a", "a_d_u"))
     expected |= {"u_a": "%", "u": "knot", "V_N": "knot", "r": "deg/s", "der(x)": "knot"}
     assert {name: shown[name] for name in expected} == expected
@@ -82,9 +82,9 @@ def test_angles_are_shown_in_degrees_and_only_shares_in_percent() -> None:
     assert (late.unit, late.display_unit) == ("1", "%")
 
 
-def _with_dead_time() -> Rov:
+def _with_dead_time() -> Vehicle:
     """Return the vehicle SIX with a dead time."""
-    return Rov(replace(SIX.layout, has_dead_time=True), {**SIX.coefficients, "T_d": 0.1})
+    return Vehicle(replace(SIX.layout, has_dead_time=True), {**SIX.coefficients, "T_d": 0.1})
 
 
 def test_another_source_of_a_curve_is_kept() -> None:

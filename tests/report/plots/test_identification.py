@@ -83,7 +83,7 @@ def test_answers_have_a_curve_and_a_band_for_each_direction_and_the_measured_poi
     assert commands == pytest.approx([-70, -50, -30, -10])
     assert values == pytest.approx([-0.7, -0.5, -0.3, -0.1])
     assert lines(ax)["measured"] == ([30.0, 50.0], [0.29, 0.51])
-    other = load_vehicle(VIDEORAY).rov.response(SURGE, 0.7)[0]
+    other = load_vehicle(VIDEORAY).response(SURGE, 0.7)[0]
     assert lines(ax)["compared"][1][-1] == pytest.approx(other)
     assert ax.get_title(loc="left") == "$V_{ss}$ (m/s)"
 

@@ -29,7 +29,7 @@ N = 60
 
 @pytest.fixture(scope="module")
 def bluerov2() -> Layout:
-    return load_vehicle(SHIPPED["bluerov2"]).rov.layout
+    return load_vehicle(SHIPPED["bluerov2"]).layout
 
 
 def pulse(command: float) -> int:
