@@ -44,7 +44,7 @@ _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number",
 def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
-    named = {"vehicle": "FileHead", "provenance": "Made", "estimated": "Estimated"} | {
+    named = {"vehicle": "FileHead", "provenance": "Provenance", "estimated": "Estimated"} | {
         f"axis_{name}": f"_{name.capitalize()}" for name in AXES
     }
     named |= {

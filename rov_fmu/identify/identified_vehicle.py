@@ -15,9 +15,10 @@ from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.model.catalogue import REVERSE, Axis
 from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
-from rov_fmu.vehicle.vehicle import Provenance, Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
@@ -69,7 +70,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
                 correlation={k: round(v, 6) for k, v in others.items() if abs(v) > 1e-6},
             )
     validity = given.description.tables.validity
-    made = Provenance(f"rov-fmu {__version__} identify", METHOD, tests.inputs, data=_data(fit))
+    made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, inputs=dict(tests.inputs))
     vehicle = replace(
         rov,
         **dict(given.head),
@@ -81,6 +82,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         intervals=intervals,
         estimates=estimates,
         provenance=made,
+        measured_from=_data(fit),
         voltage_source="" if layout.voltage is None else "Mean voltage of the logs",
         thruster_sources=given.thruster_sources,
     )

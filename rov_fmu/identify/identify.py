@@ -79,7 +79,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     findings = findings_of(found)
     provenance = vehicle.provenance
     assert provenance
-    told = replace(provenance, warnings=warnings(findings), facts=facts(findings))
+    told = provenance.model_copy(update={"warnings": warnings(findings), "facts": facts(findings)})
     return replace(found, findings=findings, vehicle=replace(vehicle, provenance=told))
 
 

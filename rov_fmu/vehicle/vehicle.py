@@ -16,10 +16,10 @@ from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
-from rov_fmu.vehicle.description import PICTURES, TABLES
+from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, with_missing_keys
 from rov_fmu.vehicle.thrust_table import CurrentTable
 
 if TYPE_CHECKING:
@@ -31,35 +31,6 @@ BY_HAND = "set by hand"
 
 class VehicleFileError(FileError):
     """A vehicle file that cannot be used. Each mistake is a line with file, key, value and what is allowed."""
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """The tool that made a vehicle file, its method, and its input files."""
-
-    tool: str
-    method: str
-    inputs: Mapping[str, str]
-    """The SHA-256 of every input file, by file name."""
-    warnings: tuple[str, ...] = ()
-    """What the data do not determine, and what speaks against the model, in sentences."""
-    facts: tuple[str, ...] = ()
-    """What was found, and what was done with the data, in sentences."""
-    report: Path | None = None
-    """The report on the identification."""
-    data: str = field(default="measurements", compare=False)
-    """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
-
-
-@dataclass(frozen=True)
-class Alternative:
-    """A set of published coefficients that the model does not use."""
-
-    description: str
-    values: Mapping[str, float]
-    """The coefficients by name."""
-    sources: Mapping[str, str]
-    """The sources of the coefficients by name."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,6 +64,8 @@ class Vehicle(Rov):
     estimates: Mapping[str, Estimated] = field(default_factory=dict)
     """The standard errors and correlations of identified coefficients, by name."""
     provenance: Provenance | None = None
+    measured_from: str = field(default="measurements", compare=False)
+    """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
     voltage_source: str = ""
     """The source of the battery's voltage."""
     thrust_files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
@@ -212,48 +185,31 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(f"{path}: {key_line('format', reason, data['format'])}")
     context = {"folder": path.parent, "coming": coming}
     file, problems = validate(data, File, **context)
-    mistakes = [
-        *problem_lines(problems, data, File),
-        *check_parts(*readable_parts(data, problems, context, Parts), data),
-    ]
+    problems = with_missing_keys(problems, data, File)
+    readable, lost = readable_parts(data, problems, context, File)
+    mistakes = [*problem_lines(problems, data, File), *check_parts(readable, lost, data)]
     if file is None or mistakes:
         raise VehicleFileError(*lines_on(path, mistakes))
-    head, made, layout = file.vehicle, file.provenance, file.layout
-    folders, found = head.folders_from(path.parent), file.quantities(layout)
+    head, validity, layout = file.vehicle, file.validity, file.layout
+    assert head, "with_missing_keys tells that it is missing"
+    assert validity, "with_missing_keys tells that it is missing"
+    found = file.quantities(layout)
     coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
     if mistakes := [*check_mass(layout, coefficients)]:
         raise VehicleFileError(*lines_on(path, mistakes))
     for doubt in doubts(layout, coefficients):
         warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
-    provenance = None
-    if made:
-        provenance = Provenance(
-            made.tool, made.method, made.inputs, made.warnings, made.facts, made.report_in(path.parent)
-        )
     return Vehicle(
         layout,
         coefficients,
-        name=head.name,
-        identifier=head.identifier,
-        version=head.version,
-        description=head.description,
-        source=head.source,
+        **dict(head),
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
-        command_range=file.validity.command_range,
-        alternatives={
-            name: Alternative(
-                alternative.description,
-                {coefficient: q.value for coefficient, q in alternative.quantities.items()},
-                {coefficient: q.source for coefficient, q in alternative.quantities.items()},
-            )
-            for name, alternative in file.alternatives.items()
-        },
-        data=folders["data"],
-        pictures=folders["pictures"],
-        limits=file.validity.limits,
+        command_range=validity.command_range,
+        alternatives=file.alternatives,
+        limits=validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=file.estimates,
-        provenance=provenance,
+        provenance=file.provenance,
         voltage_source=file.battery.voltage.source if file.battery else "",
         thrust_files={name: curve.thrust_files for name, curve in file.curves.items() if curve.thrust_files},
         electric_currents=file.electric_currents,

@@ -17,9 +17,9 @@ from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.catalogue import Declaration
 from rov_fmu.model.layout import Curve, Fin, Thruster
 from rov_fmu.vehicle.description import Head
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, keys_in_file
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Alternative, Estimated, keys_in_file
 from rov_fmu.vehicle.thrust_table import CurrentTable
-from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 _DECIMALS = 6
 """The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
@@ -34,7 +34,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     """
     document = tomlkit.document()
     if made := vehicle.provenance:
-        comment = f"Made from {made.data}: [provenance] tells how, and `interval` is 95 % confidence."
+        comment = f"Made from {vehicle.measured_from}: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(comment)).add(tomlkit.nl())
     low, high = map(_rounded, vehicle.command_range)
     paths = {"data": vehicle.data, "pictures": vehicle.pictures}
@@ -46,7 +46,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     for key, table in _hardware(vehicle, quantities, folder).items():
         document[key] = table
     if vehicle.alternatives:
-        document["alternatives"] = {name: _alternative(vehicle, one) for name, one in vehicle.alternatives.items()}
+        document["alternatives"] = {name: _alternative(one) for name, one in vehicle.alternatives.items()}
     if vehicle.estimates:
         document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
     if made:
@@ -274,13 +274,10 @@ def _thruster(thruster: Thruster, sources: Mapping[str, str]) -> dict[str, Any]:
     return entry
 
 
-def _alternative(vehicle: Vehicle, alternative: Alternative) -> dict[str, Any]:
+def _alternative(alternative: Alternative) -> dict[str, Any]:
     """Return the table of a set of published coefficients that the model does not use."""
-    declarations = vehicle.layout.coefficients
-    table: dict[str, Any] = {"description": alternative.description}
-    for name, value in alternative.values.items():
-        table[name] = _quantity_table(value, declarations[name], alternative.sources[name])
-    return table
+    rows = {name: _inline_table(q.model_dump(exclude_none=True)) for name, q in alternative.quantities.items()}
+    return {"description": alternative.description, **rows}
 
 
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:

@@ -173,7 +173,7 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
         "time_constant_heave.csv"
     }
     assert of_tables.vehicle.provenance
-    assert of_tables.vehicle.provenance.data == "tank tests"
+    assert of_tables.vehicle.measured_from == "tank tests"
     assert (made.warnings, made.facts) == (warnings(of_tables.findings), facts(of_tables.findings))
     assert vehicle.command_range == (0.2, 0.8)
 

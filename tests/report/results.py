@@ -32,8 +32,9 @@ from rov_fmu.tank.description import NO_ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Channel, Commands, Log, Source
+from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Provenance, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 FILES = ("log_1.csv", "log_2.csv")
 TIME = np.arange(0.0, 60.0, 0.1)
@@ -111,7 +112,8 @@ def without_findings() -> Identification:
         version="1",
         description="A small ROV that exists only in tests",
         source="Two dives in a pond",
-        provenance=Provenance("rov-fmu", "A result made by hand", {}, data="two dive logs"),
+        provenance=Provenance(tool="rov-fmu", method="A result made by hand", inputs={}),
+        measured_from="two dive logs",
         intervals={"a_d_u": (9.0, 11.0)},
         data=None,
         pictures=None,
@@ -169,7 +171,7 @@ def told(result: Identification) -> Identification:
     findings = findings_of(result)
     made = result.vehicle.provenance
     assert made
-    made = replace(made, warnings=warnings(findings), facts=facts(findings))
+    made = made.model_copy(update={"warnings": warnings(findings), "facts": facts(findings)})
     return replace(result, findings=findings, vehicle=replace(result.vehicle, provenance=made))
 
 

@@ -400,7 +400,8 @@ def identified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     vehicle = load_vehicle(VIDEORAY)
     made = example().vehicle.provenance
     assert made
-    vehicle = replace(vehicle, alternatives={}, data=None, pictures=None, provenance=replace(made, report=page.path))
+    made = made.model_copy(update={"report": page.path})
+    vehicle = replace(vehicle, alternatives={}, data=None, pictures=None, provenance=made)
     write_whole(page, vehicle_output(vehicle, tmp_path / "vehicle.toml"))
     return tmp_path / "vehicle.toml"
 

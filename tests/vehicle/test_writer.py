@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT, TESTS
 from tests.vehicle.test_vehicle import check_line, edit, refusal
@@ -28,7 +29,9 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
         pictures=None,
         alternatives={},
         intervals={"m_rov": (6.5, 6.6), "b_d_w": (0.0, 1.25)},
-        provenance=Provenance("tool", "heave: a\nyaw: b", inputs, ("a warning", "b"), ("a fact", "c")),
+        provenance=Provenance(
+            tool="tool", method="heave: a\nyaw: b", inputs=inputs, warnings=("a warning", "b"), facts=("a fact", "c")
+        ),
     )
     path = tmp_path / "made.toml"
     write_vehicle(made, path)
@@ -38,8 +41,10 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
 
 
 def test_the_first_words_of_a_file_say_what_it_was_made_from(vehicle: Vehicle) -> None:
-    made = Provenance("tool", "by thought", {}, data="tank tests and 2 dive logs")
-    text = vehicle_text(replace(vehicle, data=None, pictures=None, provenance=made))
+    made = Provenance(tool="tool", method="by thought", inputs={})
+    text = vehicle_text(
+        replace(vehicle, data=None, pictures=None, provenance=made, measured_from="tank tests and 2 dive logs")
+    )
     assert "\n# Made from tank tests and 2 dive logs: [provenance] tells how" in text
     assert "warnings" not in text
     assert "facts" not in text
