@@ -14,6 +14,7 @@ import click
 
 from docs import compared
 from rov_fmu.cli import _commands
+from rov_fmu.engine.source import generated_sources
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
@@ -32,7 +33,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 Table = list[tuple[str, ...]]
 _NAMES = (
     *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md"),
-    *("identify-formats.md", "identify-method.md"),
+    *("identify-formats.md", "identify-method.md", "equation.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
@@ -111,12 +112,18 @@ def filled(page: str) -> str:
             content = _gallery()
         elif kind == "equations":
             content = f"```text\n{_equations(name)}\n```"
+        elif kind == "source":
+            source = generated_sources(load_vehicle(SHIPPED[name]).layout)["equation.h"]
+            content = f"```c\n{source.rstrip()}\n```"
         else:
             content = markdown(found[name] if name in found else compared.tables()[name])
         return f"{match[1]}\n\n{content}\n\n"
 
     return re.sub(
-        r"(<!-- (commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL
+        r"(<!-- (commands|drawings|equations|source|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
+        text,
+        page,
+        flags=re.DOTALL,
     )
 
 

@@ -1,4 +1,4 @@
-"""The command rov-fmu: build, simulate, fly, sitl, sdf, prove, study, identify, tune, schema, tables, figures.
+"""The command rov-fmu: build, simulate, fly, sitl, sdf, prove, study, identify, tune, schema, tables.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
@@ -744,7 +744,7 @@ def _tune(
         print_end([], "add -o TUNED.toml to write the tuned vehicle")
 
 
-# ---- schema, tables, figures -----------------------------------------------------------------------------------------
+# ---- schema, tables --------------------------------------------------------------------------------------------------
 
 
 @_commands.command("schema")
@@ -765,37 +765,3 @@ def _tables(vehicle: Path) -> None:
 
     loaded = load_vehicle(vehicle)
     print_tables(loaded, load_tables(loaded))
-
-
-@_commands.command("figures")
-@click.argument("folder", type=_FILE)
-@click.option(
-    "--format",
-    "form",
-    type=_Choice(["svg", "pdf", "png"]),
-    default="svg",
-    show_default=True,
-    help="Format of the figures. Fonts are embedded; PNG has 300 dots per inch.",
-)
-@click.option(
-    "--column",
-    type=_Choice(["single", "double"]),
-    default="single",
-    show_default=True,
-    help="Width: one column of a journal (89 mm) or two (182 mm).",
-)
-def _figures(folder: Path, form: str, column: str) -> None:
-    """Draw those figures of the paper whose data it prints into FOLDER, each with its caption.
-
-    FOLDER is created if it does not exist. All figures are of the VideoRay. Two of them are not in the paper:
-    surge_steps has steps of the command in surge, and steady_velocity compares the refit with the paper's model.
-    """
-    _refuse_vehicle(folder, "is the name of a vehicle, and must be the folder to write the figures to")
-    from rov_fmu.report.console import console, paragraph, shell_words
-    from rov_fmu.report.plots.paper_figures import write_figures
-
-    first, *others = write_figures(folder, form, column)
-    figures = len([first, *others]) // 2
-    words = f"Wrote {figures} figures to {shell_words(folder)}, each with its caption in a text file beside it."
-    words += f" Next: open {shell_words(first)} and the others"
-    paragraph(console(), words)

@@ -51,7 +51,6 @@ COMMANDS = {
     "the vehicle": Command("rov.toml", lambda path: ["identify", str(TESTS), "--force", "-o", str(path)]),
     "the report": Command("report.html", lambda path: ["identify", str(TESTS), "--force", "--report", str(path)]),
     "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "-o", str(path)]),
-    "the figures": Command("figure_5.svg", lambda path: ["figures", str(path.parent)]),
 }
 
 

@@ -154,12 +154,12 @@ def path_of(axis: Axis, v0: float, h: float) -> float:
 
 
 def rounding_of_velocity(*velocities: float) -> float:
-    """Return the error that test_riccati.py allows for a velocity. The largest is the first or the last one."""
+    """Return the error that test_alone.py allows for a velocity. The largest is the first or the last one."""
     return VELOCITY * max(map(abs, velocities)) + TINY
 
 
 def rounding_of_distance(case: Case) -> float:
-    """Return the error that test_riccati.py allows for a distance. A subnormal velocity always has the error TINY."""
+    """Return the error that test_alone.py allows for a distance. A subnormal velocity always has the error TINY."""
     return DISTANCE * path(*case) + TINY * max(1.0, case[4])
 
 

@@ -55,7 +55,9 @@ _BODY_NUMBERS |= {
     "y_B": 0.01,
     "z_B": -0.02,
 }
-_AXIS_NUMBERS = {  # m_a, a_d, b_d, a_d_reverse, b_d_reverse, F_0
+_OTHER_NUMBER = 0.5
+"""The value of a coefficient of a curve or an axis that the tables below do not have."""
+_AXIS_NUMBERS = {
     "u": (6.3567, 141.0, 13.7, 190.0, 4.0, 0.1),
     "v": (7.1206, 217.0, 0.0, 100.0, 3.0, 0.3),
     "w": (18.6863, 190.0, 33.0, 150.0, 20.0, -1.5),
@@ -78,15 +80,17 @@ _CURVE_NUMBERS = {
     "V_0": 16.0,
     "n_V": 1.3,
 }
-assert _CURVE_NUMBERS.keys() == CURVE.keys()
 
 
 def numbered(layout: Layout, **values: float) -> Vehicle:
     """Return a vehicle with the Heavy's numbers, except for the given values, and without tuning."""
-    numbers = {curve.coefficient(key): _CURVE_NUMBERS[key] for curve in layout.curves for key in curve.keys}
+    numbers = {
+        curve.coefficient(key): _CURVE_NUMBERS.get(key, _OTHER_NUMBER) for curve in layout.curves for key in curve.keys
+    }
     for form in layout.axes:
         row = _AXIS_NUMBERS[form.axis.velocity]
-        numbers |= {form.axis.coefficient(key): value for key, value in zip(AXIS, row, strict=True)}
+        own = dict(zip(("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0"), row, strict=True))
+        numbers |= {form.axis.coefficient(key): own.get(key, _OTHER_NUMBER) for key in AXIS}
     for key, *axes in layout.cross:
         column = 0 if key == "m_a" else 1
         numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))

@@ -61,7 +61,7 @@ TESTS = {
     "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/calls",
     "fmu_src/c/s*.c": "model/test_c_step.py fmu/calls/test_values.py fmu/calls model/test_exactness.py engine",
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls",
-    "rov_fmu/model/riccati.py": "model/test_riccati.py model/test_rov.py vehicle/test_published.py",
+    "rov_fmu/model/alone.py": "model/test_alone.py model/test_rov.py vehicle/test_published.py",
     "rov_fmu/model/layout.py": "model/table docs/test_docs.py model/test_rov.py vehicle/test_vehicle.py model",
     "rov_fmu/model/*": "model/test_rov.py model/test_step.py model/test_symmetries.py model",
     "rov_fmu/engine/source.py": "model/test_c_step.py fmu/test_sources.py engine model",

@@ -11,6 +11,8 @@ static const double BESIDE_NOSE[3] = {1.0, 1e-6, 0.618e-6};
 
 enum { MOST_PARTS = 4096 }; /* of a piece, between which the heading is computed */
 
+static void model_attitude(const double y[N_SERIES], double state[N_STATES]);
+static void model_rotation(const double at[], double y[N_SERIES]);
 static double series_change(const series *s, int i, double t);
 
 /* Compute the rotation matrix among the states of the table at time t of a motion. */
@@ -30,6 +32,16 @@ static void beside_nose(const double row_1[3], const double row_2[3], double hor
         horizontal[0] += BESIDE_NOSE[i] * row_1[i];
         horizontal[1] += BESIDE_NOSE[i] * row_2[i];
     }
+}
+
+/* Return the heading that counts turns, which differs from `near` by at most half a turn. It is that of a direction beside the
+ * nose. */
+static double model_heading(const double at[], double near)
+{
+    double y[N_SERIES], horizontal[2];
+    model_rotation(at, y);
+    beside_nose(&y[Y_R_11], &y[Y_R_21], horizontal);
+    return unwrapped(atan2(horizontal[1], horizontal[0]), near);
 }
 
 /* Follow the attitude from time 0 to `end`. Per unit of time, the vehicle turns by at most `turn`, and the direction beside the

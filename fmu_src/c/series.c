@@ -96,6 +96,16 @@ INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int 
         }                                                \
     }
 
+#if HAS_ATTITUDE
+#include "heading.c"
+#else
+/* Without roll and pitch, the heading is a state that counts turns itself. */
+static double model_heading(const double at[], double near)
+{
+    (void)at;
+    return near;
+}
+#endif
 #include "equation.h"
 
 /* The largest last two coefficients of a series of order n that may be used, relative to the size of the state. They are the

@@ -264,13 +264,15 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
     return false;
 }
 
+#include "coast.c"
+
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
 static bool motion_coasts(motion *m, double rest, double state[N_STATES], double *heading)
 {
     if (m->settled != (UINT64_C(1) << N_DYNAMIC) - 1U) {
         return false;
     }
-    model_coast(m->n, &m->q, rest, m->y, m->displacement, state, heading);
+    motion_coast(m, rest, state, heading);
     return true;
 }
 
@@ -322,9 +324,9 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         if (reach < 1.0 || !series_keeps_directions(&s)) {
             reversed = series_cut(&s, &length);
         }
-        if (HAS_ATTITUDE) {
-            attitude_after_piece(&s, length, state, heading);
-        }
+#if HAS_ATTITUDE
+        attitude_after_piece(&s, length, state, heading);
+#endif
         if (length == 1.0) { /* with a constant, the compiler leaves out the multiplications */
             motion_move(&m, &s, 1.0, change);
         } else {
@@ -336,9 +338,9 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         for (int i = 0; i < N_USED; i++) {
             m.scale[i] *= 0.25;
         }
-        if (HAS_LAG) {
-            model_arrive(at, n, &m.q, m.y, m.scale);
-        }
+#if HAS_LAG
+        model_arrive(at, n, &m.q, m.y, m.scale);
+#endif
         if (length * s.unit >= rest) {
             break;
         }

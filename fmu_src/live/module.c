@@ -61,17 +61,9 @@ int step(double h)
     return done;
 }
 
-/* Compute thrust and derivatives, and V_ss and Tau of each axis alone under the current inputs, once the thrust is steady.
- * C = B V + A V^2 gives V_ss; Tau (17) is the time from rest to p V, p = 1 - 1/e. */
+/* Compute thrust and derivatives, and V_ss and Tau of each axis alone under the current inputs, once the thrust is steady. */
 void observe(void)
 {
-    double C[N_MONITORED], A[N_MONITORED], B[N_MONITORED];
     model_calculate(at, &numbers, heading);
-    model_alone(at, &numbers, C, A, B);
-    for (int a = 0; a < N_MONITORED; a++) {
-        const double force = fabs(C[a]), p = -expm1(-1.0);
-        const double D = sqrt(B[a] * B[a] + 4.0 * A[a] * force), V = 2.0 * force / (B[a] + D);
-        marks[a][0] = force == 0.0 ? 0.0 : C[a] < 0.0 ? -V : V;
-        marks[a][1] = 2.0 * atanh(D * p * V / (2.0 * force - B[a] * p * V)) / D;
-    }
+    model_alone(at, &numbers, marks);
 }

@@ -23,6 +23,18 @@ from rov_fmu import __version__
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.templates import render
 from rov_fmu.model.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
+from rov_fmu.model.forces import (
+    COUPLING,
+    DEAD_BAND,
+    LIFT,
+    LINEAR,
+    LOAD,
+    QUADRATIC,
+    RESTORING,
+    THRUST,
+    WEIGHT,
+    effects_of,
+)
 from rov_fmu.model.layout import FAINT, Thruster, VehicleAxis
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -44,6 +56,10 @@ _PROPELLER = 1e-5, 0.05
 """The mass of a propeller's link relative to the vehicle, and its radius of inertia in m."""
 _COMMANDS = tuple(n / 4.0 for n in range(-4, 5))
 """The commands whose thrust the file lists."""
+
+
+_IN_GAZEBO = (THRUST, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING, DEAD_BAND)
+"""The effects that Gazebo or the sender of its thrust has, or that have notes of their own."""
 
 
 @dataclass(frozen=True)
@@ -176,9 +192,10 @@ def _net_weight(rov: Vehicle) -> float:
     """Return the load that acts downwards in the earth frame, N: weight less buoyancy, and F_0 of a level vehicle."""
     if not rov.layout.has(HEAVE):
         return 0.0
+    weight = rov["W"] - rov["B"] if rov.layout.restoring else 0.0
     if rov.layout.has_attitude:
-        return rov["W"] - rov["B"] if rov.layout.restoring else 0.0
-    return rov.load(rov.layout.kinds[HEAVE.name])
+        return weight
+    return weight + rov.coefficients.get(HEAVE.coefficient("F_0"), 0.0)
 
 
 def _gravity(rov: Vehicle) -> float:
@@ -385,14 +402,9 @@ def _notes_of_commands(rov: Vehicle) -> Iterator[str]:
     }
     has = [part for part, is_there in parts.items() if is_there]
     yield f"the Thruster plugin takes newtons, so these are left to the sender: {', '.join(has)}"
-    effects = {
-        "the lag of the thrust (T)": "T" in keys,
-        "the dead time (T_d)": layout.has_dead_time,
-        "the loss of thrust by the speed of advance (d)": "d" in keys,
-        "the fins": bool(layout.fins),
-    }
-    for effect in (effect for effect, is_there in effects.items() if is_there):
-        yield f"left out: {effect}"
+    for effect in effects_of(layout):
+        if effect not in _IN_GAZEBO:
+            yield f"left out: {effect.words}"
 
 
 def _notes_of_motion(rov: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:

@@ -7,10 +7,21 @@ from itertools import groupby
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
+from rov_fmu.model.alone import alone_formulas, closed_form
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
-from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
-from rov_fmu.model.expression import PYTHON, Expression, Name, Number, change_of, scaled, tangent, to_c, total, written
+from rov_fmu.model.expression import (
+    PYTHON,
+    Expression,
+    Name,
+    Number,
+    change_of,
+    directed,
+    tangent,
+    to_c,
+    total,
+    written,
+)
 from rov_fmu.model.layout import Layout
 
 
@@ -161,12 +172,13 @@ class EquationSource:
         known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, known.__getitem__)
 
-    def alone(self, velocity: str, *effects: str, sign: int = 1) -> str:
-        """Write the sum of the coefficients of some effects that an axis has while only it moves and all is level."""
-        level = [(entry(3, 3),)] if velocity == HEAVE.velocity else []
-        own = [(), (velocity,), (velocity, velocity), *level]
-        terms = [term for term in self.equation.rows[velocity] if term.effect in effects and term.factors in own]
-        return to_c(total(scaled(sign, term.coefficient) for term in terms), self._in_c.__getitem__)
+    def alone(self, velocity: str, number: int) -> list[str]:
+        """Return statements that compute V_ss and Tau of an axis alone."""
+        found = alone_formulas(self.layout, velocity)
+        C = Name("C")
+        drag = {key: directed(C, found[key], found[f"{key}_reverse"]) for key in "AB"}
+        formulas = {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
+        return _statements(formulas, {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}, self._in_c)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
@@ -379,12 +391,17 @@ def generated_sources(layout: Layout) -> dict[str, str]:
 
 def unused_sources(layout: Layout) -> list[str]:
     """Return the shared C files that a vehicle does not need."""
-    return [*([] if layout.has_attitude else ["heading.c"]), *([] if layout.has_dead_time else ["delay.c"])]
+    needed = {
+        "heading.c": layout.has_attitude,
+        "delay.c": layout.has_dead_time,
+        "lag.c": bool(layout.lagging),
+        "table.c": bool(equation_of(layout).tables),
+    }
+    return [name for name, is_needed in needed.items() if not is_needed]
 
 
 def sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    unused = unused_sources(layout)
-    names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused]
-    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in names}
+    names = {"series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"} - {*unused_sources(layout)}
+    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in sorted(names)}
     return generated_sources(layout) | shared

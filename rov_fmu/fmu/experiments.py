@@ -4,14 +4,16 @@ import posixpath
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from io import StringIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from lxml import etree
 
+from rov_fmu.io.csv_table import Series, finite, read_series
 from rov_fmu.io.messages import NO_FILE, FileError, shown
-from rov_fmu.io.time_series import Series, number, series
 
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
@@ -50,8 +52,18 @@ class _Member:
     fmu: Path
     path: str
 
+    def __str__(self) -> str:
+        return f"{self.fmu}: {self.path}"
+
     def error(self, reason: str) -> FileError:
-        return FileError(f"{self.fmu}: {self.path}: {reason}")
+        return FileError(f"{self}: {reason}")
+
+    def number(self, text: str, what: str) -> float:
+        """Return a text in this file as a finite number. Raises FileError, which says what it is the text of."""
+        try:
+            return finite(text)
+        except ValueError as error:
+            raise self.error(f"{what} = {shown(text)}: {error}") from error
 
     def resolve(self, source: str | None) -> "_Member":
         """Return the file to which a relative URI in this file leads."""
@@ -111,7 +123,7 @@ class ReferenceResults:
 
             def setting(key: str, fallback: float, given: Mapping[str, str] = given, name: str = name) -> float:
                 if key in given:
-                    return number(given[key], f"experiment {shown(name)}: {key}", member.error)
+                    return member.number(given[key], f"experiment {shown(name)}: {key}")
                 value: str | None = getattr(default, key, None)
                 return float(value) if value else fallback
 
@@ -143,26 +155,31 @@ class ReferenceResults:
         found = {}
         for element in self._xml(member, "ParameterSet").iter("{*}Parameter"):
             name, value = element.get("name", ""), next(iter(element), None)
-            variable = _variable(member, name, variables)
+            if not (variable := variables.get(name)):
+                raise member.error(f"the FMU has no variable {shown(name)}")
             if value is None or value.get("value") is None:
                 raise member.error(f"parameter {shown(name)}: has no value")
             if value.get("unit") not in (None, variable.unit):
                 raise member.error(f"parameter {shown(name)}: is in {value.get('unit')}, and not in {variable.unit}")
             found[name] = value.get("value")
             if variable.type not in ("String", "Boolean"):
-                number(found[name], f"parameter {shown(name)}", member.error)
+                member.number(found[name], f"parameter {shown(name)}")
         return found
 
     def _series(self, member: _Member, variables: Mapping[str, Any]) -> Series:
         """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
 
-        def check_column(name: str) -> None:
-            variable = _variable(member, name, variables)
+        def why_wrong(name: str) -> str | None:
+            if not (variable := variables.get(name)):
+                return "the FMU has no such variable"
             if variable.type in _NON_NUMERIC or getattr(variable, "dimensions", None):
-                raise member.error(f"column {shown(name)}: the variable is not a single number")
+                return "the variable is not a single number"
+            return None
 
         if member.path not in self._read_series:
-            self._read_series[member.path] = series(self._text(member), member.error, check_column)
+            self._read_series[member.path] = read_series(
+                str(member), why_wrong, partial(StringIO, self._text(member), newline="")
+            )
         return self._read_series[member.path]
 
     def _text(self, member: _Member) -> str:
@@ -190,9 +207,3 @@ class ReferenceResults:
 
 def _children(element: Any, name: str) -> list[Any]:
     return element.findall(f"{{*}}{name}")  # type: ignore[no-any-return]
-
-
-def _variable(member: _Member, name: str, variables: Mapping[str, Any]) -> Any:
-    if name not in variables:
-        raise member.error(f"the FMU has no variable {shown(name)}")
-    return variables[name]

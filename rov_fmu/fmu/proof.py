@@ -14,10 +14,10 @@ import numpy as np
 from rov_fmu.fmu.experiments import Experiment, ReferenceResults
 from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
+from rov_fmu.io.csv_table import Series
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
-from rov_fmu.io.time_series import Series
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
 """FMPy's name of each interface, by the name on the command line."""

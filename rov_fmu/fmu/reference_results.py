@@ -16,6 +16,7 @@ from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, 
 from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.equation import Term, equation_of
 from rov_fmu.model.expression import Name, compiled
+from rov_fmu.model.forces import COUPLING, LIFT, RESTORING, Effect
 from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -175,7 +176,7 @@ def _horizon(rov: Vehicle, inputs: Values) -> float:
         if form.axis.is_rotation and isfinite(V):
             rates.append(abs(V))
         if rov.layout.coupled and isfinite(V) and not rov.layout.has_attitude:
-            couplings = (abs(k) for _, k in _terms(rov, rov.layout.velocities, "coupling"))
+            couplings = (abs(k) for _, k in _terms(rov, rov.layout.velocities, COUPLING))
             rates.append(_COUPLING_FACTOR * sum(couplings) * abs(V))
     if rov.layout.has_attitude:
         rates.append(_coupling_rate(rov, inputs))
@@ -186,10 +187,10 @@ def _horizon(rov: Vehicle, inputs: Values) -> float:
 def _swings(rov: Vehicle) -> list[float]:
     """Return the angular frequencies of the oscillations by restoring forces (1/s)."""
     rotations = [form.axis.velocity for form in rov.layout.axes if form.axis.is_rotation]
-    return [sqrt(abs(k)) for _, k in _terms(rov, rotations, "restoring")]
+    return [sqrt(abs(k)) for _, k in _terms(rov, rotations, RESTORING)]
 
 
-def _terms(rov: Vehicle, velocities: Iterable[str], *effects: str) -> Iterator[tuple[Term, float]]:
+def _terms(rov: Vehicle, velocities: Iterable[str], *effects: Effect) -> Iterator[tuple[Term, float]]:
     """Yield the terms of some effects in the accelerations along axes, and the values of their coefficients."""
     rows = equation_of(rov.layout).rows
     for term in (term for v in velocities for term in rows[v]):
@@ -209,7 +210,7 @@ def _coupling_rate(rov: Vehicle, inputs: Values) -> float:
         size[v] = root[v] * abs(V) if isfinite(root[v] * V) else 0.0
     changes = []
     for v in rov.layout.velocities:
-        for term, value in _terms(rov, [v], "coupling", "lift"):
+        for term, value in _terms(rov, [v], COUPLING, LIFT):
             a, b = term.factors
             k = value * root[v] / (root[a] * root[b])
             changes += [k * size[a], k * size[b]]

@@ -21,8 +21,8 @@ from rov_fmu.identify.result import (
     Verdict,
     Word,
 )
+from rov_fmu.model.alone import AxisAlone
 from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.riccati import Riccati
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -228,7 +228,7 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle) -> tuple[Answer,
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 
-def _response(motion: Riccati) -> tuple[float, float, float]:
+def _response(motion: AxisAlone) -> tuple[float, float, float]:
     """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force."""
     V, Tau = motion.steady_velocity(), motion.time_constant()
     A, B = motion.drag(V)

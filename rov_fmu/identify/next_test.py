@@ -11,8 +11,8 @@ from rov_fmu.identify.assess import COMMANDS
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import NextTest
+from rov_fmu.model.alone import AxisAlone
 from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.riccati import Riccati
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -30,7 +30,7 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
     """Return the test that narrows the least certain steady velocity of an axis most; None without a log of it."""
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
 
-    def motion(z: Array, command: float) -> Riccati:
+    def motion(z: Array, command: float) -> AxisAlone:
         table = posterior.table
         rov = Vehicle(table.layout, table.coefficients(z.tolist()))
         return table.shapes(z.tolist()).motion(rov, axis, command)
@@ -69,7 +69,7 @@ def _widths(slopes: Array, covariance: Array) -> Array:
     return np.asarray(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)))
 
 
-def _hold(motions: Sequence[Riccati], axis: Axis, limits: TankLimits) -> float:
+def _hold(motions: Sequence[AxisAlone], axis: Axis, limits: TankLimits) -> float:
     """Return how long a command can be held ahead and then astern within the tank, s.
 
     `motions` are those without thrust, ahead and astern.
@@ -81,7 +81,7 @@ def _hold(motions: Sequence[Riccati], axis: Axis, limits: TankLimits) -> float:
     return next((hold for hold in holds if _length(motions, hold) <= limits.tank_length), 0.0)
 
 
-def _length(motions: Sequence[Riccati], hold: float) -> float:
+def _length(motions: Sequence[AxisAlone], hold: float) -> float:
     """Return the length that a test and the coasting after it cover, m, by semi-implicit Euler steps."""
     rest, ahead, astern = motions
     v, place, places = 0.0, 0.0, [0.0]

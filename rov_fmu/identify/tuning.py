@@ -85,7 +85,7 @@ def tune(rov: Vehicle, axis: Axis, points: Sequence[Target]) -> Tuning:
 
 def _closed_form(rov: Vehicle, axis: Axis, points: Sequence[Target]) -> Vehicle:
     """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
-    if rov.loss(axis, rov.held_inputs(axis, 1.0)):
+    if rov.held(axis, 1.0).B != rov.held(axis, 0.0).B:
         raise TuningError(
             f"{axis.name}: its thrust decreases with the speed of advance. Tuning cannot take this into "
             "account: remove d"
@@ -114,7 +114,7 @@ def _with(rov: Vehicle, name: str, wanted: Sequence[float]) -> Vehicle:
 def _holding(rov: Vehicle, axis: Axis, V: float) -> float:
     """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
     plain, form = rov.replaced({axis.coefficient("beta"): 1.0}), rov.layout.kinds[axis.name]
-    return -plain.inertia(form) * plain.acceleration_of(form, 0.0).acceleration(V)
+    return -plain.effective_inertia(form) * plain.held(axis, 0.0).acceleration(V)
 
 
 def impossible(rov: Vehicle, axis: Axis, point: Target) -> str | None:
@@ -133,7 +133,7 @@ def impossible(rov: Vehicle, axis: Axis, point: Target) -> str | None:
         return None
     form, allowed = rov.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"
     if "F_0" in form.keys:
-        drift = rov.acceleration_of(form, 0.0).steady_velocity()
+        drift = rov.held(axis, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
     thrust = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
     return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {thrust}"

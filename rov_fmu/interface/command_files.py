@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.interface.arguments import TIME, Array
-from rov_fmu.io.csv_table import read_header
+from rov_fmu.io.csv_table import read_header, read_series
 from rov_fmu.io.messages import NO_FILE, FileError, lines_on, only, shown
-from rov_fmu.io.reading import read_text
-from rov_fmu.io.time_series import series
 from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.layout import Layout
 from rov_fmu.tank.clocks import held
@@ -53,14 +51,10 @@ def _is_plain(path: Path, rov_file: RovFile) -> bool:
 
 
 def _of_table(path: Path, layout: Layout) -> dict[str, Array]:
-    def error(reason: str) -> FileError:
-        return FileError(f"{path}: {reason}")
+    def why_wrong(name: str) -> str | None:
+        return None if name in layout.inputs else f"there is no such input{only(name, layout.inputs)}"
 
-    def check_column(name: str) -> None:
-        if name not in layout.inputs:
-            raise error(f"column {shown(name)}: there is no such input{only(name, layout.inputs)}")
-
-    (_, times), *columns = series(read_text(path), error, check_column).items()
+    (_, times), *columns = read_series(path, why_wrong).items()
     return {name: np.asarray(values) for name, values in [(TIME, times), *columns]}
 
 

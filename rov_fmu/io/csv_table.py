@@ -1,4 +1,8 @@
-"""Reading CSV files of numbers from spreadsheets and loggers; each mistake gives one line."""
+"""Reading CSV files of numbers from spreadsheets, loggers and FMUs; each mistake gives one line.
+
+`read_columns` reads tables whose headers have units, such as `command [%]`. `read_series` reads variables of an FMU
+over time, whose headers are names.
+"""
 
 import csv
 import re
@@ -7,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import islice
+from itertools import islice, zip_longest
 from math import isfinite, isnan, nan
 from pathlib import Path
 from types import MappingProxyType
@@ -19,6 +23,9 @@ from rov_fmu.io.reading import read_lines
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 """A number as a cell has it, with a decimal point."""
 _HEADER = re.compile(r"(?P<name>[^\[\]]+)\[(?P<unit>[^\[\]]+)\]")
+_UNIT = re.compile(r"\s\[[^\[\]]*\]$")
+_WORDS = {"true": 1.0, "false": 0.0}
+_NO_ROWS = "no rows below the header"
 _BLANKS = ("", "-", "nan")
 _MOST_COMPARED = 1000
 """The largest number of headers that are compared with all known names, which takes long."""
@@ -133,13 +140,10 @@ def read_columns(
     read, with the headers that are read, by column, and with all other headers; it returns the mistakes in them.
     `open_stream` opens the lines of a table that is not the text of the file itself.
     """
-    open_stream = open_stream or read_lines(path, UnreadableFileError, most=LARGEST)
-    separator = _separator(open_stream())
-    lines = _csv_lines(path, open_stream(), separator)
-    line, header = next(lines, (1, []))
-    if not header:
-        raise UnreadableFileError(f"{path}: the file is empty")
-    titles, header = header, [renamed.get(title, title) for title in header]
+    file = _CsvFile(path, open_stream)
+    lines = iter(file)
+    line, titles = next(lines)
+    header = [renamed.get(title, title) for title in titles]
     found = _find_columns(path, line, header, columns, others, hint)
     names = [column.name for column in found.values()]
     headers = {column.name: header[place] for place, column in found.items()}
@@ -147,22 +151,19 @@ def read_columns(
         raise DataFileError(*(f"{path}, line {line}: {reason}" for reason in reasons))
 
     def by_column(cells: list[str]) -> dict[str, str]:
-        texts = (_with_point(cells[place], separator) if place < len(cells) else "" for place in found)
+        texts = (cells[place] if place < len(cells) else "" for place in found)
         return dict(zip(names, texts, strict=True))
 
     def rows() -> Iterator[Mapping[str, str]]:
-        below = islice(_csv_lines(path, open_stream(), separator), 1, None)
-        return (by_column(cells) for _, cells in below if len(cells) <= len(header))
+        return (by_column(cells) for _, cells in islice(file, 1, None) if len(cells) <= len(header))
 
     values = {name: array("d") for name in names}
     row_lines = array("L")
     unread = {name: array("L") for name in names}
-    torn, wrong = _Mistakes(), _Mistakes()
+    torn, wrong = _Mistakes(path), _Mistakes(path)
     for line, cells in lines:
         if len(cells) > len(header):
-            place_and_value = f"line {line}, column {len(header) + 1} = {shown(cells[len(header)])}"
-            mistake = f"{path}, {place_and_value}: there is no such column{_comma_hint(cells, separator)}"
-            (torn if loose else wrong).add(mistake)
+            (torn if loose else wrong).add(file.too_many(line, cells, len(header)))
             continue
         row_lines.append(line)
         for (place, column), cell in zip(found.items(), by_column(cells).values(), strict=True):
@@ -177,29 +178,80 @@ def read_columns(
                 unread[column.name].append(len(row_lines) - 1)
     if torn.count > len(row_lines):
         wrong.add(torn.first[0])
-    if wrong.count:
-        if more := wrong.count - len(wrong.first):
-            wrong.first.append(f"{path}: {more} more")
-        raise DataFileError(*wrong.first)
+    wrong.check()
     if not row_lines:
-        raise DataFileError(f"{path}, line {line}: no rows below the header")
+        raise DataFileError(f"{path}, line {line}: {_NO_ROWS}")
     units = {column.name: column.unit for column in found.values()}
     return Columns(path, titles, headers, units, values, row_lines, unread, torn.count, rows)
 
 
 def read_header(path: Path, open_stream: Callable[[], TextIO] | None = None) -> list[str]:
     """Return the cells of the first line that is not blank. Raises DataFileError."""
-    open_stream = open_stream or read_lines(path, UnreadableFileError, most=LARGEST)
-    _, header = next(_csv_lines(path, open_stream(), _separator(open_stream())), (1, []))
-    if not header:
-        raise UnreadableFileError(f"{path}: the file is empty")
-    return header
+    return next(iter(_CsvFile(path, open_stream)))[1]
+
+
+class Series(dict[str, "array[float]"]):
+    """Variables over time by their names; the first is the time."""
+
+    lines: Sequence[int] = ()
+    """The line of the file on which each row is."""
+
+
+def read_series(
+    path: Path | str, why_wrong: Callable[[str], str | None], open_stream: Callable[[], TextIO] | None = None
+) -> Series:
+    """Read variables over time: the first column is the time, which may stay but not go back, the others are variables.
+
+    `why_wrong` returns what is wrong with the name of a variable, or None. Names have no units. Each cell must be a
+    finite number, true or false. Raises DataFileError with all mistakes. `open_stream` opens the lines if `path` is not
+    the file itself, but words for its place in an archive.
+    """
+    file = _CsvFile(path, open_stream)
+    lines = iter(file)
+    line, header = next(lines)
+    if all(NUMBER.fullmatch(name) for name in header):
+        words = "the first line must be a header that names the columns: the time, and then variables"
+        raise DataFileError(f"{path}: {words}")
+    wrong = _Mistakes(path)
+    for place, name in enumerate(header):
+        if reason := _why_no_variable(header, place, why_wrong):
+            wrong.add(f"{path}, line {line}, column {shown(name)}: {reason}")
+    wrong.check()
+    series, numbers = Series({name: array("d") for name in header}), array("L")
+    for line, cells in lines:
+        numbers.append(line)
+        if len(cells) > len(header):
+            wrong.add(file.too_many(line, cells, len(header)))
+            continue
+        for name, cell in zip_longest(header, cells, fillvalue=""):
+            try:
+                series[name].append(finite(cell))
+            except ValueError as error:
+                wrong.add(f"{path}, line {line}, column {shown(name)} = {shown(cell)}: {error}")
+    wrong.check()
+    times = series[header[0]]
+    for line, before, time in zip(numbers[1:], times, times[1:], strict=False):
+        if time < before:
+            raise DataFileError(f"{path}, line {line}: the time goes back")
+    if not numbers or len(header) < 2:
+        raise DataFileError(f"{path}: {'no columns beside the time' if numbers else _NO_ROWS}")
+    series.lines = numbers
+    return series
+
+
+def finite(text: str) -> float:
+    """Return a text as a finite number; true is 1 and false is 0. Raises ValueError with only the reason."""
+    number = _WORDS.get(text.strip().lower(), _number(text.strip()))
+    if number is None:
+        raise ValueError("must be a finite number")
+    return number
 
 
 class _Mistakes:
     """The first mistakes in a file, and the number of all mistakes."""
 
-    def __init__(self) -> None:
+    def __init__(self, path: Path | str) -> None:
+        self._path = path
         self.first: list[str] = []
         self.count = 0
 
@@ -209,45 +261,59 @@ class _Mistakes:
         if self.count <= MOST:
             self.first.append(line)
 
+    def check(self) -> None:
+        """Raise DataFileError if there are mistakes."""
+        if more := self.count - len(self.first):
+            self.first.append(f"{self._path}: {more} more")
+        if self.first:
+            raise DataFileError(*self.first)
+
 
 # ---- Cells -----------------------------------------------------------------------------------------------------------
 
 
-def _separator(lines: Iterable[str]) -> str:
-    """Return the separator of the cells: the one of comma, semicolon and tab that is most frequent in the header."""
-    header = next(filter(str.strip, lines), "")
-    return max(",;\t", key=header.count)
+class _CsvFile:
+    """The lines of a CSV file that are not blank, each with its number and its cells."""
 
+    def __init__(self, path: Path | str, open_stream: Callable[[], TextIO] | None) -> None:
+        self._path = path
+        self._open = open_stream or read_lines(Path(path), UnreadableFileError, most=LARGEST)
+        header = next(filter(str.strip, self._open()), "")
+        self._separator = max(",;\t", key=header.count)
+        """The one of comma, semicolon and tab that is most frequent in the header."""
 
-def _csv_lines(path: Path, lines: Iterable[str], separator: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and the cells of every line that is not blank.
+    def __iter__(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield the lines. They are not kept, because their cells take much memory. Raises DataFileError.
 
-    Empty cells at the end of a line are dropped if the header has no such column.
-    """
-    reader = csv.reader(lines, delimiter=separator, strict=True)
-    width = 0
-    try:
-        for row in reader:
-            cells = [cell.strip() for cell in row]
-            if any(cells):
-                while len(cells) > width and not cells[-1]:
-                    cells.pop()
-                width = width or len(cells)
-                yield reader.line_num, cells
-    except csv.Error as error:
-        raise DataFileError(f"{path}, line {reader.line_num}: {error}") from error
+        Numbers have decimal points, and empty cells at the end of a line are dropped if the header has no such column.
+        """
+        reader = csv.reader(self._open(), delimiter=self._separator, strict=True)
+        width = 0
+        try:
+            for row in reader:
+                cells = [self._with_point(cell.strip()) for cell in row]
+                if any(cells):
+                    while len(cells) > width and not cells[-1]:
+                        cells.pop()
+                    width = width or len(cells)
+                    yield reader.line_num, cells
+        except csv.Error as error:
+            raise DataFileError(f"{self._path}, line {reader.line_num}: not CSV: {error}") from error
+        if not width:
+            raise UnreadableFileError(f"{self._path}: the file is empty")
 
+    def too_many(self, line: int, cells: Sequence[str], most: int) -> str:
+        """Return the line about a row with more cells than the header has."""
+        commas = self._separator == "," and all(NUMBER.fullmatch(cell) for cell in cells)
+        hint = " (are these decimal commas? They need ; between the columns)" if commas else ""
+        return f"{self._path}, line {line}, column {most + 1} = {shown(cells[most])}: there is no such column{hint}"
 
-def _with_point(text: str, separator: str) -> str:
-    """Return a number with a decimal point instead of a comma, unless commas separate the cells."""
-    with_point = text.replace(",", ".", 1)
-    return with_point if separator != "," and NUMBER.fullmatch(with_point) else text
-
-
-def _comma_hint(cells: list[str], separator: str) -> str:
-    """Return a hint at decimal commas for a row with too many cells, or an empty text."""
-    commas = separator == "," and all(NUMBER.fullmatch(cell) for cell in cells)
-    return " (are these decimal commas? They need ; between the columns)" if commas else ""
+    def _with_point(self, text: str) -> str:
+        """Return a number with a decimal point instead of a comma, unless commas separate the cells."""
+        if self._separator == "," or "," not in text:
+            return text
+        with_point = text.replace(",", ".", 1)
+        return with_point if NUMBER.fullmatch(with_point) else text
 
 
 def _is_blank(text: str) -> bool:
@@ -297,6 +363,16 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
         least = column.least * abs(factor)
         raise ValueError(f"must be 0, or {least:g} at least, or {-least:g} at most")
     return value
+
+
+def _why_no_variable(header: Sequence[str], place: int, why_wrong: Callable[[str], str | None]) -> str | None:
+    """Return what is wrong with a name above a column of variables over time, or None."""
+    name = header[place]
+    if name in header[:place]:
+        return "this column occurs twice"
+    if place and _UNIT.search(name):
+        return f"must be {shown(_UNIT.sub('', name))} without a unit; a command of 30 % is 0.3 here"
+    return why_wrong(name) if place else None
 
 
 # ---- Headers ---------------------------------------------------------------------------------------------------------

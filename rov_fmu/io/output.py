@@ -6,7 +6,7 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -62,28 +62,6 @@ def _check_folder(path: Path) -> None:
         }
         reason = reasons.get(error.errno or 0, f"no new file can be made in the folder {path.parent}: {error.strerror}")
         raise WriteError(error.errno, reason, str(path)) from error
-
-
-@contextmanager
-def folder_made(path: Path) -> Iterator[None]:
-    """Create a folder and its parents where they do not exist; those that are empty after the block are removed again.
-
-    Raises WriteError if the path is a file, or if the folder cannot be created.
-    """
-    if path.exists() and not path.is_dir():
-        raise WriteError(errno.ENOTDIR, "is a file, not a folder", str(path))
-    new = [folder for folder in (path, *path.parents) if not folder.exists()]
-    with ExitStack() as created:
-        with _errors_about(path), UNINTERRUPTED:
-            for folder in reversed(new):
-                folder.mkdir()
-                created.enter_context(cleaned_up(partial(_remove_if_empty, folder)))
-        yield
-
-
-def _remove_if_empty(folder: Path) -> None:
-    with suppress(OSError):
-        folder.rmdir()
 
 
 def write_whole(*outputs: Output) -> None:

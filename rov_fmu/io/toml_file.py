@@ -3,11 +3,13 @@
 import json
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, create_model
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from rov_fmu.io.file_kinds import check_keys
@@ -121,9 +123,6 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
     A mistake that several entries of a list of tables repeat gives one line. After the first ten the lines are empty,
     because it takes long to find the most similar key for many unknown ones.
     """
-    if not problems:  # making the JSON schema takes long
-        return
-    schema = _Schema(model)
     unknown: dict[_Place, list[_Place]] = {}  # the places of the unknown keys of each table
     for problem in problems:
         if problem["type"] == "extra_forbidden":
@@ -136,12 +135,12 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
         if number == MOST:
             yield ""
             continue
-        real = [p for p in some[:_COMPARED] if not _is_misspelt(p, unknown.get(p["loc"][:-1], ()), schema)]
+        real = [p for p in some[:_COMPARED] if not _is_misspelt(p, unknown.get(p["loc"][:-1], ()), model)]
         if real:
             number += 1
             others = len(real) - 1 + len(some[_COMPARED:])
             more = f" (and in {others} more {'entry' if others == 1 else 'entries'})" if others else ""
-            yield _problem_line(real[0], data, schema, model.hint) + more
+            yield _problem_line(real[0], data, model) + more
 
 
 def join_names(names: Iterable[str]) -> str:
@@ -163,55 +162,54 @@ def entry_label(table: str, entries: Sequence[Any], number: int) -> str:
     return f"{table}.{name or repr('')}" if is_unique else f"{table}#{number + 1}"
 
 
-class _Schema:
-    """The JSON schema of a model, searched by places in the file."""
-
-    def __init__(self, model: type[Strict]) -> None:
-        self._schema = model.model_json_schema()
-
-    def at(self, place: _Place) -> dict[str, Any]:
-        """Return the JSON schema of a place, or an empty one if there is none."""
-        found = self._schema
-        for step in place:
-            specific = found.get("items") if isinstance(step, int) else found.get("properties", {}).get(step)
-            general = [found.get("additionalProperties"), *found.get("patternProperties", {}).values()]
-            found = self._resolved(next((inner for inner in (specific, *general) if isinstance(inner, dict)), {}))
-        return found
-
-    def keys(self, place: _Place) -> list[str]:
-        """Return the keys that the table at a place may have."""
-        return [*self.at(place).get("properties", ())]
-
-    def nearest(self, place: _Place) -> str | None:
-        """Return the allowed key that is most similar to an unknown one."""
-        return next(iter(similar(str(place[-1]), self.keys(place[:-1]))), None)
-
-    def syntax(self, place: _Place) -> str:
-        """Return how to write the table, or the list of tables, at a place."""
-        here = self.at(place)
-        key = brief(".".join(str(step) for step in place if isinstance(step, str)))
-        if here.get("type") == "array" or isinstance(place[-1], int):
-            return f"a list of tables: write [[{key}]]"
-        if "value" not in here.get("properties", ()):
-            return f"a table: write [{key}]"
-        constants = {name: _constant(self.at((*place, name))) for name in here["required"]}
-        pairs = (f"{name} = {json.dumps(value) if value else '...'}" for name, value in constants.items())
-        return f"{{ {', '.join(pairs)} }}"
-
-    def _resolved(self, schema: dict[str, Any]) -> dict[str, Any]:
-        """Return a schema without references, and without null, which TOML does not have."""
-        for choice in (*schema.get("allOf", ()), *schema.get("anyOf", ())):
-            if choice != {"type": "null"}:
-                return self._resolved(choice)
-        if "$ref" in schema:
-            return self._resolved(self._schema["$defs"][schema["$ref"].removeprefix("#/$defs/")])
-        return schema
+def _declared(model: type[Strict], place: _Place) -> Any:
+    """Return the type that a model declares for a place in the file, such as a table, a list or a Literal."""
+    kind: Any = model
+    for step in place:
+        if _is_table(kind):
+            field = _fields(kind).get(str(step))
+            others = kind.__annotations__.get("__pydantic_extra__", dict[str, Any])
+            kind = field.annotation if field else get_args(others)[1]
+        elif inside := get_args(kind):
+            kind = inside[1] if get_origin(kind) is dict else inside[0]
+        while get_origin(kind) in (Annotated, Union, UnionType):
+            kind = next(choice for choice in get_args(kind) if choice is not NoneType)
+    return kind
 
 
-def _constant(schema: dict[str, Any]) -> Any:
+def _is_table(kind: Any) -> bool:
+    """Return True for a type whose keys are declared."""
+    return isinstance(kind, type) and issubclass(kind, Strict)
+
+
+def _fields(kind: Any) -> dict[str, FieldInfo]:
+    """Return the keys of a table as the file has them; none if the type is no table."""
+    fields = kind.model_fields if _is_table(kind) else {}
+    return {field.alias or name: field for name, field in fields.items()}
+
+
+def _choices(kind: Any) -> tuple[Any, ...]:
+    """Return the values that a key may have, if they are listed."""
+    return get_args(kind) if get_origin(kind) is Literal else ()
+
+
+def _constant(kind: Any) -> Any:
     """Return the only value that a key may have, or None if it may have several."""
-    allowed = schema.get("enum", [schema.get("const")])
-    return allowed[0] if len(allowed) == 1 else None
+    return _choices(kind)[0] if len(_choices(kind)) == 1 else None
+
+
+def _syntax(model: type[Strict], place: _Place) -> str:
+    """Return how to write the table, or the list of tables, at a place."""
+    kind = _declared(model, place)
+    key = brief(".".join(str(step) for step in place if isinstance(step, str)))
+    if get_origin(kind) in (list, tuple) or isinstance(place[-1], int):
+        return f"a list of tables: write [[{key}]]"
+    if "value" not in _fields(kind):
+        return f"a table: write [{key}]"
+    needed = (name for name, field in _fields(kind).items() if field.is_required())
+    constants = {name: _constant(_declared(kind, (name,))) for name in needed}
+    pairs = (f"{name} = {json.dumps(value) if value else '...'}" for name, value in constants.items())
+    return f"{{ {', '.join(pairs)} }}"
 
 
 def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
@@ -222,33 +220,36 @@ def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
     return problem["type"], key, *last, problem["msg"], value
 
 
-def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Place], schema: _Schema) -> bool:
+def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Place], model: type[Strict]) -> bool:
     """Return True when a key is missing, and one of the unknown keys of its table is probably this key, misspelt."""
-    key = problem["loc"][-1]
-    return problem["type"] == "missing" and any(schema.nearest(other) == key for other in unknown[:_COMPARED])
+    if problem["type"] != "missing" or not unknown:
+        return False
+    *above, key = problem["loc"]
+    allowed = _fields(_declared(model, tuple(above)))
+    return any(similar(str(place[-1]), allowed) == [key] for place in unknown[:_COMPARED])
 
 
-def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema, hint_of: Callable[[str], str]) -> str:
+def _problem_line(problem: ErrorDetails, data: Toml, model: type[Strict]) -> str:
     """Return the line for one problem."""
     place, value, kind = problem["loc"], problem["input"], problem["type"]
     key, is_table = brief(_key(place, data)), isinstance(value, dict)
     if kind == "missing" and isinstance(place[-1], int):  # pydantic reports each missing entry of a list
         place = place[:-1]
-        entries, number = shown(_value_at(place, data)), schema.at(place)["minItems"]
+        entries, number = shown(_value_at(place, data)), len(get_args(_declared(model, place)))
         return f"{brief(_key(place, data))} = {entries}: must have {number} entries"
     if kind == "missing":
-        constant = _constant(schema.at(place))
+        constant = _constant(_declared(model, place))
         return f"{key}: this key is missing" + (f": write {place[-1]} = {json.dumps(constant)}" if constant else "")
     if kind == "extra_forbidden":
-        if hint := hint_of(str(place[-1])):
+        if hint := model.hint(str(place[-1])):
             return f"{key}: there is no such key{hint}"
-        allowed = schema.keys(place[:-1])
+        allowed = _fields(_declared(model, place[:-1]))
         hint = did_you_mean(str(place[-1]), allowed)
         known = hint if hint and len(allowed) > _LISTED else only(str(place[-1]), allowed, join_names(allowed))
         return f"{key}: there is no such key{known}"
-    reason = _reason(problem, schema)
+    reason, declared = _reason(problem, model), _declared(model, place)
     *above, last = place
-    if isinstance(last, int) and not is_table and schema.at(place).get("type") != "object":  # show the whole list
+    if isinstance(last, int) and not (is_table or _is_table(declared)):  # show the whole list
         place, reason = tuple(above), f"entry {last + 1} {reason}"
         value = _value_at(place, data)
         key = brief(_key(place, data))
@@ -257,16 +258,13 @@ def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema, hint_of: C
     return f"{key} = {shown([*value] if isinstance(value, tuple) else value)}: {reason}"
 
 
-def _reason(problem: ErrorDetails, schema: _Schema) -> str:
+def _reason(problem: ErrorDetails, model: type[Strict]) -> str:
     """Return what is allowed where the problem is."""
     kind, place = problem["type"], problem["loc"]
-    here = schema.at(place)
-    if kind in ("model_type", "dict_type") or (kind == "list_type" and schema.keys((*place, 0))):
-        return f"must be {schema.syntax(place)}"
-    if kind in ("greater_than_equal", "less_than_equal") and "minimum" in here and "maximum" in here:
-        return f"must be within {here['minimum']:g} ... {here['maximum']:g}"
+    if kind in ("model_type", "dict_type") or (kind == "list_type" and _is_table(_declared(model, (*place, 0)))):
+        return f"must be {_syntax(model, place)}"
     if kind == "literal_error":
-        choices = [choice for choice in here.get("enum", ()) if isinstance(choice, str)]
+        choices = map(str, _choices(_declared(model, place)))
         return problem["msg"].replace("Input should", "must") + did_you_mean(str(problem["input"]), choices)
     if kind == "float_type" and type(problem["input"]) is int:
         return "must be a number of at most 308 digits"

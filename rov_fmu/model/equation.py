@@ -6,19 +6,18 @@ Between reversals, and while the inputs are held, the motion is a quadratic syst
 
 `equation_of` derives this table from the layout of a vehicle: the states y, the terms in the rate of each state, and a
 formula for each coefficient. `step.py` computes a step from it in Python, and the C code is generated from it. A new
-effect is a new term with its formula. If the term contains a state that no other term contains, that state also needs
-an entry in `starts`, and its row must come before those of the states that no term contains.
+effect is a new force (forces.py).
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
-from .catalogue import HEAVE, SURGE, SWAY, YAW, Axis, cross_name
+from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
 from .expression import Expression, Name, Names, call, directed, of, product, scaled, total
-from .forces import Force, forces_of
-from .layout import Curve, Layout, ThrustTable, VehicleAxis
+from .forces import COUPLING, Effect, Force, forces_of, thrusts
+from .layout import Layout, ThrustTable
 from .mass import MassMatrix
 from .thrust import steady_name, thrust_formulas
 
@@ -30,8 +29,8 @@ class Term:
     coefficient: Expression
     factors: tuple[str, ...] = ()
     """The states that are multiplied with the coefficient."""
-    effect: str = ""
-    """The name of the effect of a force, as in forces.py, or "coupling"."""
+    effect: Effect | None = None
+    """The effect of the force that the term belongs to; None for a term of the kinematics or of a lag."""
 
     @property
     def formula(self) -> Expression:
@@ -78,11 +77,11 @@ class Equation:
     starts: Mapping[str, Expression]
     """Formulas from the states of the vehicle to the states of the table at the start of a step, and `square_length`,
     which some of them use. States without a formula start at 0. These are the integrals, which no term contains, and
-    the progress of the lags. A state that a term contains must have a formula."""
+    the arrived fractions of the lags. A state that a term contains must have a formula."""
     lags: Mapping[str, Mapping[str, str]]
-    """For the progress of each lag: the forces that lag, each with the name of the steady thrust that it approaches.
+    """For the arrived fraction of each lag: the forces that lag, each with the steady thrust that it approaches.
 
-    The progress p rises from 0 towards 1 during a piece of a step, and each force is then F + (steady - F) p."""
+    The arrived fraction p rises from 0 towards 1 during a piece of a step. Each force is then F + (steady - F) p."""
 
     outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas."""
@@ -108,10 +107,10 @@ class Equation:
         """For each force that lags: the formulas of its rate, and of its value after a piece of a step."""
         return {
             force: (
-                self.rows[progress][0].coefficient * (Name(steady) - Name(force)),
-                Name(force) + (Name(steady) - Name(force)) * Name(progress),
+                self.rows[arrived][0].coefficient * (Name(steady) - Name(force)),
+                Name(force) + (Name(steady) - Name(force)) * Name(arrived),
             )
-            for progress, forces in self.lags.items()
+            for arrived, forces in self.lags.items()
             for force, steady in forces.items()
         }
 
@@ -126,7 +125,7 @@ class Equation:
     def used(self) -> frozenset[str]:
         """The states that a term contains, and the orientation. The other states are integrals of these.
 
-        In `rows`, the used states must come first, because the C code knows only their number.
+        In `rows`, the used states come first, because the C code knows only their number.
         """
         return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
 
@@ -200,7 +199,7 @@ class Equation:
         return found
 
     def _is_lag(self, term: Term) -> bool:
-        """Return True for a term that contains the progress of a lag. Such a term is 0 at the start of a piece."""
+        """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
         return not self.lags.keys().isdisjoint(term.factors)
 
     @cached_property
@@ -226,89 +225,162 @@ def equation_of(layout: Layout) -> Equation:
     if len(tables) < len(measured):
         raise ValueError("two thrust tables have the same name")
     by_attitude = rotation_formulas() | quaternion_formulas() if layout.has_attitude else {}
-    names = Names([*layout.places, *by_attitude])
-    mass = mass_matrix(layout, names)
-    parameters = _parameters(layout, mass, names)
-    by_direction: dict[str, Directed] = {}
-    held = _held_forces(layout, mass, names)
-    rows: dict[str, tuple[Term, ...]] = {}
-    for v in layout.velocities:
-        terms = [Term(names("held", v))]
-        terms += [
-            Term(names("remaining", v, curve), (names("progress", curve).identifier,))
-            for curve in _lagging(layout, mass, v)
-        ]
-        for name, forces in _accelerations(layout, mass, v, names).items():
-            first = forces[0][1]
-            ahead, astern = (total(f.along(one, reverse=reverse) for one, f in forces) for reverse in (False, True))
-            coefficient: Expression = name
-            if first.velocity and first.is_held:
-                held[name.identifier] = ahead
-                direction = names("direction", first.velocity)
-                by_direction[direction.identifier] = Directed(first.velocity, ONE, -ONE)
-                coefficient = direction * name
-            elif first.velocity:
-                by_direction[name.identifier] = Directed(first.velocity, ahead, astern)
-            else:
-                (held if first.is_held else parameters)[name.identifier] = ahead
-            terms.append(Term(coefficient, first.factors, first.effect))
-        coriolis = mass.coriolis(v) if layout.coupled else {}
-        for factors, formula in coriolis.items():
-            name = names("coupling", v, *([] if len(coriolis) == 1 else ["".join(factors)]))
-            parameters[name.identifier] = formula
-            terms.append(Term(name, factors, "coupling"))
-        rows[v] = tuple(terms)
+    table = _Table(layout, Names([*layout.places, *by_attitude]))
+    rows = {v: table.motion(v) for v in layout.velocities}
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
-    lags: dict[str, dict[str, str]] = {}
-    for curve in layout.curves:
-        if curve.has_lag:
-            progress, rate = names("progress", curve.name).identifier, names("rate", curve.name)
-            rows[progress] = (Term(rate), Term(-rate, (progress,)))
-            own = [t.name for t in layout.thrusters if t.curve == curve.name]
-            lags[progress] = {f"F_{name}": steady_name(name, curve, names).identifier for name in own}
-    rows |= attitude
-    rows |= _kinematics(layout, names)
-    starts: dict[str, Expression] = {v: Name(v) for v in layout.velocities}
+    rows |= table.lags() | attitude | table.pose()
+    used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
+    starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
     if "cos_psi" in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     if layout.has_attitude:
         starts |= rotation_formulas()
     return Equation(
-        parameters,
-        by_direction,
-        thrust_formulas(layout, names),
-        held,
-        rows,
+        table.parameters,
+        table.directed,
+        thrust_formulas(layout, table.names),
+        table.forces,
+        {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
-        lags,
+        {
+            table.names("arrived", curve.name).identifier: {
+                f"F_{t.name}": steady_name(t.name, curve, table.names).identifier
+                for t in layout.thrusters
+                if t.curve == curve.name
+            }
+            for curve in layout.curves
+            if curve.has_lag
+        },
         outputs=angle_formulas() if layout.has_attitude else {},
         ends=quaternion_formulas() if layout.has_attitude else {},
         tables=tables,
-        names=names,
+        names=table.names,
     )
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
 
 
-def _accelerations(layout: Layout, mass: MassMatrix, axis: str, names: Names) -> dict[Name, list[tuple[Name, Force]]]:
-    """Return the forces that accelerate an axis, by the names of their coefficients, each with its inverse mass.
+class _Table:
+    """The rows of the table of terms, and the formulas of their coefficients, which each row adds."""
 
-    A force along another axis accelerates this one through the inverse of the mass matrix. Forces with the same effect
-    and the same factors are added. They must agree in `velocity` and `is_held`.
-    """
-    inverse = mass.inverse(axis)
-    found: dict[Name, list[tuple[Name, Force]]] = {}
-    for force in forces_of(layout, names):
-        if force.axis in inverse:
-            others = dict.fromkeys(factor for factor in force.factors if factor != axis or force.effect not in _DRAG)
-            found.setdefault(names(force.effect, axis, *others), []).append((inverse[force.axis], force))
-    return found
+    def __init__(self, layout: Layout, names: Names) -> None:
+        self.layout, self.names = layout, names
+        self._mass = mass_matrix(layout, names)
+        self._declared = [*forces_of(layout, names)]
+        self.parameters = _parameters(layout, self._mass, names)
+        self.directed: dict[str, Directed] = {}
+        self.forces: dict[str, Expression] = {
+            f"tau_{curve.name}": total(thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves
+        }
 
+    def _is_constant(self, formula: Expression) -> bool:
+        """Return True for a formula of coefficients alone."""
+        return formula.names <= self.layout.coefficients.keys() | self.parameters.keys()
 
-_DRAG = ("linear", "quadratic")
+    def _named(self, formula: Expression, kind: str, *owners: str) -> Name:
+        """Return a name for a formula, which becomes one of `parameters` or of `forces`."""
+        name = self.names(kind, *owners)
+        (self.parameters if self._is_constant(formula) else self.forces)[name.identifier] = formula
+        return name
+
+    def motion(self, v: str) -> tuple[Term, ...]:
+        """Return the terms of the acceleration of an axis, (18).
+
+        A force along another axis accelerates this one through the inverse of the mass matrix.
+        """
+        inverse = self._mass.inverse(v)
+        loads: dict[str, list[Expression]] = {other: [] for other in inverse}
+        alike: dict[tuple[Effect, tuple[str, ...]], list[Force]] = {}
+        for force in (force for force in self._declared if force.axis in inverse):
+            if force.factors:
+                alike.setdefault((force.effect, force.factors), []).append(force)
+            else:
+                loads[force.axis].append(force.formula)
+        constant = total(gain * total(loads[other]) for other, gain in inverse.items())
+        coriolis = self._mass.coriolis(v) if self.layout.coupled else {}
+        return (
+            Term(self._named(constant, "constant", v)),
+            *self._arriving(v, inverse),
+            *(self._term(v, forces, inverse) for forces in alike.values()),
+            *(
+                Term(
+                    self._named(formula, "coupling", v, *([] if len(coriolis) == 1 else ["".join(pair)])),
+                    pair,
+                    COUPLING,
+                )
+                for pair, formula in coriolis.items()
+            ),
+        )
+
+    def _arriving(self, v: str, inverse: Mapping[str, Name]) -> Iterator[Term]:
+        """Yield, for each lag, the change of acceleration until the thrust is steady."""
+        for curve in (curve for curve in self.layout.curves if curve.has_lag):
+            changes = []
+            for other, gain in inverse.items():
+                axis = self.layout.by_velocity[other].axis
+                if arriving := thrusts(self.layout, axis, self.names, curve, arriving=True):
+                    changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
+            if changes:
+                change = self._named(total(changes), "arriving", v, curve.name)
+                yield Term(change, (self.names("arrived", curve.name).identifier,))
+
+    def _term(self, v: str, forces: Sequence[Force], inverse: Mapping[str, Name]) -> Term:
+        """Return the sum of forces with one effect and equal factors. They must agree in `velocity`."""
+        first = forces[0]
+        ahead, astern = (
+            total(force.along(inverse[force.axis], reverse=reverse) for force in forces) for reverse in (False, True)
+        )
+        own = first.effect.name, v, *(() if set(first.factors) == {v} else dict.fromkeys(first.factors))
+        if not first.velocity:
+            coefficient: Expression = self._named(ahead, *own)
+        elif self._is_constant(ahead):
+            coefficient = self.names(*own)
+            self.directed[coefficient.identifier] = Directed(first.velocity, ahead, astern)
+        else:
+            direction = self.names("direction", first.velocity)
+            self.directed[direction.identifier] = Directed(first.velocity, ONE, -ONE)
+            coefficient = direction * self._named(ahead, *own)
+        return Term(coefficient, first.factors, first.effect)
+
+    def lags(self) -> dict[str, tuple[Term, ...]]:
+        """Return the rows of the arrived fractions, p' = (1 - p) / T."""
+        found: dict[str, tuple[Term, ...]] = {}
+        for curve in (curve for curve in self.layout.curves if curve.has_lag):
+            arrived, rate = self.names("arrived", curve.name).identifier, self.names("rate", curve.name)
+            found[arrived] = (Term(rate), Term(-rate, (arrived,)))
+        return found
+
+    def pose(self) -> dict[str, tuple[Term, ...]]:
+        """Return the rows of the pose, which follows from the velocities and a steady current.
+
+        A vehicle without yaw always heads north, so its cos_psi is 1 and its sin_psi is 0.
+        """
+        layout = self.layout
+        rows: dict[str, tuple[Term, ...]] = {}
+        rotation: list[tuple[str, str, Expression, tuple[str, ...]]]
+        if layout.has_attitude:
+            rotation = [(x, v, ONE, (entry(i, n),)) for i, x in enumerate("xyz", 1) for n, v in enumerate("uvw", 1)]
+        else:
+            rotation = [("x", "u", ONE, ()), ("y", "v", ONE, ()), ("z", "w", ONE, ())]
+            if layout.has(YAW) and "x" in layout.pose:
+                rows = {"cos_psi": (Term(-ONE, ("r", "sin_psi")),), "sin_psi": (Term(ONE, ("r", "cos_psi")),)}
+                rotation[:2] = [
+                    ("x", "u", ONE, ("cos_psi",)),
+                    ("x", "v", -ONE, ("sin_psi",)),
+                    ("y", "u", ONE, ("sin_psi",)),
+                    ("y", "v", ONE, ("cos_psi",)),
+                ]
+        for x, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
+            if x in layout.pose:
+                terms = [Term(self._named(Name(current), "constant", x))] if current in layout.inputs else []
+                own = [turned for turned in rotation if turned[0] == x and turned[1] in layout.velocities]
+                rows[x] = (*terms, *(Term(sign, (v, *entries)) for _, v, sign, entries in own))
+        if "psi" in layout.pose:
+            rows["psi"] = (Term(ONE, ("r",)),)
+        return rows
 
 
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
@@ -368,73 +440,6 @@ def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Exp
     return found
 
 
-def _held_forces(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
-    """Return formulas for the torque of every curve, (4), and for the held accelerations of every axis, (18).
-
-    For each curve with a lag, an axis has another formula: the change of acceleration until the thrust is steady.
-    """
-    found = {f"tau_{curve.name}": total(_thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves}
-    loads = {form.axis.velocity: load_along(layout, form, names) for form in layout.axes}
-    lagging = [curve for curve in layout.curves if curve.has_lag]
-    for form in layout.axes:
-        v = form.axis.velocity
-        inverse = mass.inverse(v)
-        found[names("held", v).identifier] = total(gain * loads[other] for other, gain in inverse.items())
-        for curve in lagging:
-            changes = []
-            for other, gain in inverse.items():
-                axis = layout.by_velocity[other].axis
-                if thrusts := _thrusts(layout, axis, names, curve, remaining=True):
-                    changes.append(gain * (Name(axis.coefficient("alpha")) * total(thrusts)))
-            if changes:
-                found[names("remaining", v, curve.name).identifier] = total(changes)
-    for name, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
-        if name in layout.pose and current in layout.inputs:
-            found[names("held", name).identifier] = Name(current)
-    return found
-
-
-def load_along(layout: Layout, form: VehicleAxis, names: Names) -> Expression:
-    """Return the force along an axis, or the moment about it, that is constant while the inputs are held."""
-    axis = form.axis
-    if axis is YAW:
-        thrust: list[Expression] = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
-    else:
-        thrust = _thrusts(layout, axis, names)
-    parts: list[Expression] = [Name(axis.coefficient("alpha")) * total(thrust)] if thrust else []
-    parts += [Name(axis.external), *([Name(form.coefficient("F_0"))] if "F_0" in form.keys else [])]
-    if axis is HEAVE and layout.restoring and not layout.has_attitude:
-        parts.append(names("net_weight"))
-    return total(parts)
-
-
-def _thrusts(
-    layout: Layout, axis: Axis, names: Names, curve: Curve | None = None, *, remaining: bool = False
-) -> list[Expression]:
-    """Return the thrusts along an axis, or their moments about it: all of them, or only those of a curve.
-
-    `remaining` gives the changes of these thrusts until they are steady.
-    """
-    found = []
-    for t in layout.drivers(axis):
-        own = layout.curve_of[t.name]
-        if curve in (None, own):
-            force: Expression = Name(f"F_{t.name}")
-            if remaining:
-                force = steady_name(t.name, own, names) - force
-            if axis is YAW and t.position is None and t.arm:
-                force = names("arm") * force
-            found.append(scaled(t.effect(axis), force))
-    return found
-
-
-def _lagging(layout: Layout, mass: MassMatrix, axis: str) -> list[str]:
-    """Return the curves with lag whose thrusters accelerate an axis."""
-    forms = [layout.by_velocity[other] for other in mass.inverse(axis)]
-    drivers = {thruster.curve for form in forms for thruster in layout.drivers(form.axis)}
-    return [curve.name for curve in layout.curves if curve.has_lag and curve.name in drivers]
-
-
 def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
     """Return the rows of the rotation matrix, if the vehicle rolls or pitches."""
     rows: dict[str, tuple[Term, ...]] = {}
@@ -443,37 +448,4 @@ def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
         for row in (1, 2, 3):
             for name, terms in rotation_terms(row, velocities).items():
                 rows[name] = tuple(Term(of(sign), factors) for sign, factors in terms)
-    return rows
-
-
-def _kinematics(layout: Layout, names: Names) -> dict[str, tuple[Term, ...]]:
-    """Return the rows of the pose, which follows from the velocities and a steady current.
-
-    A vehicle without yaw always heads north, so its cos_psi is 1 and its sin_psi is 0.
-    """
-    rows: dict[str, tuple[Term, ...]] = {}
-    if layout.has_attitude:
-        velocities = frozenset(layout.velocities)
-        for row, name in enumerate("xyz", 1):
-            if name in layout.pose:
-                moving = [Term(ONE, (v, entry(row, n))) for n, v in enumerate("uvw", 1) if v in velocities]
-                rows[name] = (Term(names("held", name)), *moving)
-        return rows
-    if layout.has(SURGE, SWAY):
-        turns = layout.has(YAW)
-        if turns:
-            rows["cos_psi"] = (Term(-ONE, ("r", "sin_psi")),)
-            rows["sin_psi"] = (Term(ONE, ("r", "cos_psi")),)
-        north, east = [Term(names("held", "x"))], [Term(names("held", "y"))]
-        if layout.has(SURGE):
-            north.append(Term(ONE, ("u", "cos_psi") if turns else ("u",)))
-            east += [Term(ONE, ("u", "sin_psi"))] if turns else []
-        if layout.has(SWAY):
-            north += [Term(-ONE, ("v", "sin_psi"))] if turns else []
-            east.append(Term(ONE, ("v", "cos_psi") if turns else ("v",)))
-        rows["x"], rows["y"] = tuple(north), tuple(east)
-    if layout.has(HEAVE):
-        rows["z"] = (Term(ONE, ("w",)),)
-    if layout.has(YAW):
-        rows["psi"] = (Term(ONE, ("r",)),)
     return rows

@@ -145,9 +145,10 @@ def saturated(x: Expression) -> Operation:
     return Operation("saturated", (x,))
 
 
-def directed(subject: Expression, forward: Expression, reverse: Expression) -> Expression:
+def directed(subject: Expression, forward: Real, reverse: Real) -> Expression:
     """Return the value for a subject that is not negative, or the other one for a negative subject."""
-    return forward if forward == reverse else Operation("directed", (subject, forward, reverse))
+    one, other = of(forward), of(reverse)
+    return one if one == other else Operation("directed", (subject, one, other))
 
 
 def beyond_dead_band(beyond: Expression, dead_band: Expression, force: Expression) -> Operation:
@@ -220,7 +221,7 @@ def plain(x: Expression) -> Expression:
 
 # ---- Printing --------------------------------------------------------------------------------------------------------
 
-FUNCTIONS = ("sin", "cos", "abs", "sqrt", "pow", "log", "atan2")
+FUNCTIONS = ("sin", "cos", "abs", "sqrt", "pow", "log", "atan2", "atanh")
 """The functions of expressions besides the thrust tables."""
 _RANK = {"if": 0, "or": 1, "and": 2, "<": 3, ">": 3, ">=": 3, "==": 3, "+": 4, "-": 4, "*": 5, "/": 5, "neg": 6}
 """How strongly operations bind."""
@@ -236,11 +237,12 @@ class Language:
     either: str = " or "
     functions: Mapping[str, str] = field(default_factory=dict)
     """The names of functions, if they are others."""
+    infinity: str = "inf"
     is_branchless: bool = False
     """True if choices, `both` and `either` are functions."""
 
 
-C = Language("{0} ? {1} : {2}", " && ", " || ", {"abs": "fabs"})
+C = Language("{0} ? {1} : {2}", " && ", " || ", {"abs": "fabs"}, "INFINITY")
 PYTHON = Language("{1} if {0} else {2}")
 ARRAYS = Language("where({0}, {1}, {2})", "both({}, {})", "either({}, {})", is_branchless=True)
 """Python for arrays and symbols, which have no single truth value."""
@@ -261,7 +263,7 @@ def written(x: Expression, language: Language, name_of: Callable[[str], str] = s
     if isinstance(x, Name):
         return name_of(x.identifier)
     if isinstance(x, Number):
-        return repr(x.value)
+        return language.infinity if x.value == math.inf else repr(x.value)
     assert isinstance(x, Operation)
     rank = _CALL if language.is_branchless and x.op in ("if", "and", "or") else _RANK.get(x.op, _CALL)
     match x.op, x.args:
@@ -284,7 +286,12 @@ def written(x: Expression, language: Language, name_of: Callable[[str], str] = s
 
 # ---- Evaluation ------------------------------------------------------------------------------------------------------
 
-_IN_PYTHON = {**{name: getattr(math, name) for name in FUNCTIONS if name != "abs"}, "abs": abs, "__builtins__": {}}
+_IN_PYTHON = {
+    **{name: getattr(math, name) for name in FUNCTIONS if name != "abs"},
+    "abs": abs,
+    "inf": math.inf,
+    "__builtins__": {},
+}
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 

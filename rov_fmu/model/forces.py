@@ -1,44 +1,78 @@
-"""The forces and moments that depend on velocities and attitude. Each kind is a function that `forces_of` calls."""
+"""The forces and moments along the axes of a vehicle. Each is declared once, by a function that `forces_of` calls.
+
+The table of terms (equation.py), the motion of one axis alone (alone.py), the dependencies and derivatives, and the
+equations on the page of an FMU follow from these declarations. So does what other simulators lack, and what the page
+lists as left out, from the effects.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 
 from .attitude import entry
-from .catalogue import REVERSE, cross_name
+from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
 from .expression import Expression, Name, Names, call, directed, product, scaled, total
-from .layout import FAINT, Layout, effect_along
+from .layout import FAINT, Curve, Layout, effect_along
+from .thrust import steady_name
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a force comes from, or what changes it."""
+
+    name: str
+    """The beginning of the names of its coefficients."""
+    words: str
+    """What people read: "the fins"."""
+    missed: str = ""
+    """The word for it where a model lacks it; empty if nobody expects it."""
+
+
+THRUST = Effect("thrust", "the thrust")
+LOAD = Effect("load", "the constant load and the load from outside")
+WEIGHT = Effect("weight", "the net weight")
+LINEAR = Effect("linear", "linear drag")
+QUADRATIC = Effect("quadratic", "quadratic drag")
+LIFT = Effect("lift", "lift of the hull")
+RESTORING = Effect("restoring", "weight and buoyancy")
+COUPLING = Effect("coupling", "Coriolis and Munk terms")
+LAG = Effect("lag", "the lag of the thrust (T)", "lag")
+DEAD_BAND = Effect("dead band", "the dead band (c_0)", "dead band")
+DEAD_TIME = Effect("dead time", "the dead time (T_d)", "delay")
+ADVANCE = Effect("advance", "the loss of thrust by the speed of advance (d)", "loss of thrust with speed")
+STEERING = Effect("steering", "the fins")
+EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
+"""The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
 
 @dataclass(frozen=True)
 class Force:
-    """A force or moment along an axis: a coefficient times one or two states of the table."""
+    """A force or moment along an axis: a coefficient, alone or times one or two states of the table."""
 
-    effect: str
-    """The name of the effect: linear and quadratic drag, lift, restoring, advance, steering."""
+    effect: Effect
     axis: str
     """The velocity of the axis."""
     sign: int
     coefficient: tuple[Expression, ...]
     """The factors of the coefficient."""
-    factors: tuple[str, ...]
-    """The states that multiply the coefficient."""
+    factors: tuple[str, ...] = ()
+    """The states that multiply the coefficient. A force without them is constant while the inputs are held."""
     velocity: str = ""
     """The velocity on whose direction the coefficient depends, or an empty text."""
     reverse: tuple[Expression, ...] = ()
     """The factors of the coefficient for a negative velocity, if they are others."""
     turns: bool = False
     """True when the force has the other sign for a negative velocity."""
-    is_held: bool = False
-    """True when the coefficient depends on inputs."""
 
     @property
     def formula(self) -> Expression:
         """The force as a formula, for both directions of the velocity."""
         both = zip(self.coefficient, self.reverse or self.coefficient, strict=True)
         coefficient = [directed(Name(self.velocity), *pair) for pair in both]
-        first, *others = map(Name, self.factors)
-        return scaled(self.sign, product(*coefficient, call("abs", first) if self.turns else first, *others))
+        states: list[Expression] = [*map(Name, self.factors)]
+        if self.turns:
+            states[0] = call("abs", states[0])
+        return scaled(self.sign, product(*coefficient, *states))
 
     def along(self, inverse: Expression, *, reverse: bool = False) -> Expression:
         """Return the coefficient of an acceleration: `inverse` is the acceleration per load."""
@@ -47,25 +81,77 @@ class Force:
 
 
 def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
-    """Yield all forces and moments of a vehicle that depend on its velocities and its attitude."""
+    """Yield all forces and moments of a vehicle along its axes, in the order of its equation."""
+    yield from _loads(layout, names)
     yield from chain(_drag(layout), _restoring(layout, names), _advance(layout, names), _steering(layout, names))
+
+
+def effects_of(layout: Layout) -> list[Effect]:
+    """Return the effects that a vehicle has, each once."""
+    found = [force.effect for force in forces_of(layout, Names())]
+    has = {
+        LAG: bool(layout.lagging),
+        DEAD_BAND: any("c_0" in curve.keys or curve.tables for curve in layout.curves),  # a table may have one
+        DEAD_TIME: layout.has_dead_time,
+        COUPLING: layout.coupled,
+    }
+    return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *found]))
+
+
+# ---- The forces ------------------------------------------------------------------------------------------------------
+
+
+def _loads(layout: Layout, names: Names) -> Iterator[Force]:
+    """Yield what is constant while the inputs are held: thrust, external and constant load, and the net weight."""
+    for form in layout.axes:
+        axis, v = form.axis, form.axis.velocity
+        thrust = thrusts(layout, axis, names)
+        if axis is YAW:  # each of these torques is an output
+            thrust = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
+        if thrust:
+            yield Force(THRUST, v, 1, (Name(axis.coefficient("alpha")), total(thrust)))
+        yield Force(LOAD, v, 1, (Name(axis.external),))
+        if "F_0" in form.keys:
+            yield Force(LOAD, v, 1, (Name(form.coefficient("F_0")),))
+        if axis is HEAVE and layout.restoring and not layout.has_attitude:
+            yield Force(WEIGHT, v, 1, (names("net_weight"),))
+
+
+def thrusts(
+    layout: Layout, axis: Axis, names: Names, curve: Curve | None = None, *, arriving: bool = False
+) -> list[Expression]:
+    """Return the thrusts along an axis, or their moments about it: all of them, or only those of a curve.
+
+    `arriving` gives the changes of these thrusts until they are steady.
+    """
+    found = []
+    for t in layout.drivers(axis):
+        own = layout.curve_of[t.name]
+        if curve in (None, own):
+            force: Expression = Name(f"F_{t.name}")
+            if arriving:
+                force = steady_name(t.name, own, names) - force
+            if axis is YAW and t.position is None and t.arm:
+                force = names("arm") * force
+            found.append(scaled(t.effect(axis), force))
+    return found
 
 
 def _drag(layout: Layout) -> Iterator[Force]:
     """Yield the damping: linear and quadratic drag of each axis, and the cross terms."""
     for form in layout.axes:
         v = form.axis.velocity
-        for key, effect, factors in (("b_d", "linear", (v,)), ("a_d", "quadratic", (v, v))):
+        for key, effect, factors in (("b_d", LINEAR, (v,)), ("a_d", QUADRATIC, (v, v))):
             ahead, astern = (Name(form.coefficient(key + end)) for end in ("", REVERSE))
             yield Force(effect, v, -1, (ahead,), factors, v, (astern,), turns=key == "a_d")
     for key, axis, *others in layout.cross:
         coefficient = (Name(cross_name(key, axis, *others)),)
         if key == "b_d":
-            yield Force("linear", axis, -1, coefficient, (others[0],))
+            yield Force(LINEAR, axis, -1, coefficient, (others[0],))
         elif key == "a_d":
-            yield Force("quadratic", axis, -1, coefficient, (others[0], others[0]), others[0], turns=True)
+            yield Force(QUADRATIC, axis, -1, coefficient, (others[0], others[0]), others[0], turns=True)
         elif key == "lift":
-            yield Force("lift", axis, 1, coefficient, (others[0], others[1]))
+            yield Force(LIFT, axis, 1, coefficient, (others[0], others[1]))
 
 
 def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
@@ -77,11 +163,11 @@ def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
     for form in layout.axes:
         v = form.axis.velocity
         if v in "uvw":
-            yield Force("restoring", v, 1, (names("net_weight"),), ((x, y, z)["uvw".index(v)],))
+            yield Force(RESTORING, v, 1, (names("net_weight"),), ((x, y, z)["uvw".index(v)],))
             continue
         for sign, (coordinate, direction) in zip((1, -1), arms[v], strict=True):
             if {f"{coordinate}_G", f"{coordinate}_B"} & set(layout.restoring):
-                yield Force("restoring", v, sign, (names("righting", coordinate),), (direction,))
+                yield Force(RESTORING, v, sign, (names("righting", coordinate),), (direction,))
 
 
 def _advance(layout: Layout, names: Names) -> Iterator[Force]:
@@ -98,7 +184,7 @@ def _advance(layout: Layout, names: Names) -> Iterator[Force]:
                     parts.append(scaled(effect, names("loss", t.name)))
             if parts:
                 lost = Name(form.axis.coefficient("alpha")), total(parts)
-                yield Force("advance", form.axis.velocity, -1, lost, (other.axis.velocity,), is_held=True)
+                yield Force(ADVANCE, form.axis.velocity, -1, lost, (other.axis.velocity,))
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:
@@ -114,4 +200,4 @@ def _steering(layout: Layout, names: Names) -> Iterator[Force]:
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
         acting = total(scaled(*part) for part in parts if abs(part[0]) > FAINT)
         if acting.names:
-            yield Force("steering", form.axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True, is_held=True)
+            yield Force(STEERING, form.axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)

@@ -9,12 +9,12 @@ from functools import cache, cached_property, lru_cache
 from math import inf
 from typing import TypeVar
 
+from .alone import AxisAlone, alone_formulas
 from .attitude import unwrapped_heading
-from .catalogue import ARM, HEAVE, YAW, Axis, delayed_name
+from .catalogue import ARM, YAW, Axis, delayed_name
 from .equation import equation_of
 from .expression import compiled
 from .layout import Curve, Layout, Thruster, VehicleAxis, arm
-from .riccati import Riccati
 from .step import Table, step
 from .thrust import curve_formulas, steady_name
 
@@ -32,6 +32,10 @@ class _Formulas:
         self.table = Table(equation)
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
+        self.alone = {
+            form.axis.name: compiled(alone_formulas(layout, form.axis.velocity), equation.measured)
+            for form in layout.axes
+        }
         self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
 
 
@@ -87,14 +91,6 @@ class Rov:
         """Return the values of all formulas from the commands to the steady thrust."""
         return self._formulas.thrust({**self.coefficients, **inputs, **self._acting(inputs)})
 
-    def loss(self, axis: Axis, inputs: Values) -> float:
-        """Return the loss of thrust along an axis per velocity (N.s/m, N.m.s/rad) under the commands, before α."""
-        lossy = [t for t in self.layout.drivers(axis) if "d" in self.layout.curve_of[t.name].keys]
-        if not lossy:
-            return 0.0
-        found = self._steady(inputs)
-        return sum(t.effect(axis) ** 2 * found[self._formulas.names("loss", t.name).identifier] for t in lossy)
-
     def _acting(self, inputs: Values) -> dict[str, float]:
         """Return the commands that act after the dead time: those that are given, or else the present ones."""
         if not self.layout.has_dead_time:
@@ -142,49 +138,24 @@ class Rov:
 
     # ---- One axis alone ----
 
-    def inertia(self, form: VehicleAxis) -> float:
-        """Return the mass or moment of inertia, with the added mass."""
-        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
-        return self[form.axis.inertia] + added
-
-    def gain(self, form: VehicleAxis) -> float:
-        """Return β/m, the acceleration per force."""
-        return self[form.axis.coefficient("beta")] / self.inertia(form)
-
     def effective_inertia(self, form: VehicleAxis) -> float:
-        """Return the effective inertia m/β."""
-        beta = self[form.axis.coefficient("beta")]
-        return self.inertia(form) / beta if beta > 0.0 else inf
+        """Return the effective inertia m/β (kg, kg.m2): the load per acceleration along an axis alone."""
+        gain = self.parameters[self._formulas.names("gain", form.axis.velocity).identifier]
+        return 1.0 / gain if gain > 0.0 else inf
 
-    def load(self, form: VehicleAxis) -> float:
-        """Return the constant load (N, N.m): F_0, and in heave the weight less the buoyancy of a level vehicle."""
-        net_weight = self["W"] - self["B"] if form.axis is HEAVE and self.layout.restoring else 0.0
-        return net_weight + (self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0)
+    def alone(self, axis: Axis, inputs: Values) -> AxisAlone:
+        """Return the motion of an axis alone, (18), under held inputs, once the thrust is steady."""
+        return self._alone(axis, {**self._steady(inputs), **self.parameters})
 
-    def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0, loss: float = 0.0) -> Riccati:
-        """Return the equation of an axis alone, (18), under a held thrust (before α), load, and loss of thrust.
+    def _alone(self, axis: Axis, values: Values) -> AxisAlone:
+        found = self._formulas.alone[axis.name](values)
+        drag, reverse = (found["A"], found["B"]), (found["A_reverse"], found["B_reverse"])
+        return AxisAlone(*drag, found["C"], reverse if reverse != drag else None)
 
-        The equation is m v' = β (α (F - loss v) + F_ext + F_0 - a_d |v| v - b_d v), of a level vehicle in heave.
-        """
-        gain = self.gain(form)
-        alpha = self[form.axis.coefficient("alpha")]
-        A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
-        lost = gain * alpha * loss
-        reverse = None
-        if not {"a_d_reverse", "b_d_reverse"}.isdisjoint(form.keys):
-            a, b = (gain * self[form.coefficient(key)] for key in ("a_d_reverse", "b_d_reverse"))
-            reverse = a, b + lost
-        return Riccati(A, B + lost, gain * (alpha * thrust + load + self.load(form)), reverse)
-
-    def motions(self, inputs: Values) -> tuple[Riccati, ...]:
-        """Return the equation of each axis alone under held inputs, once the thrust is steady."""
-        F = self.commanded(inputs)
-        return tuple(
-            self.acceleration_of(
-                form, self.along(form.axis, F), inputs[form.axis.external], self.loss(form.axis, inputs)
-            )
-            for form in self.layout.axes
-        )
+    def motions(self, inputs: Values) -> tuple[AxisAlone, ...]:
+        """Return the motion of each axis alone under held inputs, once the thrust is steady."""
+        values = {**self._steady(inputs), **self.parameters}
+        return tuple(self._alone(form.axis, values) for form in self.layout.axes)
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
@@ -202,10 +173,9 @@ class Rov:
         """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
         return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
 
-    def held(self, axis: Axis, command: float) -> Riccati:
-        """Return the equation of an axis alone, (18), under a held command, once the thrust is steady."""
-        loss = self.loss(axis, self.held_inputs(axis, command))
-        return self.acceleration_of(self.layout.kinds[axis.name], self.force(axis, command), loss=loss)
+    def held(self, axis: Axis, command: float) -> AxisAlone:
+        """Return the motion of an axis alone, (18), under a held command, once the thrust is steady."""
+        return self.alone(axis, self.held_inputs(axis, command))
 
     def response(self, axis: Axis, command: float) -> tuple[float, float]:
         """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""

@@ -520,7 +520,7 @@ def _needed_in_file(schema: dict[str, Any]) -> None:
 class File(Tables, _Head, json_schema_extra=_needed_in_file):
     """A vehicle file (TOML): an ROV with any thrusters, axes and curves."""
 
-    # Any table may be missing, so that one with a mistake does not hide those of the others. with_missing_keys checks it.
+    # Any table may be missing, so that others are read where one has a mistake. with_missing_keys tells what lacks.
 
     alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
     """Other sets of published coefficients, by a name for each set."""

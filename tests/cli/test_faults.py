@@ -190,7 +190,7 @@ def _interrupted(action: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-_SLOW = [pytest.param(name, marks=pytest.mark.long) for name in ("the vehicle", "the report", "the figures")]
+_SLOW = [pytest.param(name, marks=pytest.mark.long) for name in ("the vehicle", "the report")]
 
 
 @pytest.mark.parametrize("name", ["the tuned vehicle", *_SLOW])

@@ -419,7 +419,7 @@ def test_wrong_inputs_of_a_plan_are_one_line(here: Path, videoray_fmu: Path, cap
     plan = plan.replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
     (here / "plan.toml").write_text(plan, encoding="utf-8")
     for text, expected in (
-        ("", "is empty"),
+        ("", "the file is empty"),
         ("0,1\n1,2\n", "the first line must be a header that names the columns: the time, and then var"),
     ):
         (here / "in.csv").write_text(text, encoding="utf-8")

@@ -143,7 +143,7 @@ def complete(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes(complete: Complete) -> None:
-    commands = ["build", "figures", "fly", "identify", "prove", "schema", "sdf", "simulate", "sitl"]
+    commands = ["build", "fly", "identify", "prove", "schema", "sdf", "simulate", "sitl"]
     commands += ["study", "tables", "tune"]
     assert complete("") == [f"plain,{name}" for name in commands]
     assert complete("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]

@@ -47,13 +47,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
-# The figures make their folder, so its cases are tested with them.
-_CASES = {
-    f"{name}-{case}": (command, case)
-    for name, command in COMMANDS.items()
-    for case in IMPOSSIBLE
-    if name != "the figures" or case not in ("no folder", "a file for a folder")
-}
+_CASES = {f"{name}-{case}": (command, case) for name, command in COMMANDS.items() for case in IMPOSSIBLE}
 
 
 @_posix

@@ -147,7 +147,6 @@ COMMANDS = [
     _long(*_TUNE),
     _long("tune", "videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "0.6"),
     _long("tune", "videoray", "--axis", "heave"),
-    _long("figures", "."),
     _long("study", "bare.toml", "-o", "results"),
     *(_long(name, "--help") for name in _commands.commands),
 ]

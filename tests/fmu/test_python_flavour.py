@@ -77,6 +77,7 @@ def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
             f"resources/videoray_model/{name}.py"
             for name in (
                 "__init__",
+                "alone",
                 "attitude",
                 "catalogue",
                 "delay",
@@ -86,7 +87,6 @@ def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
                 "expression",
                 "layout",
                 "mass",
-                "riccati",
                 "rov",
                 "step",
                 "thrust",

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from rov_fmu.model.riccati import steady_velocity, time_constant
+from rov_fmu.model.alone import steady_velocity, time_constant
 from tests.motions import (
     BOUNDARIES,
     CASES,

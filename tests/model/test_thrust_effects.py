@@ -123,11 +123,15 @@ def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> N
 
 def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_balance() -> None:
     V_ss, _ = NOW.response(SURGE, 0.6)
-    assert NOW.loss(SURGE, NOW.held_inputs(SURGE, 0.6)) == pytest.approx(2.0 * 6.0 * 0.6, rel=1e-15)
+    mass = NOW.effective_inertia(NOW.layout.kinds["surge"])
+    lost = mass * (NOW.held(SURGE, 0.6).B - NOW.held(SURGE, 0.0).B)
+    assert lost == pytest.approx(2.0 * 6.0 * 0.6 * NOW["alpha_u"], rel=1e-14)
     assert NOW.step(NOW.held_inputs(SURGE, 0.6), at_rest(NOW), 100.0)["u"] == pytest.approx(V_ss, rel=1e-12)
     heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
     V_ss, _ = heavy.response(HEAVE, -0.3)
-    assert heavy.load(heavy.layout.kinds["heave"]) == heavy["W"] - heavy["B"] > 0.5
+    weight = heavy.held(HEAVE, 0.0).C * heavy.effective_inertia(heavy.layout.kinds["heave"])
+    assert weight == pytest.approx(heavy["W"] - heavy["B"], rel=1e-13)
+    assert weight > 0.5
     assert heavy.step(heavy.held_inputs(HEAVE, -0.3), at_rest(heavy), 100.0)["w"] == pytest.approx(V_ss, rel=1e-9)
 
 

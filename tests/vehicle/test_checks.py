@@ -219,7 +219,10 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
         {"thruster.5.direction.value": "up"},
         [("thruster.5.direction.value = 'up'", "three numbers")],
     ),
-    "no thrusters together": ({"curves.boost.together": 0}, [("curves.boost.together = 0", "must be within 1 ... 32")]),
+    "no thrusters together": (
+        {"curves.boost.together": 0},
+        [("curves.boost.together = 0", "must be greater than or equal to 1")],
+    ),
     "half a thruster": ({"curves.boost.together": 1.5}, [("curves.boost.together = 1.5", "must be a whole number")]),
     "a dead band in percent": ({"curves.frame.c_0.value": 8.7}, [("curves.frame.c_0.value = 8.7", "0 ... 0.9")]),
     "no lag": ({"curves.frame.T.value": 0.0}, [("curves.frame.T.value = 0.0", "0.001 ... 60 s")]),
@@ -228,7 +231,10 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
         {"axes.rol": {"a_d": quantity(1.0, "N.m.s2/rad2")}},
         [("axes.rol: there is no such key, only surge, sway, heave, roll, pitch, yaw; did you mean roll?",)],
     ),
-    "a gain out of bounds": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "must be within -100 ... 100")]),
+    "a gain out of bounds": (
+        {"inputs.heave.5": 1e3},
+        [("inputs.heave.5 = 1000.0", "must be less than or equal to 100")],
+    ),
     # thrust
     "thrust of the wrong sign": (
         {"curves.boost.a_t.value": -200.0, "curves.boost.b_t.value": 10.0},

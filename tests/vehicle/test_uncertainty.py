@@ -93,7 +93,7 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "above 1": (
         lambda text: text.replace("-0.883478", "-1.5"),
-        "estimates.b_d_u.correlation.a_d_u = -1.5: must be within -1 ... 1",
+        "estimates.b_d_u.correlation.a_d_u = -1.5: must be greater than or equal to -1",
     ),
     "not a number": (
         lambda text: text.replace("-0.883478", "nan"),

@@ -89,6 +89,6 @@ class Heyoka:
             at[name] = _value(formula, at)
         for name, directed in equation.directed.items():  # a velocity at rest goes where its force pushes it
             v = directed.velocity
-            is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"held_{v}"] < 0.0)
+            is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"constant_{v}"] < 0.0)
             at[name] = _value(directed.reverse if is_reverse else directed.forward, at)
         return at

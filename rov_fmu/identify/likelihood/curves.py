@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rov_fmu.model.alone import AxisAlone
 from rov_fmu.model.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.model.layout import Curve, Layout
-from rov_fmu.model.riccati import Riccati
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -87,7 +87,7 @@ class Shapes:
         (acting,) = self.commands(curve.name, np.array([command])).tolist()
         return curve.together * rov.curve_force(curve, acting)
 
-    def motion(self, rov: Vehicle, axis: Axis, command: float) -> Riccati:
+    def motion(self, rov: Vehicle, axis: Axis, command: float) -> AxisAlone:
         """Return the equation of an axis alone under a held command, once the thrust is steady."""
         layout = rov.layout
         inputs = dict(layout.usual_inputs)
@@ -95,8 +95,7 @@ class Shapes:
             curve = layout.curve_of.get(name.removeprefix("u_"))
             acting = self.commands(curve.name, np.array([value])) if curve else [value]
             inputs[name] = inputs[delayed_name(name)] = float(acting[0])
-        F = rov.commanded(inputs)
-        return rov.acceleration_of(layout.kinds[axis.name], rov.along(axis, F), loss=rov.loss(axis, inputs))
+        return rov.alone(axis, inputs)
 
 
 NO_SHAPES = Shapes({})

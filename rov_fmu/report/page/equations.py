@@ -11,7 +11,7 @@ from itertools import groupby
 from markupsafe import escape
 
 from rov_fmu.model.catalogue import REVERSE, YAW
-from rov_fmu.model.equation import ONE, Equation, equation_of, load_along, mass_matrix
+from rov_fmu.model.equation import ONE, Equation, equation_of, mass_matrix
 from rov_fmu.model.expression import (
     FUNCTIONS,
     PYTHON,
@@ -27,7 +27,7 @@ from rov_fmu.model.expression import (
     total,
     written,
 )
-from rov_fmu.model.forces import forces_of
+from rov_fmu.model.forces import COUPLING, forces_of
 from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.thrust import by_direction, steady_name
 from rov_fmu.report.templates import RAISED, number
@@ -118,8 +118,8 @@ def of(layout: Layout) -> Equations:
 
     def motion(form: VehicleAxis) -> Line:
         """Return the equation of motion of an axis: with effective masses on the left, if the axis has several."""
-        v, loads = form.axis.velocity, load_along(layout, form, names)
-        loads = total([loads, *(force.formula for force in forces_of(layout, names) if force.axis == v)])
+        v = form.axis.velocity
+        loads = total(force.formula for force in forces_of(layout, names) if force.axis == v)
         if not has_effective_inertia:
             found = rate(v, Name(form.axis.coefficient("beta")) * loads, Name(form.axis.inertia))
             return replace(found, reference=form.axis.equations[1])
@@ -187,7 +187,7 @@ def coupled(layout: Layout) -> list[str]:
     """Return the names of the axes with Coriolis and Munk terms."""
     rows = equation_of(layout).rows
     axes = (form.axis for form in layout.axes)
-    return [axis.name for axis in axes if any(term.effect == "coupling" for term in rows[axis.velocity])]
+    return [axis.name for axis in axes if any(term.effect is COUPLING for term in rows[axis.velocity])]
 
 
 def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
@@ -199,7 +199,7 @@ def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
 def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     """Return the formulas that replace their names, because the page has no equation of these names."""
     names = equation.names
-    kinds = ("saturated", "command", "net_weight", "righting", "arm", "held")
+    kinds = ("saturated", "command", "net_weight", "righting", "arm", "constant")
     inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
     inlined -= {
         names("command", t.name).identifier

@@ -19,6 +19,7 @@ from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
 from rov_fmu.model.catalogue import ARM, Axis
+from rov_fmu.model.forces import EXPECTED, effects_of
 from rov_fmu.model.layout import Layout
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
@@ -97,6 +98,7 @@ def documentation_page(
         choices=equations.choices,
         mirrored=_mirrored(layout),
         has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
+        missing=[effect.missed for effect in EXPECTED if effect not in effects_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         arm=[rov[name] for name in ARM] if layout.has_arm else None,
         live=live([Flown(vehicle, module)]) if module else None,

@@ -9,9 +9,8 @@ from uuid import uuid4
 import numpy as np
 import numpy.typing as npt
 
+from rov_fmu.io.csv_table import read_series
 from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
-from rov_fmu.io.reading import read_text
-from rov_fmu.io.time_series import series
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.expression import CONSTANTS
@@ -101,14 +100,10 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal
         return {}, ()
     file = path.parent / plan.input_file.path
 
-    def error(reason: str) -> FileError:
-        return FileError(f"{file}: {reason}")
+    def why_wrong(name: str) -> str | None:
+        return None if name in model.variables else unknown(name, model.variables)
 
-    def check_column(name: str) -> None:
-        if name not in model.variables:
-            raise error(unknown(name, model.variables))
-
-    table = series(read_text(file), error, check_column)
+    table = read_series(file, why_wrong)
     (_, times), *columns = table.items()
     found = {}
     for name, values in columns:

@@ -11,8 +11,8 @@ import pytest
 
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST, Experiment, ReferenceResults
 from rov_fmu.fmu.proof import Finding, _deviation, _signals
+from rov_fmu.io.csv_table import Series
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.time_series import Series
 
 _ROWS = "time,y\n0,0\n1,1\n"
 _MANIFEST = """<fmiReferences><Related source="a.exp" role="experiment"/>
@@ -98,10 +98,10 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
         ({"inside": '<References source="//[y"/>'}, "a.exp: source = '//[y' does not lead to a file"),
         ({"inside": ""}, "fmi-ls-manifest.xml: names no experiment with expected results"),
         ({"y": b"time,y\n0,\xff\n"}, "y.csv: not UTF-8 text, at byte 9"),
-        ({"y": b"time,text\n0,1\n"}, "y.csv: column 'text': the variable is not a single number"),
-        ({"y": b"time,clock\n0,1\n"}, "y.csv: column 'clock': the variable is not a single number"),
-        ({"y": b"time,vector\n0,1\n"}, "y.csv: column 'vector': the variable is not a single number"),
-        ({"y": b"time,z\n0,1\n"}, "y.csv: the FMU has no variable 'z'"),
+        ({"y": b"time,text\n0,1\n"}, "y.csv, line 1, column 'text': the variable is not a single number"),
+        ({"y": b"time,clock\n0,1\n"}, "y.csv, line 1, column 'clock': the variable is not a single number"),
+        ({"y": b"time,vector\n0,1\n"}, "y.csv, line 1, column 'vector': the variable is not a single number"),
+        ({"y": b"time,z\n0,1\n"}, "y.csv, line 1, column 'z': the FMU has no such variable"),
         ({"y": b"<no/>", "inside": '<Parameters source="y.csv"/>'}, "y.csv: must begin with <ParameterSet>"),
     ],
 )

@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
-from rov_fmu.cli import main
-from rov_fmu.report.plots.paper_figures import COLUMNS, FORMATS, PaperFigure, paper_figures
+from examples.videoray.figures import COLUMNS, FORMATS, PaperFigure, main, paper_figures
 from tests.commands import ROOT
 
 FIGURES = {figure.name: figure for figure in paper_figures()}
+EXAMPLE = ROOT / "examples" / "videoray"
 SHIPPED = ROOT / "docs" / "figures"
 
 
@@ -73,49 +73,25 @@ def test_every_figure_has_its_caption_beside_it_and_the_folder_is_created(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "for the" / "paper"
-    assert main(["figures", str(folder), "--format", "pdf"]) == 0
-    out = capsys.readouterr().out
-    assert "Wrote 9 figures to" in out
-    assert f"Next: open '{folder / 'figure_5.pdf'}' and the others\n" in out
+    assert main([str(folder), "--format", "pdf"]) == 0
+    assert f"Wrote 9 figures to {folder}" in capsys.readouterr().out
     wanted = {f"{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "txt")}
     assert {path.name for path in folder.iterdir()} == wanted
     for name, figure in FIGURES.items():
         assert (folder / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
 
 
-@pytest.mark.parametrize(("path", "reason"), [("file", "is a file, not a folder"), ("file/folder", "Not a directory")])
-def test_a_folder_that_cannot_be_made_is_one_line_and_leaves_nothing(
-    path: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("kept", encoding="utf-8")
-    assert main(["figures", str(tmp_path / path)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("rov-fmu: ")
-    assert line.endswith(reason)
-    assert [(found.name, found.read_text("utf-8")) for found in tmp_path.iterdir()] == [("file", "kept")]
-
-
-def test_the_name_of_a_vehicle_is_no_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["figures", "videoray"]) == 2
-    expected = "rov-fmu: videoray: is the name of a vehicle, and must be the folder to write the figures to\n"
-    assert capsys.readouterr().err == expected
-    assert not [*tmp_path.iterdir()]
-
-
-def test_the_documentation_shows_every_figure_that_is_drawn_with_its_caption() -> None:
-    page = " ".join((ROOT / "docs" / "model.md").read_text(encoding="utf-8").split())
+def test_the_readme_shows_every_figure_that_is_drawn_with_its_caption() -> None:
+    page = " ".join((EXAMPLE / "README.md").read_text(encoding="utf-8").split())
     assert {path.name for path in SHIPPED.iterdir()} == {
         f"{name}.{suffix}" for name in FIGURES for suffix in ("svg", "txt")
     }
     for name, figure in FIGURES.items():
-        assert f"(figures/{name}.svg) {figure.caption}" in page
+        assert f"(../../docs/figures/{name}.svg) {figure.caption}" in page
         assert (SHIPPED / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
         shown, shipped = figure.content("svg", "double"), (SHIPPED / f"{name}.svg").read_bytes()
         assert size_of(shipped, "svg") == size_of(shown, "svg")
-        assert texts(shipped) == texts(shown) != [], "`rov-fmu figures docs/figures --column double` draws them"
+        assert texts(shipped) == texts(shown) != [], "the command in the README draws them"
 
 
 @pytest.mark.parametrize("name", [name for name in FIGURES if re.search("11|steps", name)])
@@ -131,13 +107,12 @@ def test_a_caption_and_the_legend_tell_of_the_points_that_are_drawn(name: str) -
     assert labels == ["non-linear", "scaled", "measured $V_{ss}$", "measured $Tau$"][: 4 if drawn_points else 3]
 
 
-def test_the_help_tells_which_figures_are_not_the_papers(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", "--help"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
+def test_the_readme_tells_which_figures_are_not_the_papers() -> None:
+    said = (EXAMPLE / "README.md").read_text(encoding="utf-8")
     own = [name for name in FIGURES if not name.startswith("figure_")]
-    assert "Two of them are not in the paper: " in said
+    assert "two figures that it does not have" in said
     assert len(own) == 2
-    assert all(name in said for name in own)
+    assert all(f"`{name}`" in said for name in own)
 
 
 def points(line: Line2D) -> list[tuple[float, float]]:

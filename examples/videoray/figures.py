@@ -1,10 +1,12 @@
-"""The figures of the paper whose data the paper prints, in a quality for publications: `rov-fmu figures FOLDER`.
+"""Draw the figures of the paper whose data it prints, for publications: python -m examples.videoray.figures FOLDER
 
 The curves are those of the printed equations. The only printed points are V_ss and Tau (Tables 3-7); the force at a
 measured velocity is that of the thrust curve, (11)-(13). The forces behind the thrust curves (Figures 4-6) and all
 recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
+import argparse
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -17,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.io.messages import listed
-from rov_fmu.io.output import Output, check_targets, folder_made, write_whole
+from rov_fmu.io.output import Output, write_whole
 from rov_fmu.model.catalogue import SURGE
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text, with_formulas
@@ -55,7 +57,7 @@ class PaperFigure:
     caption: str
     plots: tuple[Callable[[Axes], None], ...]
 
-    def content(self, form: str, column: str) -> bytes:
+    def content(self, file_format: str, column: str) -> bytes:
         """Return the figure in a format of FORMATS, as wide as a column of COLUMNS, with its fonts embedded."""
         columns = len(self.plots) if column == "double" else 1
         rows, width = len(self.plots) // columns, COLUMNS[column]
@@ -68,8 +70,8 @@ class PaperFigure:
             margin=0.04,
             salt=self.name,
             style=_EMBEDDED,
-            format=form,
-            **FORMATS[form],
+            format=file_format,
+            **FORMATS[file_format],
         )
 
     def _draw(self, figure: Figure, rows: int, columns: int) -> None:
@@ -77,21 +79,23 @@ class PaperFigure:
             plot(ax)
 
 
-def write_figures(folder: Path, form: str = "svg", column: str = "single") -> list[Path]:
-    """Write every figure into a folder, with its caption beside it as text, and return the paths.
-
-    The folder is created if it does not exist. Raises WriteError.
-    """
-    places = [(folder / f"{one.name}.{form}", folder / f"{one.name}.txt", one) for one in paper_figures()]
-    paths = [path for *both, _ in places for path in both]
-    with folder_made(folder):
-        check_targets(paths)
-        outputs = []
-        for picture, caption, figure in places:
-            outputs.append(Output(picture, figure.content(form, column)))
-            outputs.append(Output(caption, f"{figure.caption}\n".encode()))
-        write_whole(*outputs)
-    return paths
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line: write every figure into a folder, with its caption beside it as text."""
+    parser = argparse.ArgumentParser(prog="python -m examples.videoray.figures", description=__doc__)
+    parser.add_argument("folder", type=Path, help="where the figures go; it is created if it does not exist")
+    parser.add_argument("--format", choices=FORMATS, default="svg", help="default: %(default)s")
+    parser.add_argument("--column", choices=COLUMNS, default="single", help="the width; default: %(default)s")
+    options = parser.parse_args(arguments)
+    folder: Path = options.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    outputs = []
+    for figure in paper_figures():
+        picture = figure.content(options.format, options.column)
+        outputs.append(Output(folder / f"{figure.name}.{options.format}", picture))
+        outputs.append(Output(folder / f"{figure.name}.txt", f"{figure.caption}\n".encode()))
+    write_whole(*outputs)
+    print(f"Wrote {len(outputs) // 2} figures to {folder}, each with its caption in a text file beside it.")
+    return 0
 
 
 def paper_figures() -> Iterator[PaperFigure]:
@@ -207,3 +211,7 @@ def _curve(ax: Axes, scale: float, end: float, curve: Sequence[float], dashes: s
     a, b = curve
     x = np.linspace(0.0, end, 61)
     ax.plot(scale * x, a * x**2 + b * x, dashes, color=LIGHT[color], linewidth=1.8, label=label)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

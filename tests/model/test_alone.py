@@ -9,7 +9,7 @@ import pytest
 from mpmath import mp
 from scipy.optimize import brentq
 
-from rov_fmu.model.riccati import RISE, Riccati, steady_velocity, time_constant
+from rov_fmu.model.alone import RISE, AxisAlone, steady_velocity, time_constant
 from tests.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case, step_alone
 from verification.references.closed_form import advance, time_to_rest
 from verification.references.reference import axis
@@ -149,13 +149,13 @@ def test_linear_drag_has_one_time_constant_and_no_drag_no_steady_velocity() -> N
 
 
 def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -> None:
-    ahead, astern = Riccati(2.0, 3.0, 5.0, (0.5, 1.0)), Riccati(2.0, 3.0, -1.5, (0.5, 1.0))
+    ahead, astern = AxisAlone(2.0, 3.0, 5.0, (0.5, 1.0)), AxisAlone(2.0, 3.0, -1.5, (0.5, 1.0))
     assert [ahead.acceleration(v) for v in (-2.0, 0.0, 0.5)] == [5.0 + (1.0 + 0.5 * 2.0) * 2.0, 5.0, 5.0 - 2.0]
     assert [ahead.drag(sign) for sign in (-1.0, 0.0, 1.0)] == [(0.5, 1.0), (2.0, 3.0), (2.0, 3.0)]
     assert (ahead.steady_velocity(), astern.steady_velocity()) == (1.0, -1.0)
     assert ahead.time_constant() == time_constant(2.0, 3.0, 5.0)
     assert astern.time_constant() == time_constant(0.5, 1.0, -1.5)
-    assert Riccati(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
+    assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
     assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE
 
 

@@ -1,0 +1,1 @@
+"""The VideoRay beside its paper: the figures whose data the paper prints."""
