@@ -146,15 +146,15 @@ class DivergedError(Exception):
 class Filter:
     """The filter of one layout. The runs of different parameters are independent, so threads may share it."""
 
-    def __init__(self, rov: Vehicle, longest: float = 0.1, changing: float = 0.0125, share: float = 0.5) -> None:
+    def __init__(self, vehicle: Vehicle, longest: float = 0.1, changing: float = 0.0125, share: float = 0.5) -> None:
         """Load the filter. Raises BuildError.
 
         `longest` is the longest step of the mean, s, and `changing` that in which a command changes. No step is longer
         than this share of the fastest time constant.
         """
-        layout = rov.layout
+        layout = vehicle.layout
         self.layout, self._steps = layout, (longest, changing, share)
-        library = load_library(rov, FILTER_FILE)
+        library = load_library(vehicle, FILTER_FILE)
         sizes = (ctypes.c_int * 6)()
         library.filter_sizes(sizes)
         self.states, axes, sensors, self.variables, self.inputs, self.held = sizes

@@ -44,7 +44,7 @@ class StepJacobian:
 
 
 def step_jacobian(
-    rov: Vehicle,
+    vehicle: Vehicle,
     inputs: Mapping[str, float],
     state: Mapping[str, float],
     h: float,
@@ -52,17 +52,17 @@ def step_jacobian(
 ) -> StepJacobian:
     """Return the states after h > 0 seconds with the inputs held, and their derivatives from the series of the step.
 
-    The states and inputs are in the order of `rov.layout.state` and `rov.layout.inputs`. `coefficients` are the names
-    of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with a
-    dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
+    The states and inputs are in the order of `vehicle.layout.state` and `vehicle.layout.inputs`. `coefficients` are the
+    names of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with
+    a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
 
     Raises ValueError when the motion overflows or takes too many pieces, and InputError when a coefficient is unknown.
     """
-    layout = rov.layout
+    layout = vehicle.layout
     for name in coefficients:
-        if name not in rov.coefficients:
-            raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*rov.coefficients])}")
-    motion = _Tangents(_formulas_of(layout, tuple(coefficients)), rov, inputs, state)
+        if name not in vehicle.coefficients:
+            raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*vehicle.coefficients])}")
+    motion = _Tangents(_formulas_of(layout, tuple(coefficients)), vehicle, inputs, state)
     if not motion.advance(h):
         raise ValueError(
             "the derivatives of the step cannot be computed: it overflows, or never settles and needs to be shorter"
@@ -129,7 +129,7 @@ class _Tangents(Motion):
     """
 
     def __init__(
-        self, formulas: _Formulas, rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float]
+        self, formulas: _Formulas, vehicle: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float]
     ) -> None:
         layout = formulas.layout
         self.formulas = formulas
@@ -141,7 +141,7 @@ class _Tangents(Motion):
         unit |= {name: unit[command] for name, command in zip(delayed, layout.commands, strict=False)}
         self.changes: dict[str, Array] = {_change(name): change for name, change in unit.items()}
         self.zero = np.zeros(len(names))
-        super().__init__(formulas.table, {**rov.coefficients, **given})
+        super().__init__(formulas.table, {**vehicle.coefficients, **given})
         found = self._at({})
         starts = formulas.table.equation.starts
         self.d = np.array([self._change(found, name) if name in starts else self.zero for name in self.table.states])

@@ -23,15 +23,15 @@ _LOADED: dict[str, ctypes.CDLL] = {}
 _LOADING = Lock()
 
 
-def load_library(rov: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
+def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     """Return the library of a vehicle made from a file of the engine. It does not depend on the coefficients.
 
     Raises BuildError when it cannot be compiled or loaded.
     """
-    key = f"{file.name} {rov.layout!r}"
+    key = f"{file.name} {vehicle.layout!r}"
     with _LOADING:
         if key not in _LOADED:
-            texts = {**sources(rov.layout), file.name: file.read_text(encoding="utf-8")}
+            texts = {**sources(vehicle.layout), file.name: file.read_text(encoding="utf-8")}
             try:
                 _LOADED[key] = _load(texts)
             except OSError as error:

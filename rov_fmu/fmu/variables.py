@@ -141,9 +141,9 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
     )
 
 
-def variables(rov: Vehicle) -> tuple[Variable, ...]:
+def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
-    layout = rov.layout
+    layout = vehicle.layout
     result: list[Variable] = []
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
@@ -198,7 +198,7 @@ def variables(rov: Vehicle) -> tuple[Variable, ...]:
             "parameter",
             "tunable" if declaration.tunable else "fixed",
             initial="exact",
-            start=rov[name],
+            start=vehicle[name],
         )
     for name, declaration in layout.initial.items():
         add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)
@@ -217,9 +217,9 @@ LOG_CATEGORIES = {
 """The log categories by the standard's names (2.2.4), each with its description."""
 
 
-def interface_header(rov: Vehicle, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
+def interface_header(vehicle: Vehicle, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
     """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
-    declared = variables(rov)
+    declared = variables(vehicle)
     return render(
         "interface.h.j2",
         variables=declared,
@@ -228,7 +228,7 @@ def interface_header(rov: Vehicle, identifier: str, token: str, fmi: int, interf
         token=token,
         fmi=fmi,
         interfaces=interfaces,
-        ranges=rov.layout.voltage_ranges,
+        ranges=vehicle.layout.voltage_ranges,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

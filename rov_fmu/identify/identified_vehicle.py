@@ -115,19 +115,19 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
     """
     table, (low, high) = fit.kept.table, fit.command_range
     coefficients = table.coefficients(z.tolist())
-    shapes, rov = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
+    shapes, vehicle = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
     for curve in fit.known.curves:
         if curve.name in shapes.of:
             c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
 
             def force(command: float, curve: Curve = curve) -> float:
-                return shapes.force(rov, curve, command)
+                return shapes.force(vehicle, curve, command)
 
             coefficients |= fitted(curve, force, c_0, low, high)
     return coefficients | {name: table.base[name] for name in table.exact}
 
 
-def _changed(fit: Fit, rov: Vehicle) -> list[str]:
+def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
     """Return the names of the coefficients of the vehicle that the parameters change."""
     z, changed = fit.posterior.z, dict[str, None]()
     before = _in_file(fit, z)
@@ -135,7 +135,7 @@ def _changed(fit: Fit, rov: Vehicle) -> list[str]:
         moved = z.copy()
         moved[n] += 0.1 * fit.posterior.table.parameters[n].deviation + 0.01
         changed |= dict.fromkeys(name for name, value in _in_file(fit, moved).items() if value != before[name])
-    return [name for name in rov.coefficients if name in changed]
+    return [name for name in vehicle.coefficients if name in changed]
 
 
 def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
@@ -205,7 +205,7 @@ def _data(fit: Fit) -> str:
     return " and ".join(parts) or "given values"
 
 
-def _coefficients(fit: Fit, rov: Vehicle, changed: Sequence[str]) -> Iterator[Coefficient]:
+def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterator[Coefficient]:
     """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
     names = [name for name in changed if not name.startswith("alpha_")]
     if not names:
@@ -215,18 +215,18 @@ def _coefficients(fit: Fit, rov: Vehicle, changed: Sequence[str]) -> Iterator[Co
     for n, name in enumerate(names):
         error, before = float(np.sqrt(covariance[n, n])), float(np.sqrt(prior[n, n]))
         told = error / before if before > 0.0 else 0.0
-        declaration, value = rov.layout.coefficients[name], rov[name]
-        interval: Interval | None = _interval(rov, name, error)
+        declaration, value = vehicle.layout.coefficients[name], vehicle[name]
+        interval: Interval | None = _interval(vehicle, name, error)
         if not told <= _TOLD or not error > 0.0:
             interval = None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
         yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
 
 
-def _interval(rov: Vehicle, name: str, error: float) -> Interval:
+def _interval(vehicle: Vehicle, name: str, error: float) -> Interval:
     """Return the 95 % interval of a coefficient within its bounds."""
-    declaration = rov.layout.coefficients[name]
+    declaration = vehicle.layout.coefficients[name]
     if name.startswith("c_0"):
         error = max(error, EXACT_BAND / QUANTILE)
-    low, high = around(rov[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
+    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
     return max(low, declaration.minimum), min(high, declaration.maximum)

@@ -32,8 +32,8 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
 
     def motion(z: Array, command: float) -> AxisAlone:
         table = posterior.table
-        rov = Vehicle(table.layout, table.coefficients(z.tolist()))
-        return table.shapes(z.tolist()).motion(rov, axis, command)
+        vehicle = Vehicle(table.layout, table.coefficients(z.tolist()))
+        return table.shapes(z.tolist()).motion(vehicle, axis, command)
 
     def speed(z: Array, command: float) -> float:
         return motion(z, command).steady_velocity()

@@ -60,7 +60,7 @@ def source(wanted: Sequence[Target]) -> str:
     return f"Tuned to {points}{', ...' if len(wanted) > 2 else ''}"
 
 
-def read_points(path: Path, rov: Vehicle, axis: Axis) -> list[Target]:
+def read_points(path: Path, vehicle: Vehicle, axis: Axis) -> list[Target]:
     """Read wanted points from a CSV file with command, velocity and time constant, which may have blanks.
 
     Raises DataFileError.
@@ -74,7 +74,7 @@ def read_points(path: Path, rov: Vehicle, axis: Axis) -> list[Target]:
         for n, value in enumerate(table.values.get(column, ())):
             if isfinite(value):
                 points.append(Target(quantity, table.values["command"][n], value))
-                if reason := impossible(rov, axis, points[-1]):
+                if reason := impossible(vehicle, axis, points[-1]):
                     raise table.error(n, column, reason)
     if not any(point.quantity == "V_ss" for point in points):
         raise DataFileError(f"{path}: no row has a velocity, and alpha is tuned to velocities")

@@ -80,9 +80,9 @@ class StepTest:
     steady_columns: tuple[str, ...]
     """The directions of motion in that table; the responses belong to the last one."""
 
-    def response(self, rov: Vehicle, command: Decimal) -> tuple[float, float]:
+    def response(self, vehicle: Vehicle, command: Decimal) -> tuple[float, float]:
         """Return V_ss and Tau (s) in closed form for a command in %."""
-        return rov.response(self.axis, float(command) / 100.0)
+        return vehicle.response(self.axis, float(command) / 100.0)
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,11 @@ STEP_TESTS = (
 )
 
 
-def untuned(rov: Vehicle) -> Vehicle:
+def untuned(vehicle: Vehicle) -> Vehicle:
     """Return the vehicle with every α and β equal to 1, which is the paper's non-linear model."""
-    return rov.replaced({name: 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable})
+    return vehicle.replaced(
+        {name: 1.0 for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable}
+    )
 
 
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
@@ -135,7 +137,7 @@ def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
     return rows
 
 
-def _load_table(folder: Path, rov: Vehicle, test: StepTest) -> ResponseTable:
+def _load_table(folder: Path, vehicle: Vehicle, test: StepTest) -> ResponseTable:
     """Return one of Tables 6–8."""
     responses_file, velocities_file = (folder / name for name in TABLES[test.axis.name])
     units: dict[str, str] = {}
@@ -148,8 +150,8 @@ def _load_table(folder: Path, rov: Vehicle, test: StepTest) -> ResponseTable:
     rows = []
     for command, (*printed, V_measured, Tau_measured) in responses.items():
         measured = steady.get(command) if V_measured is None else V_measured, Tau_measured
-        non_linear = Response(*map(Cell, printed[:2], test.response(untuned(rov), command), measured))
-        scaled = Response(*map(Cell, printed[2:], test.response(rov, command), measured))
+        non_linear = Response(*map(Cell, printed[:2], test.response(untuned(vehicle), command), measured))
+        scaled = Response(*map(Cell, printed[2:], test.response(vehicle, command), measured))
         rows.append(ResponseRow(command, non_linear, scaled))
     return ResponseTable(**vars(test), rows=tuple(rows), steady=steady)
 

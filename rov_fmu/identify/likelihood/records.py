@@ -70,15 +70,15 @@ class SampledLog:
             s.is_velocity and s.over_ground and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors
         )
 
-    def rov(self, coefficients: Mapping[str, float]) -> Vehicle:
+    def vehicle(self, coefficients: Mapping[str, float]) -> Vehicle:
         """Return the part of a vehicle that the log concerns."""
         return Vehicle(self.layout, {name: coefficients[name] for name in self.layout.coefficients})
 
     def thrust(self, coefficients: Mapping[str, float], axis: Axis, rows: Array) -> Array:
         """Return the steady thrust of a vehicle along an axis for some rows of inputs, N or N m."""
-        rov, names, usual = self.rov(coefficients), [*self.layout.inputs], self.layout.usual_inputs
-        forces = (rov.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
-        return np.array([rov.along(axis, F) for F in forces])
+        vehicle, names, usual = self.vehicle(coefficients), [*self.layout.inputs], self.layout.usual_inputs
+        forces = (vehicle.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
+        return np.array([vehicle.along(axis, F) for F in forces])
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

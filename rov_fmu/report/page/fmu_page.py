@@ -68,7 +68,7 @@ def documentation_page(
     model as WebAssembly; without it the page has no live section. The page of a vehicle without a data folder has no
     tables and no measurements. Raises FileError.
     """
-    rov, layout = vehicle, vehicle.layout
+    layout = vehicle.layout
     tables = tables_by_axis(vehicle)
     held = held_commands(vehicle, tables.values())
     axes = [form.axis for form in layout.axes]
@@ -81,14 +81,16 @@ def documentation_page(
         "index.html.j2",
         vehicle=vehicle,
         layout=layout,
-        is_tuned=_is_tuned(rov),
+        is_tuned=_is_tuned(vehicle),
         native=native,
         fmi=fmi,
         kinds=INTERFACES[interface if native else "cs"],
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
-        groups=[list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))],
+        groups=[
+            list(group) for _, group in groupby(variables(vehicle), lambda v: (v.causality, v.variability, v.initial))
+        ],
         reversing=_reversing,
-        settable=[v.name for v in variables(rov) if v.name in layout.state and v.initial == "exact"]
+        settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
         other_axes=listed(name for name in _AXES if name not in layout.kinds).capitalize(),
         coupled=listed(equations.coupled(layout)),
@@ -100,22 +102,22 @@ def documentation_page(
         has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
         missing=[effect.missed for effect in EXPECTED if effect not in effects_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
-        arm=[rov[name] for name in ARM] if layout.has_arm else None,
+        arm=[vehicle[name] for name in ARM] if layout.has_arm else None,
         live=live([Flown(vehicle, module)]) if module else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
         first=first,
-        moved=float(simulate(rov, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
-        moves_at_rest=any(rov.derivatives(rest, rest).values()),
+        moved=float(simulate(vehicle, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
+        moves_at_rest=any(vehicle.derivatives(rest, rest).values()),
         held=held,
-        motions=[motion for axis in axes if layout.signs(axis) for motion in _motions(rov, axis, held)],
+        motions=[motion for axis in axes if layout.signs(axis) for motion in _motions(vehicle, axis, held)],
         frames=[image(label, path) for label, path in own],
         thrusters=[
-            _plot(f"Thrusters {view}", partial(draw_thrusters, rov=rov, scene=scene), scene.inches)
-            for view, scene in scenes(rov).items()
+            _plot(f"Thrusters {view}", partial(draw_thrusters, vehicle=vehicle, scene=scene), scene.inches)
+            for view, scene in scenes(vehicle).items()
         ],
-        curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, rov=rov, curve=c)) for c in layout.curves],
+        curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, vehicle=vehicle, curve=c)) for c in layout.curves],
         steady=[
             _plot(
                 f"V_ss over the command: {a.name}",
@@ -126,7 +128,7 @@ def documentation_page(
         steps=[
             _plot(
                 f"Step responses: {a.name}",
-                partial(plot_steps, rov=rov, axis=a, commands=held, table=tables.get(a.name)),
+                partial(plot_steps, vehicle=vehicle, axis=a, commands=held, table=tables.get(a.name)),
             )
             for a in axes
         ],
@@ -148,31 +150,31 @@ class Motion:
     """The other axes that the last command pushes too, and the force or torque along them."""
 
 
-def _motions(rov: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
+def _motions(vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
     """Yield the motion along an axis, for each direction if they differ. The commands are in percent."""
     directions = [(1.0, "")]
-    if differs_by_direction(rov, axis):
+    if differs_by_direction(vehicle, axis):
         directions = [(1.0, f" {axis.positive}"), (-1.0, f" {axis.negative}")]
     for sign, words in directions:
-        signs = {name: sign * one for name, one in rov.layout.signs(axis).items()}
+        signs = {name: sign * one for name, one in vehicle.layout.signs(axis).items()}
         fractions = [sign * float(c) / 100.0 for c in commands]
-        responses = [rov.response(axis, fraction) for fraction in fractions]
-        yield Motion(axis, words, signs, responses, list(_side_effects(rov, axis, fractions[-1])))
+        responses = [vehicle.response(axis, fraction) for fraction in fractions]
+        yield Motion(axis, words, signs, responses, list(_side_effects(vehicle, axis, fractions[-1])))
 
 
-def _side_effects(rov: Vehicle, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
+def _side_effects(vehicle: Vehicle, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
     """Yield the other axes that a command of an axis pushes, for example because thrust in reverse is weaker."""
-    F = rov.commanded(rov.held_inputs(axis, command))
-    for other in (form.axis for form in rov.layout.axes if form.axis is not axis):
-        pushes = [rov.effect(t, other) * F[t.name] for t in rov.layout.drivers(other)]
+    F = vehicle.commanded(vehicle.held_inputs(axis, command))
+    for other in (form.axis for form in vehicle.layout.axes if form.axis is not axis):
+        pushes = [vehicle.effect(t, other) * F[t.name] for t in vehicle.layout.drivers(other)]
         if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
             yield other, sum(pushes)
 
 
-def differs_by_direction(rov: Vehicle, axis: Axis) -> bool:
+def differs_by_direction(vehicle: Vehicle, axis: Axis) -> bool:
     """Return True if the motion under a negative command is not the mirror image of that under a positive one."""
     for c in (0.1, 0.3, 0.6, 1.0):
-        (V, Tau), (back, Tau_back) = rov.response(axis, c), rov.response(axis, -c)
+        (V, Tau), (back, Tau_back) = vehicle.response(axis, c), vehicle.response(axis, -c)
         if not (isclose(V, -back, rel_tol=1e-9) and isclose(Tau, Tau_back, rel_tol=1e-9)):
             return True
     return False
@@ -230,9 +232,9 @@ def _mirrored(layout: Layout) -> str:
     return " and ".join(found)
 
 
-def _is_tuned(rov: Vehicle) -> bool:
+def _is_tuned(vehicle: Vehicle) -> bool:
     """Return True unless each alpha and beta is 1."""
-    return any(rov[name] != 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable)
+    return any(vehicle[name] != 1.0 for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------------------------
@@ -240,15 +242,15 @@ def _is_tuned(rov: Vehicle) -> bool:
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
     """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
-    rov, (low, high) = vehicle, (100.0 * end for end in vehicle.command_range)
-    least = -100 if differs_by_direction(rov, axis) else 0
+    low, high = (100.0 * end for end in vehicle.command_range)
+    least = -100 if differs_by_direction(vehicle, axis) else 0
     ax.axvspan(low, high, label="range of the model", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     if least:
         ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     commands = range(least, 101, 2)
-    models = [("tuned α and β", rov, "blue", "-")]
-    if _is_tuned(rov):
-        models.insert(0, ("α = β = 1", untuned(rov), "grey", "--"))
+    models = [("tuned α and β", vehicle, "blue", "-")]
+    if _is_tuned(vehicle):
+        models.insert(0, ("α = β = 1", untuned(vehicle), "grey", "--"))
     for label, model, color, dashes in models:
         V_ss = [model.response(axis, c / 100.0)[0] for c in commands]
         name = label if len(models) > 1 else None
@@ -260,12 +262,14 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     ax.set_xlim(least, 100)
 
 
-def plot_steps(ax: Axes, rov: Vehicle, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
+def plot_steps(
+    ax: Axes, vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None
+) -> None:
     """Plot the velocity after steps of the command from rest, with the measured V_ss and Tau."""
     steps = [measured_step(table, c) for c in commands]
-    if differs_by_direction(rov, axis):
+    if differs_by_direction(vehicle, axis):
         steps += [Step(-step.command) for step in steps]
-    draw_steps(ax, axis, steps, [(rov, "-")])
+    draw_steps(ax, axis, steps, [(vehicle, "-")])
     with_formulas(ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left"))
 
 

@@ -28,7 +28,7 @@ _WIDTH = 3.7
 """The width of a drawing, inches."""
 
 
-def place(rov: Vehicle, thruster: Thruster) -> Point:
+def place(vehicle: Vehicle, thruster: Thruster) -> Point:
     """Return the position of a thruster from the centre of mass, m.
 
     A thruster on an arm is at the distance R and the angle γ behind the centre of mass; one without a known position is
@@ -36,9 +36,9 @@ def place(rov: Vehicle, thruster: Thruster) -> Point:
     """
     if thruster.position is not None:
         return thruster.position
-    if not thruster.arm or not rov.layout.has_arm:
+    if not thruster.arm or not vehicle.layout.has_arm:
         return 0.0, 0.0, 0.0
-    R, gamma = rov["R"], rov["gamma"]
+    R, gamma = vehicle["R"], vehicle["gamma"]
     return -R * cos(gamma), -thruster.arm * R * sin(gamma), 0.0
 
 
@@ -60,11 +60,11 @@ class _Mark:
         return self.at[0] + 0.5 * size * self.along[0], self.at[1] + 0.5 * size * self.along[1]
 
 
-def _marks(rov: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
+def _marks(vehicle: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
     """Yield the marks of a view, which is one of VIEWS."""
     seen: dict[tuple[float, ...], list[str]] = {}
-    for thruster in rov.layout.thrusters:
-        at, d = place(rov, thruster), thruster.direction
+    for thruster in vehicle.layout.thrusters:
+        at, d = place(vehicle, thruster), thruster.direction
         along = d[0], d[_INDEX[down]]
         hidden = toward * d[_INDEX[sight]] if hypot(*along) < 0.1 else 0.0
         key = tuple(round(part, 3) + 0.0 for part in (at[0], at[_INDEX[down]], *along, hidden))
@@ -94,33 +94,33 @@ class Scene:
         return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
 
 
-def scenes(rov: Vehicle) -> dict[str, Scene]:
+def scenes(vehicle: Vehicle) -> dict[str, Scene]:
     """Return the scene of each view, at a common scale."""
-    inch = 0.9 * size_of(rov)
+    inch = 0.9 * size_of(vehicle)
     for _ in range(3):  # text takes part of the drawing, which changes the scale and so the size of text in metres
-        found = {view: _arranged(rov, view, inch) for view in VIEWS}
+        found = {view: _arranged(vehicle, view, inch) for view in VIEWS}
         left, right = zip(*(scene.limits[0] for scene in found.values()), strict=True)
         inch = (max(right) - min(left)) / _WIDTH
     across = min(left), max(right)
     return {view: replace(scene, limits=(across, scene.limits[1])) for view, scene in found.items()}
 
 
-def size_of(rov: Vehicle) -> float:
+def size_of(vehicle: Vehicle) -> float:
     """Return the largest coordinate of a thruster from the centre of mass, m."""
-    return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
+    return max([_SMALLEST, *(abs(part) for thruster in vehicle.layout.thrusters for part in place(vehicle, thruster))])
 
 
-def _arranged(rov: Vehicle, view: str, inch: float) -> Scene:
+def _arranged(vehicle: Vehicle, view: str, inch: float) -> Scene:
     """Return a view with its labels placed, in a drawing in which an inch is `inch` metres."""
     down, sight, toward = VIEWS[view]
-    size = size_of(rov)
+    size = size_of(vehicle)
     space = Space(inch, [(-1.2 * size, 0.0)])  # the least width of a drawing
-    marks = list(_marks(rov, down, sight, toward))
+    marks = list(_marks(vehicle, down, sight, toward))
     from_above = down is SWAY
     ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}
     for end in ends.values():
         space.line((0.0, 0.0), end)
-    turn = _turn(size) if from_above and rov.layout.has(YAW) else None
+    turn = _turn(size) if from_above and vehicle.layout.has(YAW) else None
     if turn:
         tail, tip = turn
         space.line(tail, (1.27 * size, 0.0))
@@ -129,9 +129,9 @@ def _arranged(rov: Vehicle, view: str, inch: float) -> Scene:
         space.ring(mark.at, 0.1 * size)
         if not mark.toward:
             space.line(mark.at, mark.tip(size))
-    labels = _arm_labels(rov, space, size) if from_above and rov.layout.has_arm else []
+    labels = _arm_labels(vehicle, space, size) if from_above and vehicle.layout.has_arm else []
     for axis, end in ends.items():
-        words = rf"${_LETTERS[axis]}, {axis.velocity}$" if rov.layout.has(axis) else f"${_LETTERS[axis]}$"
+        words = rf"${_LETTERS[axis]}, {axis.velocity}$" if vehicle.layout.has(axis) else f"${_LETTERS[axis]}$"
         ahead = end[0] / hypot(*end), end[1] / hypot(*end)
         labels.append((words, space.name(0.3 if "," in words else 0.1, [(end, 0.0, [ahead, *AROUND])]), "ink"))
     if turn:
@@ -140,13 +140,13 @@ def _arranged(rov: Vehicle, view: str, inch: float) -> Scene:
     labels += [(mark.label, _place_label(mark, space, size), "blue") for mark in marks]
     (left, right), (high, low) = space.limits()
     edge = 0.06 * inch
-    low += (0.3 if _has_scale(rov) else 0.06) * inch
+    low += (0.3 if _has_scale(vehicle) else 0.06) * inch
     return Scene(view, marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
 
 
-def _arm_labels(rov: Vehicle, space: Space, size: float) -> list[tuple[str, Place, str]]:
+def _arm_labels(vehicle: Vehicle, space: Space, size: float) -> list[tuple[str, Place, str]]:
     """Return the labels of R and γ, and reserve the space of the arm and of these labels."""
-    x, y, _ = _armed(rov)
+    x, y, _ = _armed(vehicle)
     space.line((0.0, 0.0), (x, y))
     space.line((0.0, 0.0), (1.15 * x, 0.0))
     gamma, far, side = atan2(abs(y), -x), 0.38 * size, -1.0 if y < 0.0 else 1.0
@@ -168,14 +168,14 @@ def _place_label(mark: _Mark, space: Space, size: float) -> Place:
     return space.name(mark.width, [near_thruster, near_tip])
 
 
-def _has_scale(rov: Vehicle) -> bool:
+def _has_scale(vehicle: Vehicle) -> bool:
     """Return True if the position of a thruster is known, so that the drawing has a scale."""
-    return any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
+    return any(any(place(vehicle, thruster)) for thruster in vehicle.layout.thrusters)
 
 
-def _armed(rov: Vehicle) -> Point:
+def _armed(vehicle: Vehicle) -> Point:
     """Return the position of the first thruster on an arm."""
-    return next(place(rov, t) for t in rov.layout.thrusters if t.position is None and t.arm)
+    return next(place(vehicle, t) for t in vehicle.layout.thrusters if t.position is None and t.arm)
 
 
 def _turn(size: float) -> tuple[Place, Place]:
@@ -184,30 +184,30 @@ def _turn(size: float) -> tuple[Place, Place]:
     return tail, tip
 
 
-def draw_thrusters(ax: Axes, rov: Vehicle, scene: Scene) -> None:
+def draw_thrusters(ax: Axes, vehicle: Vehicle, scene: Scene) -> None:
     """Draw the centre of mass, the body frame, the thrusters with their positive forces, and R and γ if they exist."""
     down, size = VIEWS[scene.view][0], scene.size
-    _draw_frame(ax, size, turns=down is SWAY and rov.layout.has(YAW))
+    _draw_frame(ax, size, turns=down is SWAY and vehicle.layout.has(YAW))
     if not any(mark.toward and hypot(*mark.at) < 0.05 * size for mark in scene.marks):
         _draw_centre(ax, size)
     for mark in scene.marks:
         _draw_mark(ax, mark, size)
-    if down is SWAY and rov.layout.has_arm:
-        _draw_arm(ax, _armed(rov), size)
+    if down is SWAY and vehicle.layout.has_arm:
+        _draw_arm(ax, _armed(vehicle), size)
     for text, at, color in scene.labels:
         with_formulas(ax.text(*at, text, color=LIGHT[color], zorder=8, ha="center", va="center"))
     ax.set(aspect="equal", xlim=scene.limits[0], ylim=scene.limits[1])
     ax.grid(visible=False)
     ax.spines[:].set_visible(False)
-    if _has_scale(rov):
+    if _has_scale(vehicle):
         _draw_scale(ax, size)
     ax.set(xticks=[], yticks=[])
     ax.set_title(scene.view.capitalize(), loc="left")
 
 
-def draw_icon(ax: Axes, rov: Vehicle) -> None:
+def draw_icon(ax: Axes, vehicle: Vehicle) -> None:
     """Draw the vehicle from above without text: its thrusters on a body with a round bow."""
-    size, marks = size_of(rov), list(_marks(rov, *VIEWS["from above"]))
+    size, marks = size_of(vehicle), list(_marks(vehicle, *VIEWS["from above"]))
     x, y = 1.2 * size, max([0.5 * size, *(abs(mark.at[1]) for mark in marks)])
     ax.add_patch(PathPatch(_body(x, y), facecolor=LIGHT["band"], edgecolor=LIGHT["metal"], linewidth=2.0))
     for mark in marks:
