@@ -18,7 +18,7 @@ from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
-from tests.model.steps import Step, in_fmu, in_python
+from tests.model.steps import Step, in_fmu
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
 
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
@@ -173,5 +173,5 @@ def fmu(videoray_dir: Path) -> Fmu:
 
 @pytest.fixture
 def steps(fmu: Fmu) -> list[Step]:
-    """The steps of the VideoRay in Python and in C."""
-    return [in_python, partial(in_fmu, fmu)]
+    """The step of the VideoRay in C."""
+    return [partial(in_fmu, fmu)]

@@ -106,7 +106,7 @@ def _part(module: str) -> str:
 def test_the_imports_are_seen(imports: dict[str, set[str]]) -> None:
     assert imports["rov_fmu.build"] >= {"rov_fmu.fmu.archive", "rov_fmu.report.page.fmu_page"}
     assert "rov_fmu.report.report" in imports["rov_fmu.interface.identify_command"], "inside a function"
-    assert "rov_fmu.model.rov" in imports["rov_fmu.fmu.slave"], "from a package"
+    assert "rov_fmu.model.step" in imports["rov_fmu.fmu.slave"], "from a package"
     assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "model", "__main__"}
 
 

@@ -11,7 +11,8 @@ from typing import Any
 from rov_fmu.model.catalogue import delayed_name
 from rov_fmu.model.equation import Equation, equation_of
 from rov_fmu.model.expression import ARRAYS, Expression, Name, compiled
-from rov_fmu.model.layout import Layout, ThrustTable, cubic
+from rov_fmu.model.layout import Layout, ThrustTable
+from rov_fmu.model.step import cubic
 
 Functions = Mapping[str, Callable[..., Any]]
 """The functions of a library that formulas may call: sin, cos, sqrt, pow, where, both, either; and `interval`.

@@ -3,26 +3,26 @@
 They are the derivatives of the states at its end with respect to the states at its start, the inputs and the
 coefficients.
 
-In a Taylor series, the derivatives of the coefficients follow from the same table of terms as the coefficients
-themselves (rov_fmu/model/step.py), because each term is a product of at most two states. A reversal does not
-interrupt the derivatives: every term with a coefficient that depends on the direction of a velocity is 0 where this
-velocity is 0, so the rates are continuous there.
+The step of rov_fmu/model/step.py is taken with dual numbers, which carry their derivatives through every operation
+(forward differentiation). A reversal does not interrupt the derivatives: every term with a coefficient that depends on
+the direction of a velocity is 0 where this velocity is 0, so the rates are continuous there.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.io.messages import InputError, did_you_mean
-from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model import step
 from rov_fmu.model.catalogue import delayed_name
-from rov_fmu.model.equation import Equation, equation_of
-from rov_fmu.model.expression import Expression, Name, change_of, compiled, slope_name, tangent
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.step import ORDER, Motion, Series, Table, usable_time
+from rov_fmu.model.printed import loaded
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -50,195 +50,199 @@ def step_jacobian(
     h: float,
     coefficients: Sequence[str] = (),
 ) -> StepJacobian:
-    """Return the states after h > 0 seconds with the inputs held, and their derivatives from the series of the step.
+    """Return the states after h > 0 seconds with the inputs held, and their derivatives.
 
     The states and inputs are in the order of `vehicle.layout.state` and `vehicle.layout.inputs`. `coefficients` are the
     names of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with
     a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
 
-    Raises ValueError when the motion overflows or takes too many pieces, and InputError when a coefficient is unknown.
+    Raises ValueError when the motion overflows or takes too many substeps, and InputError when a coefficient is
+    unknown.
     """
     layout = vehicle.layout
     for name in coefficients:
         if name not in vehicle.coefficients:
             raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*vehicle.coefficients])}")
-    motion = _Tangents(_formulas_of(layout, tuple(coefficients)), vehicle, inputs, state)
-    if not motion.advance(h):
+    names = [*layout.state, *layout.inputs, *coefficients]
+    numbers = np.hstack([[[{**vehicle.coefficients, **inputs, **state}[name]] for name in names], np.eye(len(names))])
+    known = {**vehicle.coefficients, **dict(zip(names, map(Dual, numbers), strict=True))}
+    if layout.has_dead_time:
+        known |= {delayed_name(name): known[name] for name in layout.commands}
+    with np.errstate(all="ignore"):  # an overflow ends the motion
+        motion = _Tangents(_model_of(layout), known)
+        is_done = motion.move(h)
+    if not is_done:
         raise ValueError(
             "the derivatives of the step cannot be computed: it overflows, or never settles and needs to be shorter"
         )
-    after, derivatives = motion.result()
+    after = motion.end()
+    derivatives = np.array([_row(after[name], numbers.shape[1])[1:] for name in layout.state])
     n, m = len(layout.state), len(layout.state) + len(layout.inputs)
-    return StepJacobian(after, derivatives[:, :n], derivatives[:, n:m], derivatives[:, m:])
+    return StepJacobian(
+        {name: float(after[name]) for name in layout.state}, derivatives[:, :n], derivatives[:, n:m], derivatives[:, m:]
+    )
 
 
-class _Formulas:
-    """The compiled derivatives of the formulas of a layout."""
+class Dual:
+    """A number and its derivatives, in one array: the number is first."""
 
-    def __init__(self, layout: Layout, coefficients: tuple[str, ...]) -> None:
-        equation = equation_of(layout)
-        self.layout, self.table, self.coefficients = layout, Table(equation), coefficients
-        changing = [*layout.inputs, *layout.state, *layout.delayed, *coefficients]
-        given = {name: change_of(name) for name in changing}
-        formulas = {**equation.program, **equation.forces, **self.table.coefficient_formulas}
-        self.held_formulas, self.held = _with_tangents(formulas, given, equation)
-        lagging = {force: after for force, (_, after) in equation.lagging.items()}
-        progress = {name: change_of(name) for name in equation.lags}
-        self.lag_formulas, _ = _with_tangents(lagging, {**self.held, **given, **progress}, equation)
-        moved = {name: change_of(name) for name in equation.states}
-        self.end_formulas, self.finished = _with_tangents(equation.ends, {**given, **moved}, equation)
-        pairs = self.table.products
-        self.first = np.array([pair[0] for pair in pairs], int)
-        self.second = np.array([pair[1] for pair in pairs], int)
-        columns: dict[tuple[int, ...], int] = {(): 0}
-        columns |= {(i,): 1 + i for i in range(len(self.table.states))}
-        columns |= {pair: len(columns) + n for n, pair in enumerate(pairs)}
-        terms = [
-            (row, columns[factors], place) for row, found in enumerate(self.table.rows) for place, factors in found
-        ]
-        self.rows, self.columns, self.places = np.array(terms, int).T
-        self.width = len(columns)
+    __slots__ = ("row",)
+
+    def __init__(self, row: Array) -> None:
+        self.row = row
+
+    def __float__(self) -> float:
+        return float(self.row[0])
+
+    def __bool__(self) -> bool:
+        return float(self) != 0.0
+
+    def __neg__(self) -> "Dual":
+        return Dual(-self.row)
+
+    def __abs__(self) -> "Dual":
+        return -self if self < 0.0 else self
+
+    def __add__(self, other: "Dual | float") -> "Dual":
+        return Dual(self.row + other.row) if isinstance(other, Dual) else self._with(float(self) + other, 1.0)
+
+    def __sub__(self, other: "Dual | float") -> "Dual":
+        return self + -other
+
+    def __mul__(self, other: "Dual | float") -> "Dual":
+        if not isinstance(other, Dual):
+            return Dual(self.row * other)
+        product = float(self) * other.row + float(other) * self.row
+        product[0] = float(self) * float(other)
+        return Dual(product)
+
+    def __truediv__(self, other: "Dual | float") -> "Dual":
+        if not isinstance(other, Dual):
+            return Dual(self.row / other)
+        return self * other._with(1.0 / float(other), -1.0 / float(other) ** 2)
+
+    def __pow__(self, exponent: float) -> "Dual":
+        return self._with(float(self) ** exponent, exponent * float(self) ** (exponent - 1.0))
+
+    def __radd__(self, other: float) -> "Dual":
+        return self + other
+
+    def __rsub__(self, other: float) -> "Dual":
+        return -self + other
+
+    def __rmul__(self, other: float) -> "Dual":
+        return self * other
+
+    def __rtruediv__(self, other: float) -> "Dual":
+        return self._with(other / float(self), -other / float(self) ** 2)
+
+    def __lt__(self, other: "Dual | float") -> bool:
+        return float(self) < float(other)
+
+    def __gt__(self, other: "Dual | float") -> bool:
+        return float(self) > float(other)
+
+    def __le__(self, other: "Dual | float") -> bool:
+        return float(self) <= float(other)
+
+    def __ge__(self, other: "Dual | float") -> bool:
+        return float(self) >= float(other)
+
+    def __eq__(self, other: object) -> bool:
+        return float(self) == other
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _with(self, value: float, slope: float) -> "Dual":
+        """Return a function of this number by its value and its derivative."""
+        row = slope * self.row
+        row[0] = value
+        return Dual(row)
 
 
-_formulas_of = lru_cache(maxsize=100)(_Formulas)
+def _row(x: "Dual | float", width: int) -> Array:
+    """Return a number and its derivatives, which are 0 for a float."""
+    return x.row if isinstance(x, Dual) else np.concatenate(([x], np.zeros(width - 1)))
 
 
-def _change(name: str) -> str:
-    return change_of(name).identifier
+def _function(value: Callable[[float], float], slope: Callable[[float], float]) -> Callable[[Any], Any]:
+    """Return a function of dual numbers and floats."""
+    return lambda x: x._with(value(float(x)), slope(float(x))) if isinstance(x, Dual) else value(x)
 
 
-def _with_tangents(
-    formulas: Mapping[str, Expression], changing: Mapping[str, Name], equation: Equation
-) -> tuple[Callable[[Mapping[str, object]], dict[str, object]], dict[str, Name]]:
-    """Compile formulas together with their changes. Return also the names of the changes, by name."""
-    changes = dict(changing)
-    both: dict[str, Expression] = {}
-    for name, formula in formulas.items():
-        if change := tangent(formula, changes.get):
-            changes[name] = change_of(name)
-            both[changes[name].identifier] = change  # before the formula, which may overwrite a value that it needs
-        both[name] = formula
-    slopes = {slope_name(name): table.slope for name, table in equation.tables.items()}
-    return compiled(both, {**equation.measured, **slopes}), changes
+def _power(base: Any, exponent: Any) -> Any:
+    """Return the power of a base that is not negative."""
+    x, n = float(base), float(exponent)
+    found: Any = x**n
+    if isinstance(base, Dual):
+        found = base._with(found, n * x ** (n - 1.0) if x > 0.0 or n >= 1.0 else 0.0)
+    if isinstance(exponent, Dual):
+        found = exponent._with(0.0, x**n * math.log(x) if x > 0.0 else 0.0) + found
+    return found
 
 
-class _Tangents(Motion):
-    """A motion, and its derivatives with respect to the states at its start, the inputs and the coefficients.
+def _arctangent(y: Any, x: Any) -> Any:
+    """Return atan2."""
+    square = float(x) ** 2 + float(y) ** 2
+    change = y * (float(x) / square) - x * (float(y) / square)
+    return change + (math.atan2(float(y), float(x)) - float(change))
 
-    No state settles.
-    """
 
-    def __init__(
-        self, formulas: _Formulas, vehicle: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float]
-    ) -> None:
-        layout = formulas.layout
-        self.formulas = formulas
-        delayed = {delayed_name(name): inputs[name] for name in layout.commands} if layout.has_dead_time else {}
-        given = {name: float(inputs[name]) for name in layout.inputs} | delayed
-        given |= {name: float(state[name]) for name in layout.state}
-        names = [*layout.state, *layout.inputs, *formulas.coefficients]
-        unit = dict(zip(names, np.eye(len(names)), strict=True))
-        unit |= {name: unit[command] for name, command in zip(delayed, layout.commands, strict=False)}
-        self.changes: dict[str, Array] = {_change(name): change for name, change in unit.items()}
-        self.zero = np.zeros(len(names))
-        super().__init__(formulas.table, {**vehicle.coefficients, **given})
-        found = self._at({})
-        starts = formulas.table.equation.starts
-        self.d = np.array([self._change(found, name) if name in starts else self.zero for name in self.table.states])
-        """The derivatives of the states of the table (states of the table x directions)."""
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "expm1": _function(math.expm1, math.exp),
+    "sin": _function(math.sin, math.cos),
+    "cos": _function(math.cos, lambda x: -math.sin(x)),
+    "sqrt": _function(math.sqrt, lambda x: 0.5 / math.sqrt(x)),
+    "log": _function(math.log, lambda x: 1.0 / x),
+    "pow": _power,
+    "atan2": _arctangent,
+}
 
-    def _at(self, more: Mapping[str, float]) -> dict[str, object]:
-        return self.formulas.held_formulas({**self.values, **more, **self.changes})
 
-    def _change(self, found: Mapping[str, object], name: str) -> Array:
-        return np.asarray(found.get(_change(name), self.changes.get(_change(name), self.zero)), float)
+@lru_cache(maxsize=100)
+def _model_of(layout: Layout) -> ModuleType:
+    return loaded(layout, _FUNCTIONS)
 
-    def hold(self) -> None:
-        """Compute the coefficients and their derivatives for both directions of the velocities."""
-        for progress in self.table.equation.lags:
-            self.put(self.table.place[progress], 0.0)
-        both = [self._at(dict.fromkeys(self.table.equation.monitored, sign)) for sign in (1.0, -1.0)]
-        names = self.table.coefficients
-        self.forward, self.reverse = ([float(found[name]) for name in names] for found in both)  # type: ignore[arg-type]
-        self.d_both = np.array([[self._change(found, name) for name in names] for found in both])
-        self.direct(self.y)
 
-    def direct(self, signs: Sequence[float]) -> None:
-        """Choose the coefficients and their derivatives for the signs of the velocities."""
-        super().direct(signs)
-        side = [int(v is not None and signs[v] < 0.0) for v in self.table.velocities]
-        self.d_k = self.d_both[side, np.arange(len(side))]
+class _Slopes(list[Any]):
+    """The rates of the states as dual numbers, which are the rows of a matrix."""
 
-    def settle(self) -> None:
-        """Choose the coefficients. No state settles, because its derivatives may still change."""
-        self.direct(self.y)
+    def __init__(self, matrix: Array) -> None:
+        super().__init__(map(Dual, matrix))
+        self.matrix = matrix
 
-    def series(self, unit: float) -> Series:
-        """Return the series of all states, and compute that of their derivatives."""
-        found = super().series(unit)
-        f, c = self.formulas, np.array(found)
-        shape = len(c), f.width
-        weights, d_weights = np.zeros(shape), np.zeros((*shape, len(self.zero)))
-        np.add.at(weights, (f.rows, f.columns), np.array(self.k)[f.places])
-        np.add.at(d_weights, (f.rows, f.columns), self.d_k[f.places])
-        d = np.zeros((ORDER + 1, *self.d.shape))
-        d[0] = self.d
-        with np.errstate(all="ignore"):  # `reach` sees an overflow
-            self._grow(c, d, weights, d_weights, unit)
-        self.d_series = d
-        return found
 
-    def _grow(self, c: Array, d: Array, weights: Array, d_weights: Array, unit: float) -> None:
-        """Compute the coefficients of the derivatives from those of the states."""
-        f = self.formulas
-        for n in range(ORDER):
-            a, b = c[f.first, : n + 1], c[f.second, n::-1]
-            d_a, d_b = d[: n + 1, f.first], d[n::-1, f.second]
-            factors = np.concatenate(([float(n == 0)], c[:, n], np.sum(a * b, axis=1)))
-            d_products = np.einsum("jpd,pj->pd", d_a, b) + np.einsum("pj,jpd->pd", a, d_b)
-            d_factors = np.concatenate((self.zero[np.newaxis], d[n], d_products))
-            d[n + 1] = unit / (n + 1) * (weights @ d_factors + np.einsum("iwd,w->id", d_weights, factors))
+_TOLERANCE = 1e-10  # of a derivative in a substep
+_SHARE = 1e-4  # derivatives below this share of the others of their direction may be rounding errors
 
-    def reach(self, series: Series) -> float:
-        """Return the time up to which the series of the states and of their derivatives may be used, at most 1."""
-        largest = np.abs(self.d_series).max(axis=2, initial=0.0).T.tolist()
-        if not np.isfinite(self.d_series[-3:]).all():
-            return 0.0
-        return min(super().reach(series), *(usable_time(largest[i]) for i in self.table.used))
 
-    def move(self, series: Series, length: float) -> float:
-        """Move to the end of a piece, which is at `length` or at the first reversal, and return that time."""
-        self.d_start = self.d
-        length = self.end_of_piece(series, length)[0]
-        self.d = np.tensordot(length ** np.arange(ORDER + 1.0), self.d_series, axes=1)
-        return super().move(series, length)
+class _Tangents(step.Motion):
+    """A motion of dual numbers. No state settles, because its derivatives may still change."""
 
-    def arrive(self) -> None:
-        """Update the forces that lag, the coefficients, and the derivatives of both."""
-        states = self.table.states
-        values = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
-        changes = {_change(name): self.d[self.table.place[name]] for name in values}
-        steady = self._at({})
-        found = self.formulas.lag_formulas({**steady, **values, **changes})
-        self.changes |= {_change(force): self._change(found, force) for force in self.table.equation.lagging}
-        for name in values:
-            self.d[states.index(name)] = 0.0
-        super().arrive()
+    def __init__(self, model: ModuleType, values: Mapping[str, Any]) -> None:
+        self.width = len(next(x for x in values.values() if isinstance(x, Dual)).row)
+        super().__init__(model, values)
 
-    def result(self) -> tuple[dict[str, float], Array]:
-        """Return the states of the vehicle by name, and their derivatives."""
-        equation, layout = self.table.equation, self.formulas.layout
-        place = self.table.place
-        starts = {_change(name): row for name, row in zip(layout.state, np.eye(len(self.zero)), strict=False)}
-        rows = {name: self.changes[_change(name)] for name in equation.lagging}
-        for name, n in place.items():
-            if name in layout.state:
-                rows[name] = self.d[n] + (0.0 if name in equation.starts else starts[_change(name)])
-        if equation.ends:
-            moved = {name: self.y[n] for name, n in place.items()} | {
-                _change(name): self.d[n] for name, n in place.items()
-            }
-            found = self.formulas.end_formulas({**self.start, **starts, **moved})
-            rows |= {name: self._change(found, f"next_{name}") for name in QUATERNION}
-        end = self.end()
-        return {name: end[name] for name in layout.state}, np.array([rows[name] for name in layout.state])
+    def rates(self, after: float, y: list[Any]) -> _Slopes:
+        """Return the rates of the states some seconds after the start of the substep."""
+        return _Slopes(np.array([_row(x, self.width) for x in super().rates(after, y)]))
+
+    def combined(self, weights: Mapping[int, float], slopes: Sequence[Any]) -> _Slopes:
+        """Return a weighted sum of slopes."""
+        total = np.zeros_like(slopes[0].matrix)
+        for n, weight in weights.items():
+            total += weight * slopes[n].matrix
+        return _Slopes(total)
+
+    def error(self, h: float, y: list[Any], fifth: Any, third: Any) -> float:
+        """Return the largest error of a state or of a derivative, relative to its tolerance."""
+        change = h * np.abs(self.rate.matrix[:, 1:])  # type: ignore[attr-defined]
+        size = np.abs(np.array([_row(x, self.width)[1:] for x in y])) + change
+        least = np.maximum(size, _SHARE * size.max(axis=0)) * _TOLERANCE
+        errors = h * np.abs(fifth.matrix[:, 1:])
+        worst = np.divide(errors, least, out=np.zeros_like(errors), where=errors > 0.0).max(initial=0.0)
+        return max(super().error(h, y, fifth, third), float(worst)) if np.isfinite(size).all() else math.inf
+
+    def settle(self, h: float) -> bool:  # noqa: ARG002
+        """Return False."""
+        return False

@@ -13,30 +13,37 @@ from pythonfmu import FmuBuilder
 from rov_fmu.engine.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.model.catalogue import delayed_name
+from rov_fmu.model.printed import printed
 from rov_fmu.vehicle.vehicle import Vehicle
 
-_HERE = Path(__file__).parent
-_MODEL = _HERE.parent / "model"
+_SLAVE = Path(__file__).with_name("slave.py")
+_STEP = Path(__file__).parents[1] / "model" / "step.py"
 
 
 def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
-    """Return the files of this project in resources/ by name: the slave, the variables in JSON, the model.
+    """Return the files of this project in resources/ by name: the slave, the variables in JSON, the step, the equation.
 
     The modules are named after the vehicle, because all FMUs and the user's own code share one interpreter.
     """
-    package = f"{vehicle.identifier}_model"
-    slave = (_HERE / "slave.py").read_text(encoding="utf-8")
+    package, layout = f"{vehicle.identifier}_model", vehicle.layout
     declaration = {
         "identifier": vehicle.identifier,
         "log_categories": LOG_CATEGORIES,
-        "layout": asdict(vehicle.layout),
+        "commands": {name: delayed_name(name) for name in layout.commands} if layout.has_dead_time else {},
+        "voltage_ranges": [[*bounds, curves] for bounds, curves in layout.voltage_ranges.items()],
         "variables": [asdict(v) for v in variables],
     }
     return {
-        f"{vehicle.identifier}_slave.py": slave.replace("rov_fmu.model", package),
+        f"{vehicle.identifier}_slave.py": _text(_SLAVE).replace("rov_fmu.model", package),
         "variables.json": json.dumps(declaration, ensure_ascii=False, indent=1) + "\n",
-        **{f"{package}/{path.name}": path.read_text(encoding="utf-8") for path in sorted(_MODEL.glob("*.py"))},
+        f"{package}/step.py": _text(_STEP),
+        f"{package}/equation.py": printed(layout, f"{package}.step"),
     }
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
 
 
 def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:

@@ -13,7 +13,6 @@ from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, start_formulas
 from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
-from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.equation import Term, equation_of
 from rov_fmu.model.expression import Name, compiled
 from rov_fmu.model.forces import COUPLING, LIFT, RESTORING, Effect
@@ -326,7 +325,7 @@ def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFil
 
 def _trajectory(vehicle: Vehicle, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
     """Return the states from rest at the times of each phase, during which the inputs are held."""
-    line = DelayLine(vehicle.layout)
+    line = vehicle.delay_line()
     found: list[_Row] = [(0.0, vehicle.layout.at_rest)]
     for inputs, times in phases:
         for t in times:

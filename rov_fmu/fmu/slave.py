@@ -1,11 +1,12 @@
-"""The FMU in pure Python: connect rov_fmu/model/rov.py to PythonFMU's Fmi2Slave.
+"""The FMU in pure Python: connect a vehicle's equation and rov_fmu/model/step.py to PythonFMU's Fmi2Slave.
 
-In the FMU this file is the slave module; variables.json (the declaration) and a copy of the model lie in its folder.
-PythonFMU 0.7 cannot return fmi2Discard. An exception must not reach it, because PythonFMU then releases its objects
-twice, and a later call ends the importer. When a value is refused, a message with the status is logged, the old value
-is kept, and the call returns fmi2OK.
+In the FMU this file is the slave module. In its folder lie variables.json (the declaration), step.py, and the equation
+of the vehicle, which rov_fmu/model/printed.py prints. PythonFMU 0.7 cannot return fmi2Discard. An exception must not
+reach it, because PythonFMU then releases its objects twice, and a later call ends the importer. When a value is
+refused, a message with the status is logged, the old value is kept, and the call returns fmi2OK.
 """
 
+import importlib
 import json
 from collections.abc import Iterable, Mapping
 from math import inf, isfinite
@@ -15,30 +16,9 @@ from typing import Any
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.model import attitude, catalogue, delay, expression, layout, rov
+from rov_fmu.model import step
 
 _TOO_LATE = "must not be set after the initialization"
-
-
-def layout_of(given: Any) -> layout.Layout:
-    """Return the layout of a vehicle from the JSON of its dataclasses.asdict."""
-    parts = {key: _tuples(value) for key, value in given.items()}
-    axes = ((catalogue.AXES[form["axis"]["name"]], form["keys"]) for form in parts["axes"])
-    parts["axes"] = tuple(layout.VehicleAxis(*form) for form in axes)
-    parts["curves"] = tuple(
-        layout.Curve(**{**curve, "tables": tuple(layout.ThrustTable(**table) for table in curve["tables"])})
-        for curve in parts["curves"]
-    )
-    parts["fins"] = tuple(layout.Fin(**fin) for fin in parts["fins"])
-    parts["thrusters"] = tuple(layout.Thruster(**thruster) for thruster in parts["thrusters"])
-    return layout.Layout(**parts)
-
-
-def _tuples(value: Any) -> Any:
-    """Return a value of JSON with tuples instead of lists."""
-    if isinstance(value, dict):
-        return {key: _tuples(one) for key, one in value.items()}
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def _limited(variable: dict[str, Any], value: float) -> float:
@@ -52,6 +32,20 @@ def _time_tolerance(t: float, h: float) -> float:
     return min(1e-9 * (abs(t) + h), 0.5 * h)
 
 
+class _Vehicle:
+    """A vehicle as the delay line moves it: the equation, and the values of all variables by name."""
+
+    def __init__(self, equation: Any, values: Mapping[str, float]) -> None:
+        self.equation, self.values = equation, values
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[name]
+
+    def step(self, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> dict[str, float]:
+        """Return the states after h seconds."""
+        return step.step(self.equation, {**self.values, **inputs, **state}, h)
+
+
 class Rov(Fmi2Slave):  # type: ignore[misc]
     """The slave. Its values are ordered by value reference, as rov_fmu/fmu/variables.py declares them."""
 
@@ -61,17 +55,16 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.modelName = declaration["identifier"]
         self.log_categories = declaration["log_categories"]
         self.declared: list[dict[str, Any]] = declaration["variables"]
-        self.layout = layout_of(declaration["layout"])
-        inputs, states = len(self.layout.inputs), len(self.layout.state)
-        self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.calculated))
+        self.equation = importlib.import_module(f"{self.modelName}_model.equation")
+        self.voltage_ranges = declaration["voltage_ranges"]
         self.place = {v["name"]: place for place, v in enumerate(self.declared)}
-        self.begin = expression.compiled(attitude.start_formulas())
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
         self._set_attitude()
         self.time = 0.0
         self.is_initialized = False
         self.stop_time: float | None = None
-        self.line = delay.DelayLine(self.layout)
+        commands = declaration["commands"]
+        self.line = step.DelayLine(self._named(commands), commands)
         self._put(self.line.delayed)
         self.warned: set[str] = set()
         for reference, v in enumerate(self.declared):
@@ -129,9 +122,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""
         if any(map(self._is_calculated, references)):
-            model, inputs, state = self._model()
-            rates, others = model.derivatives(inputs, state), model.calculated(inputs, state)
-            self.values[self.calculated] = [*rates.values(), *others.values()]
+            self._calculate()
         return [self.values[reference] for reference in references]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -143,9 +134,9 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if self.stop_time is not None and end > self.stop_time + _time_tolerance(self.stop_time, step_size):
             self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
             return False
-        model, inputs, state = self._model()
+        values = dict(zip(self.place, self.values, strict=True))
         try:
-            after = self.line.step(model, inputs, state, self.time, step_size)
+            after = self.line.step(_Vehicle(self.equation, values), values, {}, self.time, step_size)
         except ValueError as error:
             self.log(f"{error}.", Fmi2Status.error)
             return False
@@ -167,10 +158,20 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
 
     def _set_attitude(self) -> None:
         """Set the quaternion and the heading to those of the Euler angles at the start."""
-        if self.layout.has_attitude:
-            angles = self._named(self.layout.initial)
-            found = self.begin(angles)
-            self._put({**{name: found[name] for name in attitude.QUATERNION}, "psi": angles["psi_0"]})
+        if self.equation.QUATERNION:
+            found = self.equation.attitude(dict(zip(self.place, self.values, strict=True)))
+            self._put({**{name: found[name] for name in self.equation.QUATERNION}, "psi": found["psi_0"]})
+
+    def _calculate(self) -> None:
+        """Calculate the variables that follow from the inputs, states and parameters."""
+        found = self.equation.outputs(dict(zip(self.place, self.values, strict=True)))
+        if self.equation.QUATERNION:
+            found["psi"] = step.heading(found, self.values[self.place["psi"]])
+        for v in self.declared:
+            if v["derivative_of"]:
+                self._put({v["name"]: found[f"der_{v['derivative_of']}"]})
+            elif v["causality"] == "output" and v["initial"] == "calculated":
+                self._put({v["name"]: found[v["name"]]})
 
     def _named(self, names: Iterable[str]) -> dict[str, float]:
         return {name: self.values[self.place[name]] for name in names}
@@ -180,8 +181,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         name = v["name"]
         if v["unit"] == "us" and value == 0.0:
             self._warn_once("signal", f"{name} = 0 means that there is no signal: it acts as neutral")
-        elif name == "voltage" and self.layout.voltage_ranges:
-            for (low, high), curves in self.layout.voltage_ranges.items():
+        elif name == "voltage" and self.voltage_ranges:
+            for low, high, curves in self.voltage_ranges:
                 if not low <= value <= high:
                     limit = low if value < low else high
                     self._warn_once(curves, f"{name} = {value!r} saturates at {limit:g} for the thrust curve {curves}")
@@ -201,14 +202,6 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if self.is_initialized:
             return bool(v["causality"] == "input" or v["variability"] == "tunable")
         return not self._is_calculated(reference)
-
-    def _model(self) -> tuple[rov.Rov, dict[str, float], dict[str, float]]:
-        """Return the vehicle, its inputs and its state."""
-        return (
-            rov.Rov(self.layout, self._named(self.layout.coefficients)),
-            self._named((*self.layout.inputs, *self.layout.delayed)),
-            self._named((*self.layout.state, *self.layout.continued)),
-        )
 
     def _get_fmu_state(self) -> dict[str, Any]:
         line = {"acting": dict(self.line.acting), "waiting": list(self.line.waiting)}

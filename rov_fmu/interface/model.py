@@ -27,7 +27,7 @@ from rov_fmu.interface.arguments import (
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError, shown
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.delay import MOST_WAITING
+from rov_fmu.model.step import MOST_WAITING
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 

@@ -4,9 +4,6 @@ The state of the vehicle is a quaternion (eta, epsilon_1, epsilon_2, epsilon_3),
 contains the rotation matrix R from the body frame to the earth frame instead: R' = R S(omega) is a sum of products.
 """
 
-from collections.abc import Mapping, Sequence
-from math import atan2, isfinite, nan, tau
-
 from .expression import Expression, Name, call, directed, scaled, total, where
 
 Formulas = dict[str, Expression]
@@ -28,36 +25,6 @@ def rotation_terms(row: int, velocities: frozenset[str]) -> dict[str, list[tuple
         terms = [(1.0, (_RATES[last], entry(row, following))), (-1.0, (_RATES[following], entry(row, last)))]
         found[entry(row, column)] = [term for term in terms if term[1][0] in velocities]
     return found
-
-
-def unwrapped(angle: float, near: float) -> float:
-    """Return the angle that differs from an angle by whole turns and is the nearest to another one."""
-    turns = (near - angle) / tau
-    return angle + tau * round(turns) if isfinite(turns) else nan
-
-
-BESIDE_NOSE = (1.0, 1e-6, 0.618e-6)
-"""A direction in the body frame just beside the nose, for which turns are counted, as in fmu_src/c/heading.c.
-
-The heading of the nose jumps by half a turn where the nose passes the vertical, and rounding would choose the side.
-"""
-
-
-def beside_nose(values: Mapping[str, float], rows: Sequence[int] = (1, 2)) -> list[float]:
-    """Return components of the direction beside the nose, by default north and east, for a rotation matrix."""
-    a, b, c = BESIDE_NOSE
-    return [a * values[f"R_{row}1"] + (b * values[f"R_{row}2"] + c * values[f"R_{row}3"]) for row in rows]
-
-
-def turned_heading(values: Mapping[str, float], near: float) -> float:
-    """Return the heading of the direction beside the nose that differs from another heading by at most half a turn."""
-    north, east = beside_nose(values)
-    return unwrapped(atan2(east, north), near)
-
-
-def unwrapped_heading(psi: float, values: Mapping[str, float], near: float) -> float:
-    """Return the heading psi of the nose, without its turns, in the turn that follows from a heading before."""
-    return unwrapped(psi, turned_heading(values, near))
 
 
 def rotation_formulas() -> Formulas:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, sin
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .catalogue import (
     ANGLES,
@@ -51,11 +51,7 @@ from .catalogue import (
     voltage_declaration,
 )
 from .expression import unused
-
-
-def cubic(f: Any, g: Any, a: Any, b: Any, t: Any) -> Any:
-    """Return the cubic between 0 and 1 at t. Its values at the ends are f and g, and its slopes there are a and b."""
-    return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+from .step import interpolated
 
 
 @dataclass(frozen=True)
@@ -82,8 +78,7 @@ class ThrustTable:
 
         It is the cubic that has the forces and the slopes at the ends of the interval of the command.
         """
-        f, g, a, b, _, t = self._interval(command)
-        return float(cubic(f, g, a, b, t))
+        return float(interpolated(command, (self.commands, self.forces, self.slopes)))
 
     def slope(self, command: float) -> float:
         """Return the derivative of `force` with respect to the command."""

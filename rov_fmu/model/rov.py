@@ -10,12 +10,12 @@ from math import inf
 from typing import TypeVar
 
 from .alone import AxisAlone, alone_formulas
-from .attitude import unwrapped_heading
 from .catalogue import ARM, YAW, Axis, delayed_name
 from .equation import equation_of
 from .expression import compiled
 from .layout import Curve, Layout, Thruster, VehicleAxis, arm
-from .step import Table, step
+from .printed import model_of
+from .step import DelayLine, heading, step
 from .thrust import curve_formulas, steady_name
 
 Values = Mapping[str, float]
@@ -29,7 +29,7 @@ class _Formulas:
         equation = equation_of(layout)
         rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
         self.names = equation.names
-        self.table = Table(equation)
+        self.model = model_of(layout)
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
         self.alone = {
@@ -111,7 +111,7 @@ class Rov:
         """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
         found = self._formulas.calculate(self._values(inputs, state))
         for name in self.layout.continued:
-            found[name] = unwrapped_heading(found[name], found, state.get(name, found[name]))
+            found[name] = heading(found, state.get(name, found[name]))
         return {name: found[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
@@ -130,11 +130,19 @@ class Rov:
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
-        The result is exact up to rounding for any h. It is not finite when the motion overflows or takes too many
-        pieces (rov_fmu/model/step.py).
+        The result is exact up to rounding. It is not finite when the motion overflows or takes too many substeps
+        (rov_fmu/model/step.py).
         """
-        after = step(self._formulas.table, self._values(inputs, state), h)
+        after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
+
+    def delay_line(self) -> DelayLine:
+        """Return the commands that act before the first one, and nothing that waits for the dead time."""
+        commands = self.layout.commands if self.layout.has_dead_time else {}
+        return DelayLine(
+            {name: declaration.start for name, declaration in commands.items()},
+            {name: delayed_name(name) for name in commands},
+        )
 
     # ---- One axis alone ----
 

@@ -1,417 +1,438 @@
-"""A step of a vehicle by Taylor series, exact up to rounding for any length (standard library only).
+"""A step of a vehicle by an explicit Runge-Kutta method of order 8, and the dead time (standard library only).
 
-Between reversals the motion is y_i' = k_i + sum of L_ij y_j + sum of Q_ijk y_j y_k (equation.py). In the series
-y(t) = sum of c_n t^n, a product of two states is a Cauchy product. So each coefficient follows from those before it:
-
-    (n + 1) c_i,n+1 = k_i (for n = 0) + sum of L_ij c_j,n + sum of Q_ijk (c_j,0 c_k,n + ... + c_j,n c_k,0)
-
-A step consists of pieces, and each piece has its own series. A piece is as long as its last coefficients allow (Jorba
-and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005), and it
-ends at the first reversal of a monitored velocity. States that have settled are constant in the series. Once all of
-them have settled, the rest of the step is straight or circular motion.
+The method has the coefficients of DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993).
+It is a second, independent way to the step that fmu_src/c computes by Taylor series. It moves a `model`: a module that
+printed.py prints for each vehicle. Forces that lag follow their exponential, which makes nothing stiff. A substep ends
+where a velocity reverses, because drag then has other coefficients. Once nothing changes any more, the rest of the step
+is straight motion, or circular motion whose whole turns are all alike.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import atan2, copysign, hypot, inf, isfinite, nan, prod, sin, tau
-from operator import mul
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from math import atan2, copysign, floor, hypot, inf, isfinite, nan, sqrt, tau
+from typing import Any, NamedTuple
 
-from .attitude import BESIDE_NOSE, QUATERNION, beside_nose, turned_heading, unwrapped
-from .equation import Equation
-from .expression import Expression, compiled
+MOST_SUBSTEPS = 100_000
+"""The largest number of substeps that a step may try. Only a motion that never settles needs more."""
+MOST_WAITING = 1024
+"""The largest number of changes of commands that may wait for the dead time, as in fmu_src/c/delay.c."""
+BESIDE_NOSE = (1.0, 1e-6, 0.618e-6)
+"""A direction of the body just beside the nose, for which turns are counted, as in fmu_src/c/heading.c.
 
-ORDER = 20
-"""The order of the series. A higher order costs more than its longer pieces save. The C code has its own order."""
-MOST_PIECES = 100_000
-"""The largest number of pieces of a step. A vehicle that swings without linear drag never settles, and each swing takes
-a few pieces. A step that needs more is not computed. The C code, which is much faster, has its own number."""
+The heading of the nose jumps by half a turn where the nose passes the vertical, and rounding would choose the side."""
 
-_EPSILON = 2.0**-53  # half a unit in the last place of 1
-_FADED = 1e-40  # a state below this share of its largest size has no effect any more, whatever the drag is
-_RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers beyond ORDER are below rounding
-_SMALLEST = 1e-322  # rounding keeps smaller numbers from fading any further
-_MOST_PARTS = 4096  # of a piece, between which the attitude is computed
-_SHORTEST = 2.0**-20  # within this share of a piece, the drag of a velocity that just touches 0 is negligible
+_EPSILON = 2.0**-52
+_TOLERANCE = 64.0 * _EPSILON  # of the estimated error, which is far above the true one; rounding gives up to 40
+_FADED = 1e-14  # a state below this share of its largest size acts no more
+_SHARE = 1e-3  # a velocity below this share of the largest needs no smaller errors than one of this share
+_SHORTEST = 1e-30  # a substep in s; a motion that needs shorter ones overflows
+_NODES: tuple[float, ...] = (
+    0.05260015195876773,
+    0.0789002279381516,
+    0.1183503419072274,
+    0.2816496580927726,
+    1 / 3,
+    0.25,
+)
+_NODES += (0.3076923076923077, 0.6512820512820513, 0.6, 0.8571428571428571, 1.0)
+_STAGES: tuple[dict[int, float], ...] = (
+    {0: 0.05260015195876773},
+    {0: 0.0197250569845379, 1: 0.0591751709536137},
+    {0: 0.02958758547680685, 2: 0.08876275643042054},
+    {0: 0.2413651341592667, 2: -0.8845494793282861, 3: 0.924834003261792},
+    {0: 1 / 27, 3: 0.17082860872947386, 4: 0.12546768756682242},
+    {0: 0.037109375, 3: 0.17025221101954405, 4: 0.06021653898045596, 5: -0.017578125},
+    {0: 0.03709200011850479, 3: 0.17038392571223998, 4: 0.10726203044637328, 5: -0.015319437748624402}
+    | {6: 0.008273789163814023},
+    {0: 0.6241109587160757, 3: -3.3608926294469414, 4: -0.868219346841726, 5: 27.59209969944671, 6: 20.154067550477894}
+    | {7: -43.48988418106996},
+    {0: 0.47766253643826434, 3: -2.4881146199716677, 4: -0.590290826836843, 5: 21.230051448181193}
+    | {6: 15.279233632882423, 7: -33.28821096898486, 8: -0.020331201708508627},
+    {0: -0.9371424300859873, 3: 5.186372428844064, 4: 1.0914373489967295, 5: -8.149787010746927}
+    | {6: -18.52006565999696, 7: 22.739487099350505, 8: 2.4936055526796523, 9: -3.0467644718982196},
+    {0: 2.273310147516538, 3: -10.53449546673725, 4: -2.0008720582248625, 5: -17.9589318631188}
+    | {6: 27.94888452941996, 7: -2.8589982771350235, 8: -8.87285693353063, 9: 12.360567175794303}
+    | {10: 0.6433927460157636},
+)
+_WEIGHTS = {0: 0.054293734116568765, 5: 4.450312892752409, 6: 1.8915178993145003, 7: -5.801203960010585} | {
+    8: 0.3111643669578199,
+    9: -0.1521609496625161,
+    10: 0.20136540080403034,
+    11: 0.04471061572777259,
+}
+_FIFTH = {0: 0.01312004499419488, 5: -1.2251564463762044, 6: -0.4957589496572502, 7: 1.6643771824549864} | {
+    8: -0.35032884874997366,
+    9: 0.3341791187130175,
+    10: 0.08192320648511571,
+    11: -0.022355307863886294,
+}
+_THIRD = {**_WEIGHTS, 0: -0.18980075407240762, 8: -0.4226823213237919, 11: 0.02265179219836082}
 
-Series = Sequence[Sequence[float]]
-"""The coefficients of each state."""
+State = list[float]
 
 
-class Table:
-    """An equation in the form that a step needs: states and coefficients have places instead of names."""
-
-    def __init__(self, equation: Equation) -> None:
-        self.equation, self.states = equation, equation.states
-        self.place = place = {name: n for n, name in enumerate(self.states)}
-        self.monitored = [place[name] for name in equation.monitored]
-        self.rows: list[list[tuple[int, tuple[int, ...]]]] = []
-        """For each state, the terms of its rate: the place of the coefficient, and the places of the factors."""
-        self.velocities: list[int | None] = []
-        """For each coefficient, the place of the velocity on whose direction it depends, or None."""
-        formulas: dict[str, Expression] = {}
-        for terms in equation.rows.values():
-            self.rows.append([])
-            for term in terms:
-                self.rows[-1].append((len(formulas), tuple(place[name] for name in term.factors)))
-                directed = [equation.directed[name] for name in term.coefficient.names if name in equation.directed]
-                self.velocities.append(place[directed[0].velocity] if directed else None)
-                formulas[f"coefficient_{len(formulas)}"] = term.coefficient
-        self.coefficients = list(formulas)
-        self.coefficient_formulas = formulas
-        self.held_formulas = compiled({**equation.program, **equation.forces, **formulas}, equation.measured)
-        self.lag_formulas = compiled({force: after for force, (_, after) in equation.lagging.items()})
-        self.products = sorted({factors for row in self.rows for _, factors in row if len(factors) == 2})
-        self.used = {place[name] for name in equation.used}
-        """The states that a term contains. The others are integrals of them."""
-        self.orientation = {place[name] for name in equation.orientation if name in place}
-        self.end_formulas = compiled(equation.ends)
-        self.dynamic: list[tuple[set[int], set[int]]] = []
-        """The components that may settle, in their order: the states of each, and the other states it depends on."""
-        for component in equation.dynamic:
-            group = {place[name] for name in component}
-            inputs = {place[name] for state in component for name in equation.states_in_rate[state]}
-            self.dynamic.append((group, inputs - group))
-
-
-def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float]:
-    """Return the states after h > 0 seconds with the inputs held.
+def step(model: Any, values: Mapping[str, float], h: float) -> dict[str, float]:
+    """Return the states of a vehicle after h > 0 seconds with the inputs held, by their names.
 
     `values` are the coefficients, inputs and states by their names. The result is not finite when the motion overflows
-    or would take more than MOST_PIECES pieces.
+    or would need more than MOST_SUBSTEPS substeps.
     """
-    motion = Motion(table, values)
-    return motion.end() if motion.advance(h) else dict.fromkeys(motion.end(), nan)
+    motion = Motion(model, values)
+    return motion.end() if motion.move(h) else dict.fromkeys(motion.end(), nan)
 
 
 class Motion:
-    """The states of a table during a step, and the coefficients of the current piece."""
+    """The states of a model during a step, as offsets from the start where no rate depends on them."""
 
-    def __init__(self, table: Table, values: Mapping[str, float]) -> None:
-        self.table, self.values = table, dict(values)
-        found = table.held_formulas(values)
-        self.steady = {name: found[name] for forces in table.equation.lags.values() for name in forces.values()}
-        starts = {**found, **values}
-        self.y = [float(starts[name]) if name in table.equation.starts else 0.0 for name in table.states]
-        self.lost = [0.0] * len(self.y)  # the rounding error of each state, which would add up over many pieces
-        self.scale = [0.0] * len(self.y)  # the largest size of each state so far
-        self.start = dict(self.values)
+    def __init__(self, model: Any, values: Mapping[str, float]) -> None:
+        self.model, self.values, self.time, self.tried = model, dict(values), 0.0, 0
+        self.direction = dict.fromkeys(model.MONITORED, 1.0)
         self.settled: set[int] = set()
-        self.unit = 0.0  # the unit of time of the current series, s
-        self.heading = 0.0
-        """The heading of a vehicle with an attitude, with its turns, for the direction beside the nose."""
-        if table.equation.ends:
-            self.heading = turned_heading(found, values.get("psi", 0.0))
+        """The places of the states that do not change any more."""
         self.hold()
-
-    def advance(self, h: float) -> bool:
-        """Move for h seconds. Return False when the motion overflows or would take more than MOST_PIECES pieces."""
-        done, lost, unit = 0.0, 0.0, h  # elapsed seconds, their rounding error, and the unit of time of the series
-        for _ in range(MOST_PIECES):
-            self.settle()
-            if self.has_settled():
-                self.coast(h - done)
-                return True
-            unit = min(unit, h - done)
-            series = self.series(unit)
-            self.unit = unit
-            reach = self.reach(series)
-            if reach == 0.0:
-                unit *= 1e-3
-                if unit == 0.0:
-                    break
-                continue
-            length = self.move(series, reach)
-            if length * unit >= h - done:
-                return True
-            before, elapsed = done, length * unit + lost
-            done += elapsed
-            lost = elapsed - (done - before)
-            unit *= 2.0 * reach
-        return False
+        starts = {**self.held, **values, **dict.fromkeys(model.OFFSETS, 0.0)}
+        self.y: State = [starts[name] for name in model.STATES]
+        self.size = [0.0] * len(self.y)
+        """The largest size of each state so far."""
+        self.heading = self.turned(self.y, values.get("psi", 0.0))
+        self.begin()
 
     def hold(self) -> None:
-        """Compute the coefficients for both directions of the velocities.
+        """Compute all numbers that are constant until the next reversal."""
+        self.held = self.model.numbers({**self.values, **self.direction})
+        self.of_model = self.model.motion(self.held)
 
-        First, end the lags whose forces have all arrived: each of these forces becomes exactly the steady thrust.
+    def rates(self, after: float, y: State) -> State:
+        """Return the rates of the states some seconds after the start of the substep."""
+        rates: State = self.of_model(self.time + after, y)
+        for i in self.settled:
+            rates[i] = 0.0
+        return rates
+
+    def begin(self) -> None:
+        """Begin a substep: find the directions, the rates, and the sizes of the terms in the rates.
+
+        The rate of a velocity that is 0 tells its direction, unless it is a rounding error.
         """
-        table, values = self.table, self.values
-        for progress, forces in table.equation.lags.items():
-            gaps = {force: abs(self.steady[steady] - values[force]) for force, steady in forces.items()}
-            sizes = {force: abs(self.steady[steady]) + abs(self.start[force]) for force, steady in forces.items()}
-            has_arrived = all(gaps[force] <= _EPSILON * sizes[force] for force in forces)
-            if has_arrived:
-                values.update({force: self.steady[steady] for force, steady in forces.items()})
-            self.put(table.place[progress], 1.0 if has_arrived else 0.0)
-        forward = table.held_formulas({**values, **dict.fromkeys(table.equation.monitored, 1.0)})
-        reverse = table.held_formulas({**values, **dict.fromkeys(table.equation.monitored, -1.0)})
-        self.forward = [forward[name] for name in table.coefficients]
-        self.reverse = [reverse[name] for name in table.coefficients]
-        self.direct(self.y)
+        self.size = [max(size, abs(float(x))) for size, x in zip(self.size, self.y, strict=True)]
+        self.terms: State = self.model.sizes(self.held, self.time, self.y)
+        self.rate = self.rates(0.0, self.y)
+        before = dict(self.direction)
+        for name, i in self.model.MONITORED.items():
+            leads = self.y[i] or (0.0 if self.is_rounding(i, self.rate[i]) else self.rate[i])
+            self.direction[name] = copysign(1.0, leads) if leads else before[name]
+        if self.direction != before:
+            self.hold()
+            self.begin()  # the rates of other velocities may have changed
 
-    def put(self, state: int, value: float) -> None:
-        """Set a state to an exact value."""
-        self.y[state], self.lost[state] = value, 0.0
+    def is_rounding(self, i: int, rate: float) -> bool:
+        """Return True if the rate of a state is a rounding error of its terms."""
+        return abs(rate) <= 16.0 * _EPSILON * self.terms[i]
 
-    def direct(self, signs: Sequence[float]) -> None:
-        """Choose the coefficients for the signs of the velocities."""
-        both = zip(self.table.velocities, self.forward, self.reverse, strict=True)
-        self.k = [reverse if v is not None and signs[v] < 0.0 else forward for v, forward, reverse in both]
+    def move(self, h: float) -> bool:
+        """Move for h seconds. Return False if the motion overflows or needs too many substeps.
 
-    def rates(self, y: Sequence[float]) -> tuple[list[float], list[float]]:
-        """Return the rate of each state, and the sum of the sizes of its terms."""
-        rows = [[self.k[n] * prod(y[i] for i in factors) for n, factors in row] for row in self.table.rows]
-        return [_sum(row) for row in rows], [_sum(map(abs, row)) for row in rows]
+        Once all has settled, whole turns are skipped, because each changes the offsets by the same.
+        """
+        rest = self.substeps(h)
+        turn = tau / (hypot(*(float(self.y[i]) for i in self.model.TURNING)) or nan)
+        if self.has_settled and rest > 2.0 * turn:
+            before, heading = list(self.y), self.heading
+            if self.substeps(turn) > 0.0:
+                return False
+            turns = floor((rest - turn) / turn)
+            rest = max(0.0, rest - turn - turns * turn)
+            self.heading += turns * (self.heading - heading)
+            for i in self.model.OFFSETS.values():
+                self.y[i] += turns * (self.y[i] - before[i])
+            for i in self.model.QUATERNION.values() if turns % 2 else ():
+                self.y[i] *= -1.0
+            self.begin()
+        rest = self.substeps(rest)
+        return rest == 0.0
+
+    def substeps(self, rest: float) -> float:
+        """Move for a time, or until nothing changes any more. Return the rest of the time."""
+        h = rest
+        while rest > 0.0 and h > _SHORTEST and self.tried < MOST_SUBSTEPS:
+            self.tried += 1
+            h = min(h, rest)
+            y, error = self.trial(h)
+            if error > 1.0:
+                h *= max(0.1, 0.9 * error**-0.125)
+                continue
+            length, reversing = self.reversal(h, y)
+            if reversing is None and length < h:
+                h = length
+                continue
+            if reversing is not None:
+                y, _ = self.trial(length)
+                y[reversing] -= float(y[reversing])
+            self.y, self.time, rest = y, self.time + length, rest - length
+            self.heading = self.turned(y, self.heading)
+            self.begin()
+            if not self.has_settled and self.settle(length):
+                break
+            h *= min(6.0, 0.9 * (error or 1e-9) ** -0.125)
+        return rest
+
+    def trial(self, h: float) -> tuple[State, float]:
+        """Return the states after a substep, and the largest error relative to the tolerance."""
+        slopes = [self.rate]
+        for node, weights in zip(_NODES, _STAGES, strict=True):
+            change = self.combined(weights, slopes)
+            slopes.append(self.rates(node * h, [x + h * d for x, d in zip(self.y, change, strict=True)]))
+        y = [x + h * d for x, d in zip(self.y, self.combined(_WEIGHTS, slopes), strict=True)]
+        if not all(isfinite(x) for x in y):
+            return y, inf
+        return y, self.error(h, y, self.combined(_FIFTH, slopes), self.combined(_THIRD, slopes))
+
+    def error(self, h: float, y: State, fifth: State, third: State) -> float:
+        """Return the largest error of a substep relative to the tolerance. `fifth` and `third` estimate its rate."""
+        error = self.swing(y)
+        own = zip(self.size, y, self.terms, strict=True)
+        sizes = [max(size, abs(float(x))) + h * float(terms) for size, x, terms in own]
+        for group in self.model.GROUPS:
+            least = _SHARE * max(sizes[i] for i in group)
+            for i in group:
+                sizes[i] = max(sizes[i], least)
+        for size, e, e_3 in zip(sizes, map(float, fifth), map(float, third), strict=True):
+            a, b = (h * x / size / _TOLERANCE if size else 0.0 for x in (e, e_3))
+            if a * a > 0.0:
+                error = max(error, a * a / sqrt(a * a + 0.01 * b * b))
+        return error
+
+    def combined(self, weights: Mapping[int, float], slopes: Sequence[State]) -> State:
+        """Return a weighted sum of slopes."""
+        total = [0.0] * len(self.y)
+        for n, weight in weights.items():
+            total = [x + weight * slope for x, slope in zip(total, slopes[n], strict=True)]
+        return total
+
+    def reversal(self, h: float, y: State) -> tuple[float, int | None]:
+        """Return the time and the place of the first velocity that reverses in a substep with the states y at its end.
+
+        Without a reversal, this is h and None. A shorter time and None ask for another trial, because the direction of
+        a velocity that begins at 0 was the wrong one.
+        """
+        found: tuple[float, int | None] = h, None
+        rates = self.rates(h, y)
+        for name, i in self.model.MONITORED.items():
+            sign, length = self.direction[name], found[0]
+
+            def velocity(t: float, i: int = i, sign: float = sign) -> float:
+                return sign * float(self.trial(t)[0][i])
+
+            def slope(t: float, i: int = i, sign: float = sign) -> float:
+                return sign * float(self.rates(t, self.trial(t)[0])[i])
+
+            if self.y[i] and self.rate[i] * sign < 0.0 < rates[i] * sign and y[i] * sign > 0.0:
+                length = _root(slope, length, float(self.rate[i] * sign), float(rates[i] * sign))  # where it is slowest
+            reached = y[i] * sign if length == h else velocity(length)
+            if reached < -_EPSILON * max(self.size[i], abs(float(y[i]))):
+                if self.y[i]:
+                    found = _root(velocity, length, float(self.y[i] * sign), float(reached)), i
+                    continue
+                if self.is_rounding(i, self.rate[i]):
+                    self.direction[name] = -sign
+                    self.hold()
+                    self.rate = self.rates(0.0, self.y)
+                return 0.5 * h, None
+        return found
+
+    def settle(self, h: float) -> bool:
+        """Find the components that do not change any more, and return True if these are all.
+
+        The others on which such a component depends have settled, and its rates are rounding errors, once those of its
+        states that have faded are put to rest. `h` is the length of the last substep.
+        """
+        for group, inputs in self.model.DYNAMIC:
+            if self.settled.isdisjoint(group) and self.settled.issuperset(inputs):
+                y = list(self.y)
+                for i in group:
+                    if abs(y[i]) <= _FADED * (self.size[i] + h * self.terms[i]):
+                        y[i] -= float(y[i])
+                rates, terms = self.rates(0.0, y), self.model.sizes(self.held, self.time, y)
+                if all(abs(rates[i]) <= 16.0 * _EPSILON * terms[i] for i in group):
+                    self.settled |= set(group)
+                    self.y = y
+                    self.begin()
+        return self.has_settled
+
+    @property
+    def has_settled(self) -> bool:
+        """True if only the orientation and the offsets still change."""
+        return all(map(self.settled.issuperset, (group for group, _ in self.model.DYNAMIC)))
 
     # ---- Attitude ----
 
-    def follow(self, y_at: Callable[[float], Sequence[float]], end: float, turn: float, swing: float) -> None:
-        """Follow the turns of the heading, and the sign of the quaternion, from time 0 to the end of a motion.
+    def rows(self, y: State) -> list[list[float]]:
+        """Return the first two rows of the rotation matrix."""
+        return [[float(y[i]) for i in row] for row in self.model.ROTATION]
 
-        Per unit of time, the vehicle turns by at most `turn`, and the direction beside the nose by at most `swing`. In
-        each part of this time, the direction moves by less than its distance from the vertical, so that its heading is
-        that of the same turn; and the vehicle turns by less than half a turn, so that its quaternion has the sign that
-        is nearer to the one before.
-        """
-        t, horizontal = 0.0, beside_nose(self.rotation(y_at(0.0)))
-        for n in range(1, _MOST_PARTS + 1):
-            if not t < end:
-                break
-            part = min(0.9 * hypot(*horizontal) / (swing or _SMALLEST), 2.0 / (turn or _SMALLEST))
-            t = min(t + max(part, end / _MOST_PARTS), end) if n < _MOST_PARTS else end
-            values = self.rotation(y_at(t))
-            found = self.table.end_formulas({**self.start, **values})
-            self.start |= {name: found[f"next_{name}"] for name in QUATERNION}
-            horizontal, self.heading = beside_nose(values), turned_heading(values, self.heading)
+    def turned(self, y: State, heading: float) -> float:
+        """Return the heading of the direction beside the nose, by at most half a turn from a heading before."""
+        return turned_heading(self.rows(y), heading) if self.model.ROTATION else heading
 
-    def rotation(self, y: Sequence[float]) -> dict[str, float]:
-        """Return the entries of the rotation matrix by name."""
-        return {name: y[self.table.place[name]] for name in self.table.equation.orientation if name in self.table.place}
-
-    # ---- Settled states ----
-
-    def settle(self) -> None:
-        """Find the components that have settled.
-
-        A component has settled when those that it depends on have settled and its rates are rounding errors. A
-        component that has faded to nothing, and that nothing drives, is put to rest.
-        """
-        y = self.y
-        self.direct(y)
-        self.scale = [max(size, abs(x)) for size, x in zip(self.scale, y, strict=True)]
-        rates, sizes = self.rates(y)
-        self.settled = set()
-        for group, inputs in self.table.dynamic:
-            if inputs <= self.settled:
-                if all(abs(rates[i]) <= 8.0 * _EPSILON * sizes[i] for i in group):
-                    self.settled |= group
-                elif all(abs(y[i]) <= _FADED * self.scale[i] + _SMALLEST for i in group):
-                    at_rest, _ = self.rates([0.0 if i in group else x for i, x in enumerate(y)])
-                    if not any(at_rest[i] for i in group):
-                        self.settled |= group
-                        for i in group:
-                            self.put(i, 0.0)
-
-    def has_settled(self) -> bool:
-        """Return True when all states are constant, except for the heading and the integrals."""
-        return self.table.used - self.table.orientation <= self.settled
-
-    def coast(self, h: float) -> None:
-        """Move for h seconds of straight or circular motion, once all has settled.
-
-        Only the heading still changes, by a rotation y' = L y with L^3 = -w^2 L. The integrals rise by h times their
-        rates at the mean of y, which is y + (1 - cos wh)/(w^2 h) L y + (1 - sin(wh)/(wh))/w^2 L^2 y.
-        """
-        table, mean, end = self.table, list(self.y), list(self.y)
-        turning = table.orientation - self.settled
-        first = self.rates(mean)[0]
-        second = self.rates([first[i] if i in turning else x for i, x in enumerate(mean)])[0]
-        slope, bend = (hypot(*(rates[i] for i in turning)) for rates in (first, second))
-        w = bend / slope if slope else 0.0
-        angle = w * h
-        if angle:
-            half, whole = (sin(0.5 * angle), sin(angle)) if isfinite(angle) else (nan, nan)
-            for i in turning:
-                along, across = first[i] / w, second[i] / w / w
-                mean[i] += 2.0 * half * half / angle * along + (1.0 - whole / angle) * across
-                end[i] += whole * along + 2.0 * half * half * across
-            if table.equation.ends:
-                sines = [x / w if i in turning else 0.0 for i, x in enumerate(first)]
-                self.follow_circle(sines, [x / w / w if i in turning else 0.0 for i, x in enumerate(second)], angle)
-        rates, _ = self.rates(mean)
-        self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(end)]
-
-    def follow_circle(self, along: Sequence[float], across: Sequence[float], angle: float) -> None:
-        """Follow the attitude through a rotation with constant velocities.
-
-        At the angle a, the table has the states y + sin(a) along + (1 - cos(a)) across. Every whole turn changes the
-        heading by the same angle, and the sign of the quaternion.
-        """
-
-        def y_at(t: float) -> list[float]:
-            whole, half = sin(t), sin(0.5 * t)
-            return [x + whole * a + 2.0 * half * half * b for x, a, b in zip(self.y, along, across, strict=True)]
-
-        swing, turns = hypot(*beside_nose(self.rotation(along), (1, 2, 3))), angle // tau
-        before, start = self.heading, dict(self.start)
-        self.follow(y_at, tau, 1.0, swing)
-        self.heading = before + (self.heading - before) * turns
-        if turns % 2.0 == 0.0:
-            self.start = start
-        self.follow(y_at, angle % tau, 1.0, swing)
-
-    # ---- A piece ----
-
-    def series(self, unit: float) -> Series:
-        """Return the series of all states, with time in units of `unit` seconds.
-
-        The direction of a velocity that is 0 is that of its first nonzero coefficient. Until then its terms are 0.
-        """
-        table, c = self.table, [[x] for x in self.y]
-        signs = [0.0] * len(c)
-        for n in range(ORDER):
-            begins = [v for v in table.monitored if signs[v] == 0.0 and c[v][n] != 0.0]
-            if begins:
-                for v in begins:
-                    signs[v] = copysign(1.0, c[v][n])
-                self.direct(signs)
-            factor: dict[tuple[int, ...], float] = {
-                (a, b): _sum(map(mul, c[a], reversed(c[b]))) for a, b in table.products
-            }
-            factor.update({(i,): x[n] for i, x in enumerate(c)})
-            factor[()] = 1.0 if n == 0 else 0.0
-            for i, row in enumerate(table.rows):
-                rate = 0.0
-                if i not in self.settled:
-                    for place, factors in row:
-                        rate += self.k[place] * factor[factors]
-                c[i].append(unit * rate / (n + 1))
-        return c
-
-    def reach(self, series: Series) -> float:
-        """Return the time up to which the series may be used, at most 1; 0 when they overflow."""
-        if not all(isfinite(x) for c in series for x in c[-3:]):
+    def swing(self, y: State) -> float:
+        """Return an error above 1 if the direction beside the nose could have passed the vertical on either side."""
+        if not self.model.ROTATION:
             return 0.0
-        return min(1.0, *(usable_time(series[i]) for i in self.table.used))
-
-    def end_of_piece(self, series: Series, length: float) -> tuple[float, int | None]:
-        """Return the end of a piece, and the place of the velocity that reverses there, or None."""
-        reversed_velocity = None
-        for v in self.table.monitored:
-            end, is_reversal = _sign_kept(series[v], length)
-            if is_reversal or end < length:
-                length, reversed_velocity = end, v if is_reversal else None
-        return length, reversed_velocity
-
-    def move(self, series: Series, length: float) -> float:
-        """Move to the end of a piece, which is at `length` or at the first reversal, and return that time."""
-        length, reversed_velocity = self.end_of_piece(series, length)
-        if self.table.equation.ends:
-            self.follow_series(series, length)
-        changes = [_change(c, length) + lost for c, lost in zip(series, self.lost, strict=True)]
-        before, self.y = self.y, [x + change for x, change in zip(self.y, changes, strict=True)]
-        self.lost = [change - (x - y) for change, x, y in zip(changes, self.y, before, strict=True)]
-        if reversed_velocity is not None:
-            self.put(reversed_velocity, 0.0)  # so that the next piece has the other direction
-        if self.steady:
-            self.arrive()
-        return length
-
-    def arrive(self) -> None:
-        """Update the forces that lag, and the coefficients that follow from them, at the end of a piece."""
-        progress = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
-        found = self.table.lag_formulas({**self.values, **self.steady, **progress})
-        self.values.update({force: found[force] for force in self.table.equation.lagging})
-        self.hold()
-
-    def follow_series(self, series: Series, length: float) -> None:
-        """Follow the attitude through a piece."""
-        place, entries = self.table.place, [self.table.place[name] for name in self.rotation(self.y)]
-        bounds = {v: sum(abs(x) * length**k for k, x in enumerate(series[place[v]])) for v in "pqr" if v in place}
-        about = {"p": 2.0 * BESIDE_NOSE[1], "q": 1.0, "r": 1.0}
-        turn = self.unit * hypot(*bounds.values())
-        swing = self.unit * hypot(*(about[v] * bound for v, bound in bounds.items()))
-
-        def y_at(t: float) -> list[float]:
-            y = list(self.y)
-            for i in entries:
-                y[i] += _change(series[i], t)
-            return y
-
-        self.follow(y_at, length, turn, swing)
+        (a, b), (c, d) = beside_nose(self.rows(self.y)), beside_nose(self.rows(y))
+        return float(min(hypot(c - a, d - b) / max(0.9 * hypot(a, b), 1e-9), 1e9) ** 8.0)
 
     def end(self) -> dict[str, float]:
-        """Return the vehicle's states by their names."""
-        equation, found = self.table.equation, {force: self.values[force] for force in self.table.equation.lagging}
-        for name, x in zip(self.table.states, self.y, strict=True):
-            if name in self.start:  # an integral has only counted the change
-                found[name] = x if name in equation.starts else self.start[name] + x
-        if equation.ends:
-            after = self.table.end_formulas({**self.start, **dict(zip(self.table.states, self.y, strict=True))})
-            rotation = self.rotation(self.y)
-            psi = unwrapped(atan2(rotation["R_21"], rotation["R_11"]), self.heading)
-            found |= {name: after[f"next_{name}"] for name in QUATERNION} | {"psi": psi}
+        """Return the states of the vehicle by their names."""
+        y = dict(zip(self.model.STATES, self.y, strict=True))
+        found = {name: x for name, x in y.items() if name in self.values}
+        found |= {name: self.values[name] + y[name] for name in self.model.OFFSETS if name in self.values}
+        found |= self.model.lagging(self.held, self.time)
+        if self.model.ROTATION:
+            e, a, b, c = (y[name] for name in self.model.QUATERNION)
+            length = (e * e + a * a + b * b + c * c) ** 0.5
+            found |= {name: y[name] / length for name in self.model.QUATERNION}
+            found["psi"] = heading({name: float(x) for name, x in y.items()}, self.heading)
         return found
+
+
+# ---- Dead time -------------------------------------------------------------------------------------------------------
+
+
+class Change(NamedTuple):
+    """A change of the commands that waits for the dead time.
+
+    It has the time that it still takes. The time at which it arrives would have fewer digits late in a run.
+    """
+
+    remaining: float
+    """The time until it arrives, s."""
+    commands: dict[str, float]
+    lost: float = 0.0
+    """The rounding error of the remaining time, which would add up over many small steps."""
+
+    def after(self, h: float) -> "Change":
+        """Return the same change h seconds later."""
+        passed = self.lost - h
+        remaining = self.remaining + passed
+        return Change(remaining, self.commands, passed - (remaining - self.remaining))
+
+
+class DelayLine:
+    """The commands that act on a vehicle, and the changes that wait for the dead time.
+
+    Before its first command, every thruster is still. For a vehicle without a dead time, nothing waits.
+    """
+
+    def __init__(self, starts: Mapping[str, float], acting: Mapping[str, str]) -> None:
+        """Begin with the commands at the start. `acting` are the names of the commands that act after the dead time.
+
+        There are none without a dead time.
+        """
+        self.names = acting
+        self.acting = {name: starts[name] for name in acting}
+        """The commands that act."""
+        self.waiting: list[Change] = []
+        """The changes that have not arrived yet. Their remaining times never fall."""
+
+    def step(
+        self, vehicle: Any, inputs: Mapping[str, float], state: Mapping[str, float], t: float, h: float
+    ) -> dict[str, float]:
+        """Return the states of a vehicle after h > 0 seconds from time t with the inputs held.
+
+        Raises ValueError when more than MOST_WAITING changes wait. After that, and after a motion that overflows,
+        `waiting` is the same as before the step.
+        """
+        if not self.names:
+            return dict(vehicle.step(inputs, state, h))
+        line = copy(self)
+        line._send({name: inputs[name] for name in self.names}, vehicle["T_d"])
+        passed, after = 0.0, dict(state)
+        while passed < h:
+            line._receive(t, passed)
+            until = min(h, line.waiting[0].remaining) if line.waiting else h
+            after = vehicle.step({**inputs, **line.delayed}, after, until - passed)
+            passed = until
+        line.waiting = [change.after(h) for change in line.waiting]
+        line._receive(t + h)
+        if all(map(isfinite, after.values())):
+            self.acting, self.waiting = line.acting, line.waiting
+        return after
+
+    @property
+    def delayed(self) -> dict[str, float]:
+        """The commands that act, by the names of the variables for them."""
+        return {self.names[name]: value for name, value in self.acting.items()}
+
+    def _send(self, commands: dict[str, float], dead_time: float) -> None:
+        if commands == (self.waiting[-1].commands if self.waiting else self.acting):
+            return
+        kept = [change for change in self.waiting if change.remaining < dead_time]
+        if len(kept) == MOST_WAITING:
+            raise ValueError(
+                f"more than {MOST_WAITING} changes of commands wait for the dead time; change them less often"
+            )
+        self.waiting = [*kept, Change(dead_time, commands)]
+
+    def _receive(self, t: float, passed: float = 0.0) -> None:
+        while self.waiting and self.waiting[0].remaining - passed <= 4.0 * _EPSILON * (1.0 + abs(t)):
+            self.acting, self.waiting = self.waiting[0].commands, self.waiting[1:]
 
 
 # ---- Numbers ---------------------------------------------------------------------------------------------------------
 
 
-def _sum(terms: Iterable[float]) -> float:
-    """Return a sum that is the same in all versions of Python, unlike sum()."""
-    total = 0.0
-    for x in terms:
-        total += x
-    return total
-
-
-def _change(c: Sequence[float], t: float) -> float:
-    """Return the change of a state from 0 to t."""
-    change = 0.0
-    for x in c[:0:-1]:
-        change = (change + x) * t
-    return change
-
-
-def usable_time(c: Sequence[float]) -> float:
-    """Return the time at which the terms decrease like the powers of _RATIO from the first three to the last three.
-
-    Of three neighbouring coefficients the largest counts, because every second or third coefficient may be 0.
-    """
-    first = next((n for n, x in enumerate(c) if x != 0.0), len(c))
-    reach = inf
-    for n in range(max(first + 1, len(c) - 3), len(c)):
-        if c[n] != 0.0:
-            terms = range(first, min(first + 3, n))
-            reach = min(reach, _RATIO * max(abs(c[k] / c[n]) ** (1.0 / (n - k)) for k in terms))
-    return reach
-
-
-def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
-    """Return a time up to which a velocity certainly keeps its sign, and whether the velocity is 0 at that time.
-
-    The time is at most `length`.
-    """
-    first = next((n for n, x in enumerate(c) if x != 0.0), None)
-    shortest = _SHORTEST * length
-    while first is not None and length > shortest:
-        sizes = [abs(x) * length**n for n, x in enumerate(c)]
-        if sizes[first] >= sum(sizes[first + 1 :]):
+def _root(f: Callable[[float], float], b: float, f_0: float, f_b: float) -> float:
+    """Return where a function changes its sign between 0 and b, by the Illinois method."""
+    a, f_a = 0.0, f_0
+    for _ in range(100):
+        x = b - f_b * (b - a) / (f_b - f_a) if f_b else b
+        if not min(a, b) < x < max(a, b):
             break
-        if first == 0 and sizes[1] > 4.0 * sum(n * size for n, size in enumerate(sizes[2:], 2)):  # monotonic
-            end = c[0] + _change(c, length)
-            is_reversal = end == 0.0 or (end > 0.0) != (c[0] > 0.0)  # the product of both values could underflow
-            return (min(length, _root(c)), True) if is_reversal else (length, False)
-        length *= 0.5
-    return length, False
+        f_x = f(x)
+        if (f_x < 0.0) == (f_b < 0.0):
+            f_a *= 0.5
+        else:
+            a, f_a = b, f_b
+        b, f_b = x, f_x
+    return b if abs(f_b) <= abs(f_a) else a
 
 
-def _root(c: Sequence[float]) -> float:
-    """Return the root of a series by Newton's method. The slope must stay within a quarter of the first slope."""
-    t, following = 0.0, -c[0] / c[1]
-    for _ in range(60):
-        if abs(following - t) <= 2.0 * _EPSILON * following:
-            break
-        t, slope = following, 0.0
-        for n in range(len(c) - 1, 0, -1):
-            slope = slope * t + n * c[n]
-        following = t - (c[0] + _change(c, t)) / slope
-    return following
+def beside_nose(rows: Sequence[Sequence[float]]) -> list[float]:
+    """Return components of the direction beside the nose for rows of the rotation matrix."""
+    (a, b, c) = BESIDE_NOSE
+    return [a * x + (b * y + c * z) for x, y, z in rows]
+
+
+def turned_heading(rows: Sequence[Sequence[float]], near: float) -> float:
+    """Return the heading of the direction beside the nose that differs from another heading by at most half a turn.
+
+    `rows` are the first two rows of the rotation matrix.
+    """
+    north, east = beside_nose(rows)
+    return unwrapped(atan2(east, north), near)
+
+
+def heading(entries: Mapping[str, float], near: float) -> float:
+    """Return the heading of the nose for a rotation matrix, in the turn that follows from a heading before."""
+    rows = [[entries[f"R_{row}{column}"] for column in (1, 2, 3)] for row in (1, 2)]
+    return unwrapped(atan2(rows[1][0], rows[0][0]), turned_heading(rows, near))
+
+
+def unwrapped(angle: float, near: float) -> float:
+    """Return the angle that differs from an angle by whole turns and is the nearest to another one."""
+    turns = (near - angle) / tau
+    return angle + tau * round(turns) if isfinite(turns) else nan
+
+
+def cubic(f: Any, g: Any, a: Any, b: Any, t: Any) -> Any:
+    """Return the cubic between 0 and 1 at t. Its values at the ends are f and g, and its slopes there are a and b."""
+    return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+
+
+def interpolated(x: Any, table: Sequence[Sequence[float]]) -> Any:
+    """Return the value at x of cubics between points. The table has the places, values and slopes of the points."""
+    places, values, slopes = table
+    n = min(max(bisect_right(places, x) - 1, 0), len(places) - 2)
+    h = places[n + 1] - places[n]
+    return cubic(values[n], values[n + 1], h * slopes[n], h * slopes[n + 1], (x - places[n]) / h)

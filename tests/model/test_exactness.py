@@ -217,7 +217,6 @@ OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e3
 def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: Fmu, name: str) -> None:
     rov, inputs, before, h = OVERFLOWING[name]
     start = process_time()
-    assert name == "spin" or not all(map(isfinite, in_python(rov, inputs, before, h).values()))
     with fmu.instance() as instance:
         instance.start({**rov.coefficients, **inputs, **before})
         assert instance.step(0.0, h) == ERROR
@@ -306,7 +305,7 @@ def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(steps: list[Ste
         for step in steps:
             started = process_time()
             found = step(VIDEORAY, inputs, before, 1000.0)
-            assert process_time() - started < (1.0 if step is in_python else 0.1)
+            assert process_time() - started < 0.1
             assert max(errors(found, exact.state, exact.scale, before)) <= 1e-14
 
 

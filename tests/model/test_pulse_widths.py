@@ -7,7 +7,6 @@ import pytest
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.catalogue import AXES
-from rov_fmu.model.delay import DelayLine
 from rov_fmu.model.dependencies import dependencies_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, at_rest, pulsed, random_inputs, random_state
@@ -42,7 +41,7 @@ def pulses_of(rng: random.Random, rov: Vehicle) -> tuple[dict[str, float], dict[
 
 def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
     rng, of_pulses = random.Random(1), pulsed(rov, PULSE)
-    lines = DelayLine(of_pulses.layout), DelayLine(rov.layout)
+    lines = of_pulses.delay_line(), rov.delay_line()
     state = random_state(rng, rov)
     for n in range(12):
         pulses, fractions = pulses_of(rng, rov)
@@ -107,7 +106,7 @@ def test_what_depends_on_a_command_still_does(rov: Vehicle) -> None:
 
 def test_a_command_acts_after_the_dead_time_and_neutral_before() -> None:
     rov = pulsed(ROVS["thrust"], PULSE)
-    line = DelayLine(rov.layout)
+    line = rov.delay_line()
     assert set(line.delayed.values()) == {PULSE[1]}
     inputs = rov.layout.usual_inputs | {"u_l": 1900.0}
     state = line.step(rov, inputs, at_rest(rov), 0.0, rov["T_d"])

@@ -1,21 +1,21 @@
-"""Steps in cases that are difficult for Taylor series: reversals, lags, stiffness, overflow."""
+"""Steps in cases that are difficult for a Runge-Kutta method: reversals, lags, stiffness, very long steps, overflow."""
 
 import random
-from collections.abc import Mapping
+from collections.abc import Callable
 from itertools import product
-from math import exp, isfinite, pi
+from math import cos, exp, isfinite, log1p, pi, sin
 from time import process_time
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from rov_fmu.model import step as module
-from rov_fmu.model.equation import ONE, Directed, Equation, Term
-from rov_fmu.model.expression import Name, of
-from rov_fmu.model.step import ORDER, Table, usable_time
+from rov_fmu.model.catalogue import RESTORING
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.model.steps import in_python, worst
-from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
+from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
 
 COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
 FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
@@ -75,8 +75,7 @@ def test_a_step_in_a_special_case_is_exact(name: str) -> None:
     rov, inputs, state, steps = CASES[name]
     for h in steps:
         velocity, path = worst(in_python, *case(rov, inputs, state), h)
-        assert velocity <= 1e-14, h
-        assert path <= 1e-13, h
+        assert max(velocity, path) <= 1e-13, h
 
 
 @pytest.mark.parametrize(
@@ -100,34 +99,45 @@ def test_a_step_is_exact_whatever_the_drag_in_reverse(names: list[str], shares: 
                 assert max(velocity, path) <= 1e-13, (name, share, inputs, start, h)
 
 
-# ---- Other tables ----
+# ---- Other models ----
 
 
-def table_of(rows: Mapping[str, tuple[Term, ...]], **directed: Directed) -> Table:
-    """Return a table with these rows and without formulas. All its states are states of the vehicle."""
-    return Table(Equation({}, directed, {}, {}, rows, {name: Name(name) for name in rows}, lags={}))
+def model_of(rates: Callable[[dict[str, float]], Callable[[float, list[float]], list[float]]], *states: str) -> Any:
+    """Return a model without lags whose states are all states of the vehicle. It monitors the state v."""
+    places = {name: n for n, name in enumerate(states)}
+    return SimpleNamespace(
+        STATES=states,
+        MONITORED={"v": places["v"]} if "v" in places else {},
+        DYNAMIC=[([*places.values()], [])],
+        OFFSETS={},
+        GROUPS=[],
+        TURNING=(),
+        QUATERNION={},
+        ROTATION=[],
+        numbers=dict,
+        motion=rates,
+        sizes=lambda v, *at: [abs(x) for x in rates(v)(*at)],
+        lagging=lambda *_: {},
+    )
 
 
-def test_a_series_of_which_two_coefficients_in_three_are_zero_is_not_used_too_far() -> None:
+def test_a_motion_whose_rates_begin_at_zero_is_exact() -> None:
     """With t' = 1, q' = 2 t and y' = q y, the solution is y = exp(t^3/3)."""
-    table = table_of({"t": (Term(ONE),), "q": (Term(of(2.0), ("t",)),), "y": (Term(ONE, ("q", "y")),)})
+    model = model_of(lambda _: lambda _, y: [1.0, 2.0 * y[0], y[1] * y[2]], "t", "q", "y")
     for h in (0.5, 1.0, 2.0, 3.0):
-        found = module.step(table, {"t": 0.0, "q": 0.0, "y": 1.0}, h)
+        found = module.step(model, {"t": 0.0, "q": 0.0, "y": 1.0}, h)
         assert found == pytest.approx({"t": h, "q": h * h, "y": exp(h**3 / 3.0)}, rel=2e-14)
 
 
 def test_a_pendulum_with_a_stop_that_pushes_back_harder_reverses_at_the_exact_time() -> None:
     """With v' = -x and x' = k v, where k depends on the direction, the motion consists of half ellipses."""
-    table = table_of(
-        {"x": (Term(Name("k"), ("v",)),), "v": (Term(-ONE, ("x",)),)},
-        k=Directed("v", of(4.0), ONE),
-    )
-    found = module.step(table, {"x": 1.0, "v": 0.0}, 0.5 * pi)  # v < 0: x = cos t
-    assert found == pytest.approx({"x": 0.0, "v": -1.0}, abs=1e-15)
-    found = module.step(table, {"x": 1.0, "v": 0.0}, pi + 0.25 * pi)  # from t = pi on v > 0: x = -cos 2 (t - pi)
-    assert found == pytest.approx({"x": 0.0, "v": 0.5}, abs=1e-15)
-    found = module.step(table, {"x": 1.0, "v": 0.0}, 101 * 1.5 * pi)
-    assert found == pytest.approx({"x": 1.0, "v": 0.0}, abs=1e-13)
+    model = model_of(lambda v: lambda _, y: [(4.0 if v["v"] > 0.0 else 1.0) * y[1], -y[0]], "x", "v")
+    found = module.step(model, {"x": 1.0, "v": 0.0}, 0.5 * pi)  # v < 0: x = cos t
+    assert found == pytest.approx({"x": 0.0, "v": -1.0}, abs=1e-14)
+    found = module.step(model, {"x": 1.0, "v": 0.0}, pi + 0.25 * pi)  # from t = pi on v > 0: x = -cos 2 (t - pi)
+    assert found == pytest.approx({"x": 0.0, "v": 0.5}, abs=1e-14)
+    found = module.step(model, {"x": 1.0, "v": 0.0}, 101 * 1.5 * pi)
+    assert found == pytest.approx({"x": 1.0, "v": 0.0}, abs=1e-12)
 
 
 # ---- Reversals ----
@@ -148,7 +158,7 @@ def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Vehicle) -> Non
     assert high < 2.0
     for h in (low, high, high * (1.0 - 1e-9), high * (1.0 + 1e-9), 2.0 * high):
         velocity, path = worst(in_python, rov, inputs, state, h)
-        assert max(velocity, path) <= 1e-14, h
+        assert max(velocity, path) <= 1e-13, h
 
 
 def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
@@ -164,7 +174,7 @@ def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
         low, high = (u, high) if lowest(u) < 0.0 else (low, u)
     for depth in (0.0, 1e-12, 1e-6, -1e-9):
         velocity, path = worst(in_python, rov, inputs, {**state, "u": high - depth}, 0.4)
-        assert max(velocity, path) <= 1e-14, depth
+        assert max(velocity, path) <= 1e-13, depth
 
 
 # ---- Overflow and very long steps ----
@@ -188,10 +198,10 @@ def test_a_step_that_overflows_is_not_finite_and_takes_no_time(
     assert process_time() - start < 2.0
 
 
-def test_a_step_of_too_many_pieces_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_of_too_many_substeps_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
     rov, inputs, state = case(COUPLED, {}, {"u": 1.0, "v": 0.2, "r": 3.0})
     assert all(map(isfinite, rov.step(inputs, state, 5.0).values()))
-    monkeypatch.setattr(module, "MOST_PIECES", 3)
+    monkeypatch.setattr(module, "MOST_SUBSTEPS", 3)
     assert not all(map(isfinite, rov.step(inputs, state, 5.0).values()))
 
 
@@ -204,60 +214,37 @@ def test_once_all_has_settled_a_step_of_any_length_takes_no_longer(h: float) -> 
     assert all(map(isfinite, found.values()))
 
 
-# ---- Numbers of a series ----
-
-SHARE = 2.0 ** (-57 / 21)
-"""The part of its radius of convergence up to which a series of order 20 is used."""
-
-
-@pytest.mark.parametrize(
-    ("c", "expected"),
-    [
-        ([1.0] * 21, SHARE),
-        ([3.0 * 4.0**n for n in range(21)], SHARE / 4.0),
-        ([0.0] * 5 + [1.0] * 16, SHARE),
-        ([float(n % 2 == 0) for n in range(21)], SHARE),
-        ([1.0, 100.0, *[1.0] * 19], SHARE * 100.0 ** (1 / 19)),
-        ([1.0, 1.0, 100.0, *[1.0] * 18], SHARE * 100.0 ** (1 / 18)),
-        ([1.0, 1.0, 1.0, 100.0, *[1.0] * 17], SHARE),
-        ([1.0] * 20 + [1e6], SHARE * 1e-6 ** (1 / 20)),
-        ([1.0] * 18 + [1e6, 1.0, 1.0], SHARE * 1e-6 ** (1 / 18)),
-        ([1.0] * 17 + [1e6, 1.0, 1.0, 1.0], SHARE),
-        ([0.0] * 19 + [1.0, 4.0], SHARE / 4.0),
-        ([0.0] * 20 + [1.0], float("inf")),
-        ([5.0] + [0.0] * 20, float("inf")),
-        ([0.0] * 21, float("inf")),
-    ],
-)
-def test_a_series_is_used_up_to_a_share_of_where_its_last_terms_equal_its_first(
-    c: list[float], expected: float
-) -> None:
-    assert len(c) == ORDER + 1
-    assert usable_time(c) == pytest.approx(expected, rel=1e-12)
+@pytest.mark.parametrize("h", [100.0, 1e3, 1e6])
+def test_a_long_step_ends_in_straight_or_circular_motion(h: float) -> None:
+    """From a state that has settled, the motion is a circle, with its radius from the steady velocities."""
+    inputs = still(VIDEORAY) | {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5, "V_N": 0.1}
+    a = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0)
+    b = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0 + h)
+    u, r = a["u"], a["r"]
+    assert [b[v] for v in "uwr"] == pytest.approx([a[v] for v in "uwr"], rel=1e-14)
+    assert b["psi"] == pytest.approx(a["psi"] + r * h, rel=1e-13)
+    assert b["z"] == pytest.approx(a["z"] + a["w"] * h, rel=1e-13)
+    turned = 2e-13 * r * h  # the angle is known to rounding of the number of radians
+    assert b["x"] - a["x"] == pytest.approx(0.1 * h + u / r * (sin(b["psi"]) - sin(a["psi"])), rel=1e-13, abs=turned)
+    assert b["y"] - a["y"] == pytest.approx(-u / r * (cos(b["psi"]) - cos(a["psi"])), abs=turned)
 
 
-@pytest.mark.parametrize(
-    ("c", "length", "expected"),
-    [
-        ([1.0, 0.5, 0.0], 1.0, (1.0, False)),
-        ([1.0, -1.0, 0.0], 1.0, (1.0, False)),  # the largest coefficient still bounds it
-        ([1.0, -2.0, 0.0], 1.0, (0.5, True)),
-        ([-1.0, 2.0, 0.0], 1.0, (0.5, True)),
-        ([1.0, -4.0, 0.25], 1.0, (8.0 - 60.0**0.5, True)),
-        ([1.0, 2.0, 0.1], 1.0, (1.0, False)),
-        ([1.0, -2.0, 1.0], 2.0, (0.25, False)),  # it touches 0 at 1, so only a part is certain
-        ([0.0, 1.0, -2.0], 1.0, (0.5, False)),
-        ([0.0, 0.0, 0.0], 3.0, (3.0, False)),
-    ],
-)
-def test_a_velocity_keeps_its_sign_up_to_its_root_or_as_long_as_is_certain(
-    c: list[float], length: float, expected: tuple[float, bool]
-) -> None:
-    end, is_zero = module._sign_kept(c, length)
-    assert end == pytest.approx(expected[0], rel=1e-14)
-    assert is_zero == expected[1]
+@pytest.mark.parametrize("h", [1e3, 1e6])
+def test_a_vehicle_that_coasts_to_rest_stays_there(h: float) -> None:
+    """It stops after a distance whose closed form is m/a_d ln(1 + a_d u / b_d), whatever the rest of the step."""
+    a, b, m = VIDEORAY["a_d_u"], VIDEORAY["b_d_u"], VIDEORAY.effective_inertia(VIDEORAY.layout.kinds["surge"])
+    found = VIDEORAY.step(still(VIDEORAY), {**at_rest(VIDEORAY), "u": 1.5}, h)
+    assert found["x"] == pytest.approx(m / a * log1p(a * 1.5 / b), rel=1e-12)
+    assert (found["u"], found["y"], found["psi"]) == (0.0, 0.0, 0.0)
 
 
-def test_a_series_changes_by_its_terms_without_the_first() -> None:
-    assert module._change([7.0, 2.0, 3.0, -1.0], 2.0) == 2.0 * 2.0 + 3.0 * 4.0 - 8.0
-    assert module._root([-1.0, 1.0, 0.1]) == pytest.approx(5.0 * (1.4**0.5 - 1.0), rel=1e-15)
+def test_whole_turns_of_an_attitude_are_counted() -> None:
+    """A neutral vehicle turns about its vertical axis, and its quaternion changes its sign with every turn."""
+    forces = [name for name in SIX.layout.coefficients if name.startswith(("a_d", "b_d", "F_0", "m_a", "Y_"))]
+    forces += [name for name in SIX.layout.coefficients if name in RESTORING]
+    free = SIX.replaced(dict.fromkeys(forces, 0.0))
+    for turns in (0.25, 7.25, 1000.25):
+        found = free.step(still(free), {**at_rest(free), "r": 2.0 * pi}, turns)
+        assert found["psi"] == pytest.approx(2.0 * pi * turns, rel=1e-12)
+        half = pi * turns
+        assert [found["eta"], found["epsilon_3"]] == pytest.approx([cos(half), sin(half)], abs=1e-11)

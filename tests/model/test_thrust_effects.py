@@ -14,8 +14,8 @@ from scipy.interpolate import PchipInterpolator
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.model.delay import MOST_WAITING, Change, DelayLine
 from rov_fmu.model.layout import Curve, Fin, ThrustTable
+from rov_fmu.model.step import MOST_WAITING, Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, Values, at_rest, numbered, random_inputs, random_state
@@ -241,7 +241,7 @@ def test_commands_act_exactly_after_the_dead_time() -> None:
     state = at_rest(NOW)
     for t, following, values in zip(union, union[1:], immediate_inputs, strict=False):
         state = NOW.step(values, state, following - t)
-    line, delayed = DelayLine(ROV.layout), at_rest(ROV)
+    line, delayed = ROV.delay_line(), at_rest(ROV)
     for t, following, values in zip(times, times[1:], inputs, strict=False):
         delayed = line.step(ROV, values, delayed, t, following - t)
     tables = {name: np.array([values[name] for values in inputs]) for name in ROV.layout.inputs}
@@ -252,7 +252,7 @@ def test_commands_act_exactly_after_the_dead_time() -> None:
 
 def test_nothing_acts_before_the_dead_time_and_nothing_changes_the_loads() -> None:
     inputs: Values = ROV.layout.usual_inputs | {"u_l": 1.0, "u_r": 1.0, "Y_ext": 3.0}
-    line = DelayLine(ROV.layout)
+    line = ROV.delay_line()
     state = line.step(ROV, inputs, at_rest(ROV), 0.0, 0.099)
     assert state["u"] == state["F_l"] == 0.0 < state["v"]
     (change,) = line.waiting
@@ -264,7 +264,7 @@ def test_nothing_acts_before_the_dead_time_and_nothing_changes_the_loads() -> No
 
 
 def test_a_change_back_at_the_same_time_replaces_the_first_one() -> None:
-    line, state = DelayLine(ROV.layout), at_rest(ROV)
+    line, state = ROV.delay_line(), at_rest(ROV)
     usual = ROV.layout.usual_inputs
     line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 1e-20)
     line.step(ROV, usual | {"u_l": 0.5}, state, 0.0, 1e-20)
@@ -274,7 +274,7 @@ def test_a_change_back_at_the_same_time_replaces_the_first_one() -> None:
 @pytest.mark.parametrize(("units", "waits"), [(-1, False), (0, False), (8, False), (9, True)])
 def test_a_change_acts_at_its_time_to_within_the_rounding_of_the_times(units: int, waits: bool) -> None:
     inputs = ROV.layout.usual_inputs | {"u_l": 0.5}
-    line = DelayLine(ROV.layout)
+    line = ROV.delay_line()
     line.waiting = [Change(0.5 + units * 2.0**-52, {name: inputs[name] for name in ROV.layout.commands})]
     line.step(ROV, inputs, at_rest(ROV), 0.5, 0.5)
     assert (bool(line.waiting), line.acting["u_l"]) == (waits, 0.0 if waits else 0.5)
@@ -286,13 +286,13 @@ def test_a_dead_time_that_ends_inside_a_step_is_as_exact_late_in_a_run() -> None
     ends = []
     for start in (0.0, 2.0**20):
         times = start + np.array([0.0, 0.03125, 0.28125, 0.78125])  # late times of these lengths are exact
-        line, state = DelayLine(ROV.layout), at_rest(ROV)
+        line, state = ROV.delay_line(), at_rest(ROV)
         for t, following in pairwise(times.tolist()):
             state = line.step(ROV, inputs, state, t, following - t)
         in_c = simulate(ROV, times, inputs, [*state], workers=1).values[:, 0, -1].tolist()
         ends.append([*state.values(), *in_c])
     assert ends[1] == ends[0]
-    line, h = DelayLine(ROV.layout), ROV["T_d"] / 300
+    line, h = ROV.delay_line(), ROV["T_d"] / 300
     for n in range(300):  # rounding does not add up: the change acts at the end of the last step
         assert line.acting["u_l"] == 0.0
         state = line.step(ROV, inputs, state, n * h, h)
@@ -305,7 +305,7 @@ def test_as_many_changes_may_wait_as_in_c() -> None:
 
 
 def test_too_many_changes_are_refused() -> None:
-    line, state = DelayLine(ROV.layout), at_rest(ROV)
+    line, state = ROV.delay_line(), at_rest(ROV)
     usual = ROV.layout.usual_inputs
     for n in range(MOST_WAITING):
         state = line.step(ROV, usual | {"u_l": float(1 - n % 2)}, state, 1e-5 * n, 1e-5)
@@ -315,7 +315,7 @@ def test_too_many_changes_are_refused() -> None:
 
 
 def test_a_step_that_overflows_leaves_the_changes_on_their_way() -> None:
-    line, usual, state = DelayLine(ROV.layout), ROV.layout.usual_inputs, at_rest(ROV)
+    line, usual, state = ROV.delay_line(), ROV.layout.usual_inputs, at_rest(ROV)
     state = line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 0.06)
     before = (line.acting, [*line.waiting])
     after = line.step(ROV, usual | {"u_l": -1.0}, state | {"u": 1e200}, 0.06, 1.0)

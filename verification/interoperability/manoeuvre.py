@@ -22,7 +22,6 @@ from math import isfinite
 from pathlib import Path
 
 from rov_fmu.model.catalogue import AXES
-from rov_fmu.model.delay import DelayLine
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.vehicles import EVERY_OPTION
@@ -102,7 +101,7 @@ class Manoeuvre:
         """The time and the outputs at each communication point by the step in Python."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
         state: Mapping[str, float] = rov.layout.at_rest
-        line = DelayLine(rov.layout)
+        line = rov.delay_line()
         rows = []
         for time in TIMES:
             if time > 0.0:

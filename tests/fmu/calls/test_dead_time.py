@@ -15,7 +15,7 @@ from lxml import etree
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.model_description import DEAD_TIME_NOTE
-from rov_fmu.model.delay import MOST_WAITING
+from rov_fmu.model.step import MOST_WAITING
 from tests.fmi import CONTINUOUS, ERROR, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, reals
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.model.test_thrust_effects import ROV

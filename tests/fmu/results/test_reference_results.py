@@ -2,6 +2,10 @@
 
 import csv
 import io
+import os
+import platform
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -22,6 +26,7 @@ from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ROOT
 from tests.vehicles import SIX, VEHICLES, a_vehicle, at_rest, four_axes, still
 from verification.references import reference, rigid_vehicle
 from verification.references.rigid_body import VELOCITIES, rotation
@@ -233,3 +238,26 @@ def test_expected_values_with_roll_and_pitch_are_those_of_the_rigid_body() -> No
                 assert np.array(turned) == pytest.approx(np.array(rotation(y[6:10])), abs=1e-9)
     assert {name: expected[0][name.removesuffix("_0")] for name in angles} == pytest.approx(angles)
     assert expected[0]["theta"] != expected[-1]["theta"]
+
+
+_HASH = """
+import hashlib
+from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.vehicles import EVERYTHING
+print(hashlib.sha256(repr(sorted(reference_results(load_vehicle(EVERYTHING)).items())).encode()).hexdigest())
+"""
+
+
+def test_expected_results_have_the_same_bytes_whatever_the_linear_algebra_of_the_processor() -> None:
+    """OpenBLAS computes other last digits on other processors. The expected results must not contain any of its."""
+    command = [sys.executable, "-c", _HASH]
+    cores = ("Haswell", "SkylakeX", "Zen") if platform.machine() in ("x86_64", "AMD64") else ("ARMV8",)
+    found = {
+        subprocess.run(
+            command, env=os.environ | {"OPENBLAS_CORETYPE": core}, cwd=ROOT, check=True, capture_output=True, text=True
+        ).stdout
+        for core in cores
+    }
+    assert len(found) == 1
+    assert len(found.pop()) == 65

@@ -12,9 +12,9 @@ from rov_fmu.model.attitude import (
     rotation_formulas,
     start_angle_formulas,
     start_formulas,
-    unwrapped,
 )
 from rov_fmu.model.expression import compiled, of
+from rov_fmu.model.step import unwrapped
 
 ENTRIES = [f"R_{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
 ATTITUDES = {
