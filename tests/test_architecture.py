@@ -43,7 +43,6 @@ MAY_IMPORT = {
 
 LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
-    "rov_fmu/model": 13,
     "tests": 13,
     "tests/fmu": 15,
     "tests/fmu/calls": 16,

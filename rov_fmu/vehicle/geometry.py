@@ -11,8 +11,9 @@ from typing import Any
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
+from rov_fmu.model.equation import equation_of
+from rov_fmu.model.expression import compiled
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Values, parameters_of
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
@@ -142,7 +143,7 @@ _LEAST = 1e-9
 """The smallest eigenvalue of a positive definite matrix, whose diagonal is 1."""
 
 
-def check_mass(layout: Layout, coefficients: Values) -> Iterator[str]:
+def check_mass(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the mass matrix is not positive definite: the vehicle would accelerate against its load."""
     entries = [(a, b) for key, a, b, *_ in layout.cross if key == "m_a"]
     if not entries and not any(coefficients.get(f"{axis}_G") for axis in "xyz"):
@@ -150,7 +151,7 @@ def check_mass(layout: Layout, coefficients: Values) -> Iterator[str]:
     try:
         mass = {
             name.removeprefix("mass_"): value
-            for name, value in parameters_of(layout, coefficients).items()
+            for name, value in compiled(equation_of(layout).parameters)(coefficients).items()
             if name.startswith("mass_")
         }
     except ZeroDivisionError:  # a pivot of a singular matrix, or a β
@@ -178,14 +179,14 @@ def check_mass(layout: Layout, coefficients: Values) -> Iterator[str]:
         yield key_line("cross" if entries else "body", reason)
 
 
-def doubts(layout: Layout, coefficients: Values) -> Iterator[str]:
+def doubts(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line about each combination of numbers that is possible but probably wrong."""
     yield from _doubts_of_damping(layout, coefficients)
     yield from _doubts_of_weight(coefficients)
     yield from _doubts_of_voltage(layout, coefficients)
 
 
-def _doubts_of_damping(layout: Layout, coefficients: Values) -> Iterator[str]:
+def _doubts_of_damping(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the linear damping adds energy to some motions.
 
     Its symmetric part then has a negative eigenvalue.
@@ -218,7 +219,7 @@ def _doubts_of_damping(layout: Layout, coefficients: Values) -> Iterator[str]:
         )
 
 
-def _doubts_of_voltage(layout: Layout, coefficients: Values) -> Iterator[str]:
+def _doubts_of_voltage(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if thrust does not rise with the voltage, or if the voltage is far above that of the measurement."""
     voltage = layout.voltage or 0.0
     for curve in layout.curves:
@@ -233,7 +234,7 @@ def _doubts_of_voltage(layout: Layout, coefficients: Values) -> Iterator[str]:
             return
 
 
-def _doubts_of_weight(k: Values) -> Iterator[str]:
+def _doubts_of_weight(k: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the weight does not fit the mass, and one if the buoyancy turns the vehicle upside down."""
     if "W" not in k:
         return

@@ -1,4 +1,4 @@
-"""The mathematics of rov_fmu/model/rov.py: thrust, signs, rates."""
+"""The mathematics of rov_fmu/vehicle/vehicle.py: thrust, signs, rates."""
 
 import random
 from math import copysign, cos, inf, pi, sin

@@ -1,4 +1,4 @@
-"""Independent importers agree with `rov_fmu.model.rov`, and the comparison notices when one does not."""
+"""Independent importers agree with the step in Python, and the comparison notices when one does not."""
 
 import csv
 import re
