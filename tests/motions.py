@@ -7,6 +7,7 @@ from typing import Any
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from rov_fmu.engine.stepper import Stepper
 from tests.vehicles import VEHICLES, still
 from verification.references.closed_form import Axis, advance, time_to_rest
 
@@ -128,13 +129,14 @@ BOUNDARIES: list[Case] = [
 
 
 def step_alone(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
-    """Return the velocity and the distance after h seconds by a step of a vehicle that has only this axis."""
+    """Return the velocity and the distance after h seconds by a step in C of a vehicle that has only this axis."""
     rov = VEHICLES["heave only"]
     rov = rov.replaced(
         dict.fromkeys(rov.coefficients, 1.0) | {"a_d_w": A, "b_d_w": B, "a_d_w_reverse": A, "b_d_w_reverse": B}
     )
-    after = rov.step(still(rov) | {"Z_ext": C}, {"w": v0, "z": 0.0}, h)
-    return after["w"], after["z"]
+    stepper = Stepper(rov, still(rov) | {"Z_ext": C, "w": v0}, ["w", "z"])
+    velocity, distance = stepper.step([0.0] * len(rov.layout.commands), h)[-2:]
+    return velocity, distance
 
 
 # ---- Rounding errors ----

@@ -222,6 +222,8 @@ class _Tangents(step.Motion):
     def __init__(self, model: ModuleType, values: Mapping[str, Any]) -> None:
         self.width = len(next(x for x in values.values() if isinstance(x, Dual)).row)
         super().__init__(model, values)
+        self.settled.clear()  # a lag whose forces have arrived still has derivatives
+        self.begin()
 
     def rates(self, after: float, y: list[Any]) -> _Slopes:
         """Return the rates of the states some seconds after the start of the substep."""

@@ -49,12 +49,14 @@ def equation_text(layout: Layout) -> str:
         return [states.index(name) for name in names if name in states]
 
     rotation = [[states.index(entry(row, column)) for column in (1, 2, 3)] for row in (1, 2) if layout.has_attitude]
+    lags = {states.index(progress): dict(forces) for progress, forces in equation.lags.items()}
     numbers = {**equation.program, **equation.forces}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
     return f"""\
 STATES = {tuple(states)!r}
 MONITORED = {places(equation.monitored)!r}  # velocities on whose direction coefficients depend, and their places
 DYNAMIC = {dynamic!r}  # the groups of states that may settle, each with those on which it depends
+LAGS = {lags!r}  # for the progress of each lag, the forces that lag and the thrust that each approaches
 OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets from the start
 GROUPS = {[group for group in (shared("uvwpqr"), shared(["x", "y", "z", "psi"])) if group]!r}  # of like size
 TURNING = {shared("pqr")!r}  # the angular velocities

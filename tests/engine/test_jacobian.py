@@ -50,8 +50,11 @@ def _variational(rov: Vehicle, inputs: dict[str, float], state: dict[str, float]
 def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
     rov = ALL[name]
     rng = random.Random(name)
-    for _ in range(2):
+    for has_arrived in (False, True):
         inputs, state = random_inputs(rng, rov), random_state(rng, rov)
+        if has_arrived:
+            thrust = {f"F_{name}": force for name, force in rov.commanded(inputs).items()}
+            state |= {name: thrust[name] for name in rov.layout.lagging}
         found = step_jacobian(rov, inputs, state, H, [*rov.coefficients])
         after, derivatives = _variational(rov, inputs, state)
         assert np.allclose([*found.after.values()], after, rtol=1e-8, atol=1e-8)

@@ -25,8 +25,9 @@ def check(cases: Iterable[Case], stride: int = 1) -> None:
     for case in islice(cases, 0, None, stride):
         exact = axis(*case)
         for method, (velocity, distance) in (("closed form", advance(*case)), ("step", step_alone(*case))):
-            assert abs(velocity - exact.velocity) <= VELOCITY * exact.scale + TINY, (method, case)
-            assert abs(distance - exact.distance) <= DISTANCE * exact.path + TINY, (method, case)
+            room, least = (2.0, 1e-310) if method == "step" else (1.0, TINY)  # a step has many operations
+            assert abs(velocity - exact.velocity) <= room * VELOCITY * exact.scale + least, (method, case)
+            assert abs(distance - exact.distance) <= room * DISTANCE * exact.path + least, (method, case)
 
 
 def random_case(rng: random.Random) -> Case:

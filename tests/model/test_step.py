@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from scipy.integrate import DOP853
 
 from rov_fmu.model import step as module
 from rov_fmu.model.catalogue import RESTORING
@@ -109,6 +110,7 @@ def model_of(rates: Callable[[dict[str, float]], Callable[[float, list[float]], 
         STATES=states,
         MONITORED={"v": places["v"]} if "v" in places else {},
         DYNAMIC=[([*places.values()], [])],
+        LAGS={},
         OFFSETS={},
         GROUPS=[],
         TURNING=(),
@@ -248,3 +250,12 @@ def test_whole_turns_of_an_attitude_are_counted() -> None:
         assert found["psi"] == pytest.approx(2.0 * pi * turns, rel=1e-12)
         half = pi * turns
         assert [found["eta"], found["epsilon_3"]] == pytest.approx([cos(half), sin(half)], abs=1e-11)
+
+
+def test_the_method_has_the_coefficients_of_dop853() -> None:
+    """SciPy has them from Hairer's code."""
+    rows = [*(row for _, row in module._STAGES), module._END, module._FIFTH, module._THIRD]
+    expected = [*DOP853.A[1:12], DOP853.B, DOP853.E5, DOP853.E3]
+    assert [node for node, _ in module._STAGES] == DOP853.C[1:12].tolist()
+    for row, of_scipy in zip(rows, expected, strict=True):
+        assert [row.get(n, 0.0) for n in range(len(of_scipy))] == pytest.approx(of_scipy.tolist(), rel=1e-15)
