@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import AXES, AXIS, CURVE, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
+from rov_fmu.model.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
 from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -181,7 +181,7 @@ _BETWEEN = (("m_a", "u", "q"), ("m_a", "v", "r"), ("b_d", "q", "w"), ("a_d", "p"
 SIX = numbered(
     Layout(
         _axes("uvwpqr", _ALL),
-        (Curve("t200", tuple(key for key in CURVE if key not in ("k_t", "V_0", "n_V"))),),
+        (Curve("t200", tuple(key for key in _CURVE_NUMBERS if key not in ("k_t", "V_0", "n_V"))),),
         _SKEW,
         coupled=True,
         cross=_BETWEEN,

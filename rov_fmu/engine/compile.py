@@ -8,11 +8,11 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 from fat_macho import FatWriter
@@ -153,12 +153,30 @@ def compile_all(
 
     Raises BuildError. No process and no file is left behind when it is interrupted or fails.
     """
-    return _side_by_side({name: partial(_compile, name, sources, identifier, fmi) for name in platforms}, on_done)
+    own = {
+        name: [_library(platform, target, sources, identifier, name) for target in platform.targets(fmi)]
+        for name, platform in ((name, PLATFORMS[name]) for name in platforms)
+    }
+    return _compiled(own, on_done)
+
+
+def _library(platform: Platform, target: str, sources: Mapping[str, str], identifier: str, name: str) -> "_Library":
+    """Return the library of an FMU for one target of the platform with this name."""
+    file = f"{identifier}{platform.suffix}"
+    arguments = [
+        *("-target", target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS),
+        *(f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)),
+        *("-isystem", str(fmi_headers())),  # without warnings about the headers
+        *(UNITY_FILE, *platform.flags),
+        *((f"-Wl,-install_name,@rpath/{file}",) if platform.suffix == ".dylib" else ()),
+    ]
+    return _Library(file, sources, arguments, f"{name}: the compiler failed for {target}")
 
 
 def compile_module(sources: Mapping[str, str]) -> bytes:
     """Compile sources (file name to text) to the WebAssembly module of a page. Raises BuildError."""
-    return _side_by_side({MODULE_FILE: partial(_compile_module, sources)})[MODULE_FILE]
+    arguments = [*C_FLAGS, "-g0", "-s", *WARNINGS, *_MODULE_FLAGS]
+    return _one(_Library("module.wasm", sources, arguments, "the compiler failed for the page's module"))
 
 
 def compile_location(pythonfmu: bytes) -> bytes:
@@ -166,7 +184,16 @@ def compile_location(pythonfmu: bytes) -> bytes:
 
     `pythonfmu` is PythonFMU's library, which must lie beside it. Raises BuildError.
     """
-    return _side_by_side({_LOCATION_FILE.name: partial(_compile_location, pythonfmu)})[_LOCATION_FILE.name]
+    linux = PLATFORMS["linux64"]
+    arguments = [
+        *("-target", linux.target, "-std=gnu11", "-O2", "-fPIC", *_LIBRARY_FLAGS, *WARNINGS),
+        *("-isystem", str(fmi_headers()), _LOCATION_FILE.name),
+        *("-Wl,--no-as-needed", PYTHONFMU_LIBRARY, "-Wl,-rpath,$ORIGIN"),
+        *("-Wl,--allow-shlib-undefined", "-ldl", *linux.flags),
+    ]
+    files = {_LOCATION_FILE.name: _LOCATION_FILE.read_bytes(), PYTHONFMU_LIBRARY: pythonfmu}
+    reason = "the C compiler failed for the library of the Python flavour"
+    return _one(_Library("location.so", files, arguments, reason))
 
 
 def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
@@ -183,17 +210,58 @@ def compile_engine(sources: Mapping[str, str]) -> bytes:
     Raises BuildError.
     """
     *_, file = sources
-    return _side_by_side({file: partial(_compile_engine, sources)})[file]
+    reason = "the C compiler failed for the engine"
+    return _one(_Library("engine.library", sources, engine_flags(file), reason, most_lines=1))
 
 
-def _side_by_side(
-    work: Mapping[str, Callable[["_Compilers"], bytes]], on_done: Callable[[str], None] = lambda _: None
+@dataclass(frozen=True)
+class _Library:
+    """A library to compile."""
+
+    name: str
+    """The name of its file, which some systems write into it."""
+    files: Mapping[str, str | bytes]
+    """The files that the compiler finds in its folder, by their names."""
+    arguments: Sequence[str]
+    failed: str
+    """The beginning of the message when the compiler fails."""
+    most_lines: int = 2 * MOST
+    """The largest number of lines of that message."""
+
+    def compile(self, compilers: "_Compilers") -> bytes:
+        """Return the content of the library. Raises BuildError."""
+        with temporary_folder("fmu-") as folder:
+            for file, content in self.files.items():
+                Path(folder, file).write_bytes(content.encode() if isinstance(content, str) else content)
+            command = [*compiler(), *self.arguments, "-o", self.name]
+            compilers.run(command, folder, self.failed, self.most_lines)
+            return Path(folder, self.name).read_bytes()
+
+
+def _one(library: _Library) -> bytes:
+    """Compile one library. Raises BuildError."""
+    return _compiled({library.name: [library]})[library.name]
+
+
+def _universal(libraries: Sequence[_Library], compilers: "_Compilers") -> bytes:
+    """Compile a library, or those for the processors of one universal file of macOS. Raises BuildError."""
+    contents = [library.compile(compilers) for library in libraries]
+    if len(contents) == 1:
+        return contents[0]
+    universal = FatWriter()  # type: ignore[no-untyped-call]
+    for content in contents:
+        universal.add(content)
+    return bytes(universal.generate())
+
+
+def _compiled(
+    work: Mapping[str, Sequence[_Library]], on_done: Callable[[str], None] = lambda _: None
 ) -> dict[str, bytes]:
-    """Run compilations in parallel and return their results by name. Raises BuildError."""
+    """Compile libraries in parallel, and return their contents by name. Raises BuildError."""
     try:
         compilers = _Compilers(_cache())
         with ThreadPoolExecutor(os.cpu_count()) as pool, cleaned_up(compilers.end):
-            jobs = {pool.submit(job, compilers): name for name, job in work.items()}
+            jobs = {pool.submit(_universal, own, compilers): name for name, own in work.items()}
             for job in as_completed(jobs):
                 job.result()
                 on_done(jobs[job])
@@ -223,9 +291,9 @@ def _cache() -> str:
 @cache
 def _temporary_cache() -> str:
     """Make a folder for all compilers of this process, which is removed when the process ends."""
-    made = ExitStack()
-    atexit.register(made.close)
-    return made.enter_context(temporary_folder("rov-fmu-zig-"))
+    until_the_end = ExitStack()
+    atexit.register(until_the_end.close)
+    return until_the_end.enter_context(temporary_folder("rov-fmu-zig-"))
 
 
 class _Compilers:
@@ -243,7 +311,7 @@ class _Compilers:
             for process in self._running:
                 kill(process)
 
-    def run(self, command: Sequence[str], folder: str, failed: str, most_lines: int = 2 * MOST) -> None:
+    def run(self, command: Sequence[str], folder: str, failed: str, most_lines: int) -> None:
         """Run a compiler. When this returns, no process writes into the folder any more.
 
         Raises BuildError if the compiler fails or exceeds its time limit. Its text begins with `failed`, and has a few
@@ -297,72 +365,5 @@ def _shell_limits() -> str:
         "processor time (ulimit -t)": resource.RLIMIT_CPU,
         "memory (ulimit -v)": resource.RLIMIT_AS,
     }
-    found = [words for words, kind in kinds.items() if resource.getrlimit(kind)[0] != resource.RLIM_INFINITY]
-    return f"; perhaps because the shell limits {listed(found)}" if found else ""
-
-
-@contextmanager
-def _folder_of(sources: Mapping[str, str]) -> Iterator[str]:
-    """Provide a temporary folder with these files (file name to text)."""
-    with temporary_folder("fmu-") as folder:
-        for file, text in sources.items():
-            Path(folder, file).write_text(text, encoding="utf-8")
-        yield folder
-
-
-def _compile_module(sources: Mapping[str, str], compilers: _Compilers) -> bytes:
-    with _folder_of(sources) as folder:
-        command = [*compiler(), *C_FLAGS, "-g0", "-s", *WARNINGS, *_MODULE_FLAGS, "-o", "module.wasm"]
-        compilers.run(command, folder, "the compiler failed for the page's module")
-        return Path(folder, "module.wasm").read_bytes()
-
-
-def _compile_engine(sources: Mapping[str, str], compilers: _Compilers) -> bytes:
-    with _folder_of(sources) as folder:
-        *_, file = sources
-        command = [*compiler(), *engine_flags(file), "-o", "engine.library"]
-        compilers.run(command, folder, "the C compiler failed for the engine", most_lines=1)
-        return Path(folder, "engine.library").read_bytes()
-
-
-def _compile_location(pythonfmu: bytes, compilers: _Compilers) -> bytes:
-    linux = PLATFORMS["linux64"]
-    with _folder_of({_LOCATION_FILE.name: _LOCATION_FILE.read_text(encoding="utf-8")}) as folder:
-        Path(folder, PYTHONFMU_LIBRARY).write_bytes(pythonfmu)
-        command = [
-            *(*compiler(), "-target", linux.target),
-            *("-std=gnu11", "-O2", "-fPIC", *_LIBRARY_FLAGS, *WARNINGS, "-isystem", str(fmi_headers())),
-            *(_LOCATION_FILE.name, "-Wl,--no-as-needed", PYTHONFMU_LIBRARY, "-Wl,-rpath,$ORIGIN"),
-            *("-Wl,--allow-shlib-undefined", "-ldl", *linux.flags, "-o", "location.so"),
-        ]
-        compilers.run(command, folder, "the C compiler failed for the library of the Python flavour")
-        return Path(folder, "location.so").read_bytes()
-
-
-def _compile(name: str, sources: Mapping[str, str], identifier: str, fmi: int, compilers: _Compilers) -> bytes:
-    target_platform = PLATFORMS[name]
-    with _folder_of(sources) as folder:
-        library = Path(folder, f"{identifier}{target_platform.suffix}")
-        install_name = (f"-Wl,-install_name,@rpath/{library.name}",) if library.suffix == ".dylib" else ()
-        slices = []
-        for target in target_platform.targets(fmi):
-            command = [
-                *(*compiler(), "-target", target),
-                *C_FLAGS,
-                *_LIBRARY_FLAGS,
-                *WARNINGS,
-                *(f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)),
-                *("-isystem", str(fmi_headers())),  # without warnings about the headers
-                UNITY_FILE,
-                *target_platform.flags,
-                *install_name,
-                *("-o", library.name),
-            ]
-            compilers.run(command, folder, f"{name}: the compiler failed for {target}")
-            slices.append(library.read_bytes())
-        if len(slices) > 1:
-            universal = FatWriter()  # type: ignore[no-untyped-call]
-            for part in slices:
-                universal.add(part)
-            universal.write_to(str(library))
-        return library.read_bytes()
+    limited = [words for words, kind in kinds.items() if resource.getrlimit(kind)[0] != resource.RLIM_INFINITY]
+    return f"; perhaps because the shell limits {listed(limited)}" if limited else ""

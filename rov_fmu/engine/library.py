@@ -46,8 +46,8 @@ def _load(texts: dict[str, str]) -> ctypes.CDLL:
     with suppress(OSError):
         folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
         folder.mkdir(parents=True, exist_ok=True)
-        if found := _find(folder, key):
-            return ctypes.CDLL(str(found))
+        if path := _find(folder, key):
+            return ctypes.CDLL(str(path))
         content = compile_engine(texts)
         return ctypes.CDLL(str(_write(folder, key, content)))
     with temporary_folder("rov-fmu-") as temporary:

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
-from rov_fmu.model.alone import alone_formulas, closed_form
+from rov_fmu.model.alone import response_formulas
 from rov_fmu.model.attitude import QUATERNION, entry, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.expression import (
@@ -16,7 +16,6 @@ from rov_fmu.model.expression import (
     Name,
     Number,
     change_of,
-    directed,
     tangent,
     to_c,
     total,
@@ -32,6 +31,8 @@ class EquationSource:
         self.layout = layout
         self.equation: Equation = equation_of(layout)
         self.variables = frozenset(layout.places)
+        dynamic = self.equation.dynamic
+        assert self.equation.components[: len(dynamic)] == dynamic, "the C code knows only the number of these"
 
     # ---- Names ----
 
@@ -39,10 +40,10 @@ class EquationSource:
     def _in_c(self) -> dict[str, str]:
         """The C expression for every name that a formula may contain."""
         equation = self.equation
-        found = {name: f"at[REF_{name}]" for name in self.variables}
-        found |= {name: f"n->{name}" for name in equation.parameters}
-        found |= {name: f"q->{name}" for name in self.held_names()}
-        return found | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
+        in_c = {name: f"at[REF_{name}]" for name in self.variables}
+        in_c |= {name: f"n->{name}" for name in equation.parameters}
+        in_c |= {name: f"q->{name}" for name in self.held_names()}
+        return in_c | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
 
     def held_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
@@ -71,10 +72,6 @@ class EquationSource:
         """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
         return _statements(self.equation.forces, self._in_c, self._in_c)
 
-    def directions(self) -> list[tuple[str, int]]:
-        """Return each coefficient that depends on a direction, with the index of its velocity in `monitored`."""
-        return [(name, self.equation.monitored.index(d.velocity)) for name, d in self.equation.directed.items()]
-
     def starts(self) -> list[str]:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
@@ -99,13 +96,13 @@ class EquationSource:
 
     def turning(self) -> list[str]:
         """Return the entries of the rotation matrix that still change while all velocities are steady."""
-        kinematic = self.equation.components[self.dynamic() :]
+        kinematic = self.equation.components[len(self.equation.dynamic) :]
         rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
         return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
 
     def first_rotation(self) -> str:
         """Return the first angular velocity."""
-        return next(form.axis.velocity for form in self.layout.axes if form.axis.is_rotation)
+        return next(own.axis.velocity for own in self.layout.axes if own.axis.is_rotation)
 
     def _turns(self, name: str) -> bool:
         """Return True when the rate of a state depends on the heading."""
@@ -120,12 +117,6 @@ class EquationSource:
         if self.layout.has_attitude:
             return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
-
-    def dynamic(self) -> int:
-        """Return the number of components that may settle. These come first, so the C code needs only their number."""
-        equation = self.equation
-        assert equation.components[: len(equation.dynamic)] == equation.dynamic
-        return len(equation.dynamic)
 
     def finish(self) -> list[str]:
         """Return statements that assign the states of the vehicle after a step."""
@@ -174,11 +165,8 @@ class EquationSource:
 
     def alone(self, velocity: str, number: int) -> list[str]:
         """Return statements that compute V_ss and Tau of an axis alone."""
-        found = alone_formulas(self.layout, velocity)
-        C = Name("C")
-        drag = {key: directed(C, found[key], found[f"{key}_reverse"]) for key in "AB"}
-        formulas = {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
-        return _statements(formulas, {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}, self._in_c)
+        places = {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}
+        return _statements(response_formulas(self.layout, velocity), places, self._in_c)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
@@ -192,11 +180,11 @@ class EquationSource:
             level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
             last = 1 + len(self.equation.components)
             depth |= dict.fromkeys(group, level if used & set(group) else last)
-        found = []
+        blocks = []
         for level in sorted(set(depth.values())):
             neighbours = groupby(self.equation.states, key=lambda name: depth[name] == level)
-            found += [tuple(names) for is_level, names in neighbours if is_level]
-        return found
+            blocks += [tuple(names) for is_level, names in neighbours if is_level]
+        return blocks
 
     @cached_property
     def block_of(self) -> dict[str, int]:
@@ -275,10 +263,6 @@ class EquationSource:
                 partners |= sum(1 << self.equation.states.index(other) for other in others)
         return partners
 
-    def n_used(self) -> int:
-        """Return the number of states that terms contain. These states come first."""
-        return len(self.equation.used)
-
     def lagging_ends(self) -> list[tuple[str, str]]:
         """Return each force that lags, and its formula in C after a piece that ends at y."""
         return [(name, self._by_states(end)) for name, (_, end) in self.equation.lagging.items()]
@@ -295,8 +279,7 @@ class EquationSource:
 
     def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
-        orientation = _needed(self.equation.orientation, formulas.values())
-        return _statements({**orientation, **formulas}, {place: place for place in formulas}, self._in_c)
+        return _assigned(self.equation.orientation, formulas, self._in_c)
 
     def beginning(self) -> list[str]:
         """Return statements for the start.
@@ -314,39 +297,51 @@ class EquationSource:
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
-        text = _with_changes(self.layout.initial)
-        lines: list[str] = []
-        for name, formula in start_formulas().items() if self.layout.has_attitude else ():
-            change = to_c(tangent(formula, change_of) or Number(0.0), text.__getitem__)
-            if name in self.layout.state:
-                lines.append(f"d[REF_{name}] += {change};")
-            else:
-                changed = change_of(name).identifier
-                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, {changed} = {change};")
-                text |= {name: name, changed: changed}
-        return lines
+        if not self.layout.has_attitude:
+            return []
+        steps, changes = _tangents(start_formulas(), self.layout.initial)
+        states = [name for name in self.layout.state if name in changes]
+        results = {f"d[REF_{name}]": Name(f"d[REF_{name}]") + changes[name] for name in states}
+        return _assigned(steps, results, {**_with_changes(self.layout.initial), **{place: place for place in results}})
 
     def tangent_lines(self) -> list[str]:
         """Return statements that write the changes of the calculated variables to d.
 
         Before, d has the changes of all other variables.
         """
-        equation = self.equation
         given = self.variables - {*self.layout.calculated}
-        changes = {name: change_of(name) for name in given}
-        steps: dict[str, Expression] = {}
-        for name, formula in {**equation.program, **equation.outputs}.items():
-            steps[name] = formula
-            if change := tangent(formula, changes.get):
-                changes[name] = change_of(name)
-                steps[changes[name].identifier] = change
+        steps, changes = _tangents({**self.equation.program, **self.equation.outputs}, given)
         calculated = [name for name in self.layout.calculated if name in changes]
         results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
-            change = tangent(equation.rates[name], changes.get)
+            change = tangent(self.equation.rates[name], changes.get)
             results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
-        formulas = {**_needed(steps, results.values()), **results}
-        return _statements(formulas, {place: place for place in results}, _with_changes(given))
+        return _assigned(steps, results, _with_changes(given))
+
+
+def _tangents(
+    formulas: Mapping[str, Expression], given: Iterable[str]
+) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Return formulas, each with the formula of its change after it, and the changes by the names that change.
+
+    `given` are the variables whose changes are known.
+    """
+    changes: dict[str, Expression] = {name: change_of(name) for name in given}
+    steps: dict[str, Expression] = {}
+    for name, formula in formulas.items():
+        steps[name] = formula
+        if change := tangent(formula, changes.get):
+            changes[name] = change_of(name)
+            steps[change_of(name).identifier] = change
+    return steps, changes
+
+
+def _assigned(
+    steps: Mapping[str, Expression], results: Mapping[str, Expression], known: Mapping[str, str]
+) -> list[str]:
+    """Return statements that assign results to their places. Before them come the steps that they need."""
+    formulas = {**_needed(steps, results.values()), **results}
+    return _statements(formulas, {place: place for place in results}, known)
 
 
 def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], known: Mapping[str, str]) -> list[str]:
@@ -361,8 +356,8 @@ def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], k
 
 def _with_changes(variables: Iterable[str]) -> dict[str, str]:
     """Return the C expressions of variables and of their changes, by their names."""
-    found = {name: f"at[REF_{name}]" for name in variables}
-    return found | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
+    places = {name: f"at[REF_{name}]" for name in variables}
+    return places | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
 
 
 def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> dict[str, Expression]:

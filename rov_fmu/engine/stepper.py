@@ -79,10 +79,10 @@ class Stepper:
     def _move(self, end: float) -> list[float]:
         self._times[1] = end - self.time
         self._simulate(*self._arguments)
-        found: list[float] = self._result[:, 1].tolist()
-        if self._failed[0] < 2 or not all(map(isfinite, found)):
+        results: list[float] = self._result[:, 1].tolist()
+        if self._failed[0] < 2 or not all(map(isfinite, results)):
             raise OverflowError(f"the motion cannot be computed from {self.time:g} s on")
         count = len(self._kept)
-        self._numbers[self._kept] = found[:count]
+        self._numbers[self._kept] = results[:count]
         self.time = end
-        return found[count:]
+        return results[count:]

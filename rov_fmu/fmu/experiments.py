@@ -98,17 +98,17 @@ class ReferenceResults:
         `description` is FMPy's description of the FMU.
         """
         variables = {v.name: v for v in description.modelVariables}
-        found: list[Experiment] = []
+        experiments: list[Experiment] = []
         for related in _children(self._xml(self._manifest, "fmiReferences"), "Related"):
             role, _, purpose = related.get("role", "").partition("/")
             if role == "experiment" and purpose != "uncertainty-analysis":
                 member = self._manifest.resolve(related.get("source"))
-                found += self._read(member, description.defaultExperiment, variables)
-        if len(found) > _MOST_EXPERIMENTS:
-            raise self._manifest.error(f"names {len(found)} experiments; at most {_MOST_EXPERIMENTS} are run")
-        if not any(experiment.references for experiment in found):
+                experiments += self._read(member, description.defaultExperiment, variables)
+        if len(experiments) > _MOST_EXPERIMENTS:
+            raise self._manifest.error(f"names {len(experiments)} experiments; at most {_MOST_EXPERIMENTS} are run")
+        if not any(experiment.references for experiment in experiments):
             raise self._manifest.error("names no experiment with expected results")
-        return found
+        return experiments
 
     def _read(self, member: _Member, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
         """Read a file of experiments."""
@@ -152,7 +152,7 @@ class ReferenceResults:
 
     def _parameters(self, member: _Member, variables: Mapping[str, Any]) -> dict[str, str]:
         """Read a parameter set in the format of SSP, and return its values as text by name."""
-        found = {}
+        values = {}
         for element in self._xml(member, "ParameterSet").iter("{*}Parameter"):
             name, value = element.get("name", ""), next(iter(element), None)
             if not (variable := variables.get(name)):
@@ -161,10 +161,10 @@ class ReferenceResults:
                 raise member.error(f"parameter {shown(name)}: has no value")
             if value.get("unit") not in (None, variable.unit):
                 raise member.error(f"parameter {shown(name)}: is in {value.get('unit')}, and not in {variable.unit}")
-            found[name] = value.get("value")
+            values[name] = value.get("value")
             if variable.type not in ("String", "Boolean"):
-                member.number(found[name], f"parameter {shown(name)}")
-        return found
+                member.number(values[name], f"parameter {shown(name)}")
+        return values
 
     def _series(self, member: _Member, variables: Mapping[str, Any]) -> Series:
         """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
@@ -195,14 +195,14 @@ class ReferenceResults:
     def _xml(self, member: _Member, root: str) -> Any:
         """Return the root element of an XML file, which must have the name `root`."""
         try:
-            found = etree.fromstring(
+            element = etree.fromstring(
                 self._text(member).encode(), etree.XMLParser(resolve_entities=False, no_network=True)
             )
         except etree.XMLSyntaxError as error:
             raise member.error(f"not XML: {error}") from error
-        if (name := etree.QName(found).localname) != root:
+        if (name := etree.QName(element).localname) != root:
             raise member.error(f"must begin with <{root}>, and not with <{name}>")
-        return found
+        return element
 
 
 def _children(element: Any, name: str) -> list[Any]:

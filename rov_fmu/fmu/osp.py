@@ -1,4 +1,4 @@
-"""Write <modelName>_OspModelDescription.xml, which groups variables that are connected together (OSP-IS 1.0.1).
+"""Write <modelName>_OspModelDescription.xml, which groups variables that are connected as a whole (OSP-IS 1.0.1).
 
 libcosim and the OSP tools look for it in the folder of the FMU. It changes nothing in modelDescription.xml.
 """

@@ -91,19 +91,19 @@ def prove(
                 f"{fmu}: has no {interface or 'interface that can be run'}, only {', '.join(has) or 'none'}"
             )
         chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
-        experiment, found = chosen[0], list[Finding]()
+        experiment, findings = chosen[0], list[Finding]()
         limits = Limits(time=time_limit, memory=MEMORY, disk=DISK)
         try:
             with closing(ChildProcess(_Experiments, folder, interface or has[0], limits=limits)) as child:
                 for n, experiment in enumerate(chosen):
                     on_experiment(experiment.name, n / len(chosen))
-                    found += child.call("findings", experiment)
+                    findings += child.call("findings", experiment)
         except ChildError as error:
             where = one_line(f"{fmu}: experiment {experiment.name!r}")
             is_time = isinstance(error, LimitError) and error.limit == "time"
             remedy = "; --time-limit allows more" if is_time else ""
             raise ProofError(f"{where}: the FMU {error}{remedy}") from error
-    return found
+    return findings
 
 
 class _Experiments:

@@ -1,4 +1,4 @@
-"""Write terminalsAndIcons.xml, which groups variables into terminals to connect them together (FMI 3.0, 2.4.9).
+"""Write terminalsAndIcons.xml, which groups variables into terminals, which are connected as a whole (FMI 3.0, 2.4.9).
 
 FMI 2.0.4 uses the file of FMI 3.0, including fmiVersion="3.0", so it is the same in FMUs of both versions. There is no
 terminalKind: the standard defines none, and our own kind would only prevent connections to others.
@@ -36,13 +36,13 @@ def terminals(layout: Layout) -> list[Terminal]:
     All calculated variables except the Euler angles are in the terminal `thrust`.
     """
     battery = ("voltage",) if layout.voltage is not None else ()
-    loads = tuple(form.axis.external for form in layout.axes)
+    loads = tuple(own.axis.external for own in layout.axes)
     current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
     thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     driven = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
-    found = [
+    groups = [
         Terminal("thrusters", "input", "bus", f"Commands to the {driven}, {commands}", tuple(layout.commands)),
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
@@ -52,7 +52,7 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),
     ]
-    return [terminal for terminal in found if terminal.members]
+    return [terminal for terminal in groups if terminal.members]
 
 
 def terminals_and_icons(layout: Layout) -> bytes:

@@ -16,9 +16,9 @@ from xml.parsers import expat
 from rov_fmu.io.messages import FileError, brief, shown
 
 _MOST_UNPACKED = 2_000_000_000
-"""The size of all files together."""
+"""The size of all files."""
 _MOST_RATIO = 100
-"""The size of all files together, relative to that of the archive, if it is above _SMALL."""
+"""The size of all files, relative to that of the archive, if it is above _SMALL."""
 _SMALL = 100_000_000
 """Bytes that an archive may unpack to, however well it is compressed."""
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
@@ -33,7 +33,7 @@ _MOST_PARTS = 3_000_000
 _LONGEST = 1_000_000
 """The largest number of characters in an attribute."""
 _INDICES = ("derivative", "index", "dependencies", "clocks")
-"""The attributes that name other variables, beside the value references in the model structure and in dimensions."""
+"""The attributes that name other variables, besides the value references in the model structure and in dimensions."""
 _FINITE = ("nominal", "factor", "offset", "gain", "startTime", "stopTime", "tolerance", "stepSize")
 _COUNTS = ("numberOfEventIndicators", "numberOfContinuousStates")
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -53,6 +53,11 @@ _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 """The words that an attribute may have, by the version of FMI."""
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 """The types of FMI 1.0 and 2.0, each an element inside its variable."""
+_STORED_AS = {
+    **{(version, kind): "Int32" for version in "12" for kind in ("Integer", "Enumeration")},
+    ("3", "Enumeration"): "Int64",
+}
+"""The whole numbers that hold a value, by the version of FMI and the type."""
 
 
 def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
@@ -260,13 +265,9 @@ class _Description:
         elif self._type == "Boolean":
             if text not in ("true", "false", "1", "0"):
                 raise self._error(f"{place} = {shown(text)}: must be true or false")
-        elif self._type in ("Integer", "Enumeration"):
-            bits = 64 if self._version == "3" else 32
-            self._whole(place, text, -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-        elif size := re.fullmatch(r"(U?)Int(\d+)", self._type):
-            bits = int(size[2])
-            low, high = (0, 2**bits - 1) if size[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-            self._whole(place, text, low, high)
+        elif size := re.fullmatch(r"(U?)Int(\d+)", _STORED_AS.get((self._version, self._type), self._type)):
+            span = 2 ** int(size[2])
+            self._whole(place, text, *((0, span - 1) if size[1] else (-span // 2, span // 2 - 1)))
 
     def _number(self, place: str, text: str) -> None:
         try:

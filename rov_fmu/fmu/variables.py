@@ -111,23 +111,23 @@ class Variable:
 
 def _derivatives(layout: Layout) -> dict[str, Declaration]:
     """Return the unit and the description of the derivative of every state."""
-    found: dict[str, Declaration] = {}
-    for axis in (form.axis for form in layout.axes):
-        found[axis.velocity] = Declaration(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration")
+    derivatives: dict[str, Declaration] = {}
+    for axis in (own.axis for own in layout.axes):
+        derivatives[axis.velocity] = Declaration(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration")
     if layout.has_attitude:
         for name, direction in (("x", "northward"), ("y", "eastward"), ("z", "downward")):
-            found[name] = Declaration("m/s", f"Velocity over ground {direction}")
-        found |= {name: Declaration("1/s", f"Rate of change of {name}") for name in QUATERNION}
+            derivatives[name] = Declaration("m/s", f"Velocity over ground {direction}")
+        derivatives |= {name: Declaration("1/s", f"Rate of change of {name}") for name in QUATERNION}
     elif layout.has(SURGE, SWAY):
-        found["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
-        found["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
+        derivatives["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
+        derivatives["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
     if layout.has(HEAVE) and not layout.has_attitude:
-        found["z"] = Declaration("m/s", "Rate of change of depth, w")
+        derivatives["z"] = Declaration("m/s", "Rate of change of depth, w")
     if layout.has(YAW):
-        found["psi"] = Declaration("rad/s", "Rate of change of heading, r")
+        derivatives["psi"] = Declaration("rad/s", "Rate of change of heading, r")
     for name in layout.lagging:
-        found[name] = Declaration("N/s", f"Rate of change of {name}, (F(c) - F) / T")
-    return found
+        derivatives[name] = Declaration("N/s", f"Rate of change of {name}, (F(c) - F) / T")
+    return derivatives
 
 
 def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[str, str]) -> Declaration:

@@ -239,7 +239,7 @@ def _serve() -> None:
     os.dup2(nowhere, 1)  # an FMU or a parser may print
     os.dup2(nowhere, 2)
     _send(answers, (None, None, None))
-    made: Any = None
+    target: Any = None
     while True:
         too_large.file = False
         try:
@@ -248,12 +248,12 @@ def _serve() -> None:
         except Exception as raised:
             result, error = None, raised
         exceeded = _exceeded(error, limits) or ("disk" if error and too_large.file else None)
-        if made is None:
-            made, result = result, None
+        if target is None:
+            target, result = result, None
         _send(answers, (result, None if exceeded else _portable(error), exceeded))
         result = error = None  # the memory is free before the next call
         method, arguments, limits = requests.get()
-        function = getattr(made, method)
+        function = getattr(target, method)
 
 
 class _TooLarge:

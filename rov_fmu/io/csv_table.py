@@ -144,14 +144,14 @@ def read_columns(
     lines = iter(file)
     line, titles = next(lines)
     header = [renamed.get(title, title) for title in titles]
-    found = _find_columns(path, line, header, columns, others, hint)
-    names = [column.name for column in found.values()]
-    headers = {column.name: header[place] for place, column in found.items()}
-    if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in found])]:
+    file_columns = _find_columns(path, line, header, columns, others, hint)
+    names = [column.name for column in file_columns.values()]
+    headers = {column.name: header[place] for place, column in file_columns.items()}
+    if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in file_columns])]:
         raise DataFileError(*(f"{path}, line {line}: {reason}" for reason in reasons))
 
     def by_column(cells: list[str]) -> dict[str, str]:
-        texts = (cells[place] if place < len(cells) else "" for place in found)
+        texts = (cells[place] if place < len(cells) else "" for place in file_columns)
         return dict(zip(names, texts, strict=True))
 
     def rows() -> Iterator[Mapping[str, str]]:
@@ -166,7 +166,7 @@ def read_columns(
             (torn if loose else wrong).add(file.too_many(line, cells, len(header)))
             continue
         row_lines.append(line)
-        for (place, column), cell in zip(found.items(), by_column(cells).values(), strict=True):
+        for (place, column), cell in zip(file_columns.items(), by_column(cells).values(), strict=True):
             try:
                 value = _value(cell, place < len(cells), column, loose)
             except ValueError as error:
@@ -181,7 +181,7 @@ def read_columns(
     wrong.check()
     if not row_lines:
         raise DataFileError(f"{path}, line {line}: {_NO_ROWS}")
-    units = {column.name: column.unit for column in found.values()}
+    units = {column.name: column.unit for column in file_columns.values()}
     return Columns(path, titles, headers, units, values, row_lines, unread, torn.count, rows)
 
 
@@ -389,7 +389,7 @@ def _find_columns(
         if all(any(map(str.isalpha, title)) for title in header):
             reason = f"none of these headers is known; the first line must have the headers {needed}{hint}"
         raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
-    found: dict[int, FileColumn] = {}
+    file_columns: dict[int, FileColumn] = {}
     names: set[str] = set()
     wrong = []
     for place, title in enumerate(header):
@@ -397,7 +397,7 @@ def _find_columns(
             if column := known.find(title, others):
                 if column.name in names:
                     raise ValueError("this column occurs twice")
-                found[place] = column
+                file_columns[place] = column
                 names.add(column.name)
         except ValueError as error:
             is_unknown = isinstance(error, UnknownColumnError) and not str(error).endswith("?")
@@ -407,13 +407,13 @@ def _find_columns(
     if missing and not wrong:
         first, *more = (repr(_title(name, column)) for name, column in missing.items())
         reason = ", and so is ".join([f"{first} is missing", *more])
-        unread = {_name_and_unit(title)[0]: title for place, title in enumerate(header) if place not in found}
+        unread = {_name_and_unit(title)[0]: title for place, title in enumerate(header) if place not in file_columns}
         near = [shown(unread[name]) for wanted in missing for name in similar(wanted, [*unread][:_MOST_COMPARED])]
         hint = f"; is it the column {' or '.join(near)}?" if near else f"{_listed_titles(unread)}{hint}"
         wrong.append(f"{path}, line {line}, column {len(header) + 1}: {reason}{hint}")
     if wrong:
         raise DataFileError(*wrong[:MOST])
-    return found
+    return file_columns
 
 
 def _listed_titles(unread: Mapping[str, str]) -> str:
@@ -422,7 +422,7 @@ def _listed_titles(unread: Mapping[str, str]) -> str:
 
 
 class KnownColumns:
-    """The columns that a file may have, by their names, so that a header is found without a look at all of them."""
+    """The columns that a file may have, by their names, so that a header is found without a look at all."""
 
     def __init__(self, columns: Mapping[str, Column]) -> None:
         self._columns = columns

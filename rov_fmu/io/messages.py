@@ -150,8 +150,8 @@ def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[s
     `also` has other words that people use, each with the text to suggest for it.
     """
     words = {**{known: known for known in names}, **(also or {})}
-    found = dict.fromkeys(words[word] for word in similar(name, words, most))
-    return f"; did you mean {' or '.join(found)}?" if found else ""
+    suggestions = dict.fromkeys(words[word] for word in similar(name, words, most))
+    return f"; did you mean {' or '.join(suggestions)}?" if suggestions else ""
 
 
 class _Repr(reprlib.Repr):

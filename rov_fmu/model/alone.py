@@ -10,6 +10,7 @@ the time from rest until p V_ss is reached, p = 1 - 1/e:
     D^2 = B^2 + 4 A |C|,    V_ss = 2 C / (B + D),    Tau = (2 / D) artanh(p / (1 + (1 - p) B / D)).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import e, inf
 
@@ -71,10 +72,19 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
         elif force.factors == (velocity, velocity):
             drag["A"].append(minus(ahead))
             drag["A_reverse"].append(astern)
+        elif set(force.factors) == {velocity}:
+            raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
     forces = {force: Name(steady) for own in equation.lags.values() for force, steady in own.items()}
     torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
     formulas = {**{key: total(parts) for key, parts in drag.items()}, "C": gain * total(loads)}
     return {key: replaced(formula, forces | torques) for key, formula in formulas.items()}
+
+
+def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
+    """Return the formulas of V_ss and Tau of an axis alone, after those that they contain."""
+    found = alone_formulas(layout, velocity)
+    drag = {key: directed(Name("C"), found[key], found[f"{key}_reverse"]) for key in "AB"}
+    return {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
 
 
 _closed_form = compiled(closed_form(*map(Name, "ABC")))
@@ -99,6 +109,12 @@ class AxisAlone:
     C: float
     reverse: tuple[float, float] | None = None
     """A and B for v < 0, if they differ."""
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> "AxisAlone":
+        """Return the motion with the values of `alone_formulas`."""
+        drag, reverse = (values["A"], values["B"]), (values["A_reverse"], values["B_reverse"])
+        return cls(*drag, values["C"], reverse if reverse != drag else None)
 
     def drag(self, sign: float) -> tuple[float, float]:
         """Return A and B for velocities of this sign."""

@@ -10,8 +10,9 @@ effect is a new force (forces.py).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from itertools import combinations
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
@@ -226,13 +227,15 @@ def equation_of(layout: Layout) -> Equation:
         raise ValueError("two thrust tables have the same name")
     by_attitude = rotation_formulas() | quaternion_formulas() if layout.has_attitude else {}
     table = _Table(layout, Names([*layout.places, *by_attitude]))
-    rows = {v: table.motion(v) for v in layout.velocities}
+    rows: Rows = {v: table.motion(v) for v in layout.velocities}
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
     rows |= table.lags() | attitude | table.pose()
+    rows, products = quadratic(rows, table.names)
     used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
+    starts |= products
     if "cos_psi" in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     if layout.has_attitude:
@@ -381,6 +384,40 @@ class _Table:
         if "psi" in layout.pose:
             rows["psi"] = (Term(ONE, ("r",)),)
         return rows
+
+
+Rows = dict[str, tuple[Term, ...]]
+
+
+def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
+    """Return rows without products of three states, and the products that became states of their own.
+
+    With s = w w, a cubic drag is c s w, and s' = 2 w w' again has products of at most two states: w w is s.
+    """
+    products: dict[tuple[str, ...], str] = {}
+    found: Rows = {}
+    waiting = dict(rows)
+
+    def shortened(factors: tuple[str, ...]) -> tuple[str, ...]:
+        if len(factors) < 3:
+            return factors
+        pairs = [*combinations(sorted(name for name in factors if name in rows), 2)]
+        pair = next((pair for pair in pairs if pair in products), pairs[0])
+        if pair not in products:
+            products[pair] = names("product", *pair).identifier
+            moving = zip(pair, reversed(pair), strict=True)
+            waiting[products[pair]] = tuple(
+                replace(term, factors=(*term.factors, other)) for name, other in moving for term in rows[name]
+            )
+        rest = [*factors]
+        for name in pair:
+            rest.remove(name)
+        return shortened((products[pair], *rest))
+
+    while waiting:
+        name = next(iter(waiting))
+        found[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
+    return found, {name: product(*map(Name, pair)) for pair, name in products.items()}
 
 
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:

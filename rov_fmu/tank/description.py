@@ -413,6 +413,8 @@ _UNKNOWN_EFFECTS = {
     "d": "identification cannot take into account that thrust decreases with the speed of advance",
 }
 """Keys of a thrust curve, and what identification does instead of using them."""
+_FITTED = {"a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse", "T", "k_t", "n_V", "d_reverse"}
+"""The keys of a thrust curve that identification fits, or that another key of _UNKNOWN_EFFECTS comes with."""
 
 
 def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
@@ -423,7 +425,8 @@ def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
     found: dict[str, str] = {}
     for curve in layout.curves:
         keys = (*curve.keys, *(["table"] if curve.tables else []))
-        found |= {f"curves.{curve.name}.{key}": reason for key, reason in _UNKNOWN_EFFECTS.items() if key in keys}
+        for key in (key for key in keys if key not in _FITTED):
+            found[f"curves.{curve.name}.{key}"] = _UNKNOWN_EFFECTS.get(key, f"identification does not fit {key}")
     if layout.has_dead_time:
         found["commands.T_d"] = "identification finds delays itself"
     if layout.pulse:

@@ -279,17 +279,12 @@ class Vehicle:
 
     def alone(self, axis: Axis, inputs: Values) -> AxisAlone:
         """Return the motion of an axis alone, (18), under held inputs, once the thrust is steady."""
-        return self._alone(axis, {**self._steady(inputs), **self.parameters})
-
-    def _alone(self, axis: Axis, values: Values) -> AxisAlone:
-        found = self._formulas.alone[axis.name](values)
-        drag, reverse = (found["A"], found["B"]), (found["A_reverse"], found["B_reverse"])
-        return AxisAlone(*drag, found["C"], reverse if reverse != drag else None)
+        return AxisAlone.of(self._formulas.alone[axis.name]({**self._steady(inputs), **self.parameters}))
 
     def motions(self, inputs: Values) -> tuple[AxisAlone, ...]:
         """Return the motion of each axis alone under held inputs, once the thrust is steady."""
         values = {**self._steady(inputs), **self.parameters}
-        return tuple(self._alone(form.axis, values) for form in self.layout.axes)
+        return tuple(AxisAlone.of(self._formulas.alone[form.axis.name](values)) for form in self.layout.axes)
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""

@@ -10,7 +10,7 @@ import tomlkit
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.catalogue import ARM, AXES, AXIS, BODY, CURVE, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW
+from rov_fmu.model.catalogue import ARM, AXES, AXIS, BODY, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW, declarations_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS
@@ -28,9 +28,22 @@ def everything() -> Vehicle:
 
 
 def test_the_files_have_every_possible_key() -> None:
-    for key in (*BODY, *RESTORING, *CURVE, *AXIS, *TUNING, *ARM, "coupling"):
+    for key in (*BODY, *RESTORING, *TUNING, *ARM, "coupling"):
         assert re.search(rf"^{key} = ", TEXT + SIX + EFFECTS, re.M), key
     assert set(load_vehicle(SIX_AXES).layout.kinds) == set(AXES)
+
+
+def test_an_axis_may_have_every_key_of_an_axis(tmp_path: Path) -> None:
+    data = tomlkit.parse(TEXT)
+    values = {key: min(max(0.5, kind.minimum), kind.maximum) for key, kind in AXIS.items()}
+    data["axes"]["heave"] = {
+        key: {"value": value, "unit": declarations_of(HEAVE)[key].unit, "source": "T"} for key, value in values.items()
+    }
+    path = tmp_path / "vehicle.toml"
+    path.write_text(tomlkit.dumps(data), encoding="utf-8")
+    rov = load_vehicle(path)
+    form = rov.layout.kinds["heave"]
+    assert {key: rov[form.coefficient(key)] for key in form.keys} == values
 
 
 def test_every_key_is_read(everything: Vehicle) -> None:

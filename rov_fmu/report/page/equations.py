@@ -303,41 +303,30 @@ def _product(x: Expression) -> Product:  # noqa: PLR0911 - a case for each opera
 # ---- Written ---------------------------------------------------------------------------------------------------------
 
 
-_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"}
+_LETTERS = {
+    **{"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"},
+    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u"},
+    **{"command": "c", "beyond": "m", "loss": "k", "table": "f", "steady": "F", "battery": "U", "fraction": "u"},
+}
+"""The letters of quantities whose names begin with a word or whose letter is another one."""
+_INDICES = ("t", "d", "a", "0", "V", "max", "u")
+"""What stands below a letter, so that the name of a part or an axis stands above: a_t_rear, but T_rear."""
 
 
-def symbol_of(identifier: str) -> Symbol:
-    """Return the symbol of a name without the name of a part: a letter and its indices, as in m_a_u or alpha_u."""
-    letter, *indices = identifier.removesuffix(REVERSE).split("_")
-    index, upper = (*indices, "", "")[:2]
-    return Symbol(_GREEK.get(letter, letter), index, upper, "−" if identifier.endswith(REVERSE) else "")
-
-
-def symbols(layout: Layout) -> dict[str, Symbol]:
-    """Return the symbol of every name in the equations of a vehicle that contains the name of a part."""
-    names = equation_of(layout).names
-    found = {names("battery").identifier: Symbol("U")}
-    mark = "d" if layout.has_dead_time else ""
-    for name in layout.commands:
-        own = name.removeprefix("u_")
-        found |= {name: Symbol("u", own), names("fraction", name).identifier: Symbol("u", own, mark)}
-    found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
-    for fin in layout.fins:
-        found[names("angle", fin.name).identifier] = Symbol("δ", fin.name)
-        found |= {fin.coefficient(key): Symbol(key[0], fin.name) for key in ("lift", "drag")}
-        found[fin.coefficient("angle_max")] = Symbol("δ", "max", fin.name)
-    for t in layout.thrusters:
-        letters = {"command": "c", "beyond": "m", "loss": "k"}
-        found |= {names(kind, t.name).identifier: Symbol(letter, t.name) for kind, letter in letters.items()}
-        found |= {names("table", t.name).identifier: Symbol("f", t.curve), f"F_{t.name}": Symbol("F", t.name)}
-        found[names("steady", t.name).identifier] = Symbol("F", t.name, mark="*")
-    for curve in layout.curves:
-        found[f"tau_{curve.name}"] = Symbol("τ", curve.name)
-        for key in curve.keys:  # a_t of the curve rear has the index t below and rear above; T has only rear below
-            symbol = symbol_of(key)
-            above = {"upper": curve.name} if symbol.index else {"index": curve.name}
-            found[curve.coefficient(key)] = replace(symbol, **above)
-    return found
+def symbol_of(name: Name) -> Symbol:
+    """Return the symbol of a name: a letter with the indices that its identifier has, as in m_a_u or alpha_u."""
+    stem = name.identifier.removesuffix(REVERSE)
+    head, *rest = stem.split("_", 1)
+    if name.kind:
+        head, index, upper = name.kind, "_".join(name.owners).removeprefix("u_"), ""
+    elif head == "delayed":
+        index, upper = rest[0].removeprefix("u_"), "d"
+    else:
+        index, _, upper = rest[0].partition("_") if rest else ("", "", "")
+        if upper and index not in _INDICES:
+            index, upper = rest[0], ""
+    mark = "−" if stem != name.identifier else "*" if head == "steady" else ""
+    return Symbol(_LETTERS.get(head, head), index, upper, mark)
 
 
 class Text:
@@ -362,7 +351,7 @@ class Text:
     }
 
     def __init__(self, layout: Layout) -> None:
-        self._symbols = symbols(layout)
+        self._is_late = layout.has_dead_time
 
     def line(self, line: Line) -> str:
         """Write one equation."""
@@ -406,12 +395,12 @@ class Text:
     def factor(self, x: Expression) -> str:  # noqa: PLR0911 - a case for each kind of factor
         """Write a factor. Raises ValueError if there is no way to show it."""
         match x:
-            case Name(identifier):
-                return self.symbol(self.symbol_of(identifier))
+            case Name():
+                return self.symbol(self.symbol_of(x))
             case Number(value):
                 return self.write("number", number(value, 4))
-            case Operation("directed", (_, Name(identifier), _)):
-                return self.symbol(replace(self.symbol_of(identifier), mark="±"))
+            case Operation("directed", (_, Name() as forward, _)):
+                return self.symbol(replace(self.symbol_of(forward), mark="±"))
             case Operation("dead band", (beyond, _, force)):
                 return self.write("cases", self.factor(beyond), self.sum(force), self.sum(Number(0.0)))
             case Operation("+" | "-"):
@@ -422,9 +411,10 @@ class Text:
                 return self.write("function", function, self.sum(argument))
         raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
 
-    def symbol_of(self, identifier: str) -> Symbol:
-        """Return the symbol of a name."""
-        return self._symbols.get(identifier) or symbol_of(identifier)
+    def symbol_of(self, name: Name) -> Symbol:
+        """Return the symbol of a name. A fraction of the command is one that acts after the dead time."""
+        symbol = symbol_of(name)
+        return replace(symbol, upper="d") if name.kind == "fraction" and self._is_late else symbol
 
     def write(self, form: str, *parts: object) -> str:
         """Fill the parts into one of the forms."""
