@@ -45,6 +45,12 @@ class Provenance:
     """What the data do not determine, and what speaks against the model, in sentences."""
     facts: tuple[str, ...] = ()
     """What was found, and what was done with the data, in sentences."""
+    verdicts: tuple[str, ...] = ()
+    """Whether the model of each axis may be trusted, with the reasons."""
+    errors: tuple[str, ...] = ()
+    """The errors of predictions of unseen data."""
+    tested: tuple[str, ...] = ()
+    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`."""
     report: Path | None = None
     """The report on the identification."""
     data: str = field(default="measurements", compare=False)
@@ -233,7 +239,15 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     provenance = None
     if made:
         provenance = Provenance(
-            made.tool, made.method, made.inputs, made.warnings, made.facts, made.report_in(path.parent)
+            made.tool,
+            made.method,
+            made.inputs,
+            made.warnings,
+            made.facts,
+            made.verdicts,
+            made.errors,
+            made.tested,
+            made.report_in(path.parent),
         )
     return Vehicle(
         name=head.name,

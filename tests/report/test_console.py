@@ -5,12 +5,12 @@ import re
 from pathlib import Path
 
 import pytest
-from rich.progress import Progress
+from rich.progress import Progress, TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, paragraph, print_end, print_table, table
-from rov_fmu.report.progress import Parts, _Words
+from rov_fmu.report.progress import Parts
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -26,7 +26,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
     print_table(found, out)
     paragraph(out, FOREIGN)
     out.print(FOREIGN)
-    display = Progress(_Words(), console=out)
+    display = Progress(TextColumn("{task.description}", markup=False), console=out)
     shown = Parts(display)
     shown.begin(FOREIGN)
     shown.print(FOREIGN)

@@ -1,23 +1,13 @@
-"""The progress of long work: the time left, and the lines that a pipe gets."""
+"""The progress of long work: what a terminal shows, and the lines that a pipe gets."""
 
 import re
 from dataclasses import dataclass
+from io import StringIO
+from time import sleep
 
 import pytest
-from rich.progress import Task, TaskID
 
-from rov_fmu.report.progress import StudyParts, TimeLeftColumn, compiling, parts, per_second
-
-
-def test_the_time_left_counts_down_from_the_last_known_share() -> None:
-    clock = [0.0]
-    column, task = TimeLeftColumn(), Task(TaskID(0), "", total=1.0, completed=0.0, _get_time=lambda: clock[0])
-    task.start_time = 0.0
-    shown = []
-    for now, share in ((1.0, 0.0), (10.0, 0.1), (40.0, 0.1), (150.0, 0.1), (160.0, 0.8), (190.0, 0.8)):
-        clock[0], task.completed = now, share
-        shown.append(column.render(task).plain)
-    assert shown == ["", *(f"about {left} left" for left in ("1:30", "1:00", "0:00", "0:40", "0:10"))]
+from rov_fmu.report.progress import StudyParts, compiling, parts, per_second
 
 
 def test_a_pipe_gets_a_line_for_each_platform(capsys: pytest.CaptureFixture[str]) -> None:
@@ -54,19 +44,41 @@ class Runs:
     dashboard: str = "http://localhost"
 
 
-def test_a_pipe_gets_a_line_for_each_tenth_of_the_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    """Also of a study that is continued."""
+def test_a_pipe_gets_a_line_again_and_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where the work tells no progress, and of a study that is continued."""
+    monkeypatch.setattr("rov_fmu.report.progress._EVERY", 0.05)
     with parts() as shown:
         study = StudyParts(shown)
-        for done in range(6_000, 12_001, 300):
-            study.update(Runs(done, failed=done // 4_000))
-    preparing, *lines = capsys.readouterr().err.splitlines()
-    assert preparing.startswith("rov-fmu: starting the workers: done in ")
-    counts = [re.fullmatch(r"rov-fmu: ([\d,]+)/12,000 runs, [\d,]+ runs/s, (\d) failed", line) for line in lines]
-    assert [found.groups() for found in counts if found] == [
-        ("7,200", "1"),
-        *[("8,400", "2"), ("9,600", "2"), ("10,800", "2")],
-    ]
+        sleep(0.12)
+        study.update(Runs(6_000))
+        study.update(Runs(7_200, failed=2))
+        sleep(0.12)
+    sleep(0.12)
+    text = capsys.readouterr().err
+    assert "rov-fmu: starting the workers (0 s so far)" in text
+    assert "rov-fmu: starting the workers: done in 0.1 s" in text
+    found = re.findall(r"^rov-fmu: [\d,]+ runs/s, 2 failed, 7,200/12,000 runs \(0 s so far\)$", text, re.MULTILINE)
+    assert 1 <= len(found) <= 3, "none after the end"
+    sleep(0.1)
+    assert not capsys.readouterr().err
+
+
+def test_a_terminal_shows_a_bar_a_count_and_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = StringIO()
+    monkeypatch.setattr(file, "isatty", lambda: True)
+    monkeypatch.setattr("sys.stderr", file)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
+    with parts() as shown:
+        shown.begin("drawing \x1b[31m")("plot 3", 0.25)
+        assert shown.is_shown
+        shown._display.refresh()  # type: ignore[union-attr]
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", file.getvalue())
+    assert "plot 3" in text
+    assert "25%" in text
+    assert max(len(line) for line in re.split(r"[\r\n]", text)) <= 80
 
 
 @pytest.mark.parametrize(("rate", "words"), [(1120.4, "1,120 runs/s"), (10.0, "10 runs/s"), (0.25, "0.25 runs/s")])

@@ -56,9 +56,9 @@ def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
     found = []
     for plot, count in zip(plots, _counts(len(plots)), strict=True):
         draw = with_even_text(plot.draw)
-        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height))
+        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height), marked=True)
         if count < 3:
-            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad")
+            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad", marked=True)
             narrow = Markup('<div class="broad">{}</div><div class="narrow">{}</div>').format(broad, narrow)
         found.append({"name": plot.name, "text": plot.text, "row": count, "svg": narrow})
     return found
