@@ -66,7 +66,7 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
 
 def _widths(slopes: Array, covariance: Array) -> Array:
     """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
-    return np.maximum(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)), EXACT)
+    return np.asarray(np.maximum(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)), EXACT))
 
 
 def _hold(motions: Sequence[Riccati], axis: Axis, limits: TankLimits) -> float:

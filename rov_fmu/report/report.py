@@ -10,6 +10,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
 from rov_fmu.identify.result import Answer, AxisResult, Identification, Point, Prediction
 from rov_fmu.io.messages import Progress, listed, silent
@@ -18,7 +19,6 @@ from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_
 from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
 from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.vehicle.card import card
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SIZE = 3.7, 2.7

@@ -33,7 +33,14 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
 from tests.commands import TESTS
 from tests.report.conftest import Visit
-from tests.report.pages import check_breaks_long_words, check_is_whole, check_refers_to_itself_alone, rows, text_of
+from tests.report.pages import (
+    check_breaks_long_words,
+    check_is_whole,
+    check_refers_to_itself_alone,
+    rows,
+    text_of,
+    unfolded,
+)
 from tests.report.results import FILES, GOOD, axis_result, example, prediction, without_findings
 
 report_page = partial(report.report_page, made=date(2026, 11, 23))
@@ -91,14 +98,6 @@ def test_the_page_is_whole_loads_nothing_and_answers_the_owners_questions_first(
     shown = [h2.text_content() for h2 in root.iter("h2") if h2.getparent().tag != "summary"]
     verdicts = ["Surge: good", "Heave: usable", "Yaw: do not use"]
     assert shown == [*verdicts, "What you can expect", "What to measure next", "Warnings"]
-
-
-def unfolded(page: str) -> str:
-    """The text of a page that is not folded, without plots."""
-    root = html.fromstring(page)
-    for element in root.xpath("//details/*[not(self::summary)] | //svg | //script | //style | //head"):
-        element.drop_tree()
-    return " ".join(root.text_content().split())
 
 
 def test_little_is_unfolded_and_the_rest_is_there(page: str) -> None:

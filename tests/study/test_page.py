@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
 from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.templates import inline_script
 from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
 from rov_fmu.study.results.plots import Plot, draw_indices, in_rows
@@ -73,7 +74,9 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert labels == [label for label in (*shown, "Trajectories of y") for _ in ("broad", "narrow")]
     check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
-    assert "<script" not in text
+    (script,) = page.iter("script")
+    assert script.text == inline_script("plots.js").text, "the only one, which the policy allows"
+    assert inline_script("plots.js").policy in page.xpath("string(//meta[@http-equiv]/@content)")
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
     assert study_page(results) == text, "the page is the same for the same results"
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from itertools import chain
 from textwrap import fill
 
+from rov_fmu.io.messages import listed
 from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -68,7 +69,7 @@ def _left_out(layout: Layout) -> Iterator[str]:
     if missing := [name for name in _AXES if name not in layout.kinds]:
         drifts = {"surge", "yaw"} <= layout.kinds.keys() and "sway" in missing
         yield f"{', '.join(missing).capitalize()}.{' The vehicle does not drift outward in a turn.' if drifts else ''}"
-    if same := mirrored(layout):
+    if same := _mirrored(layout):
         yield f"What differs between the two directions of {same}."
     lacks = {
         "lag": not layout.lagging,
@@ -77,25 +78,23 @@ def _left_out(layout: Layout) -> Iterator[str]:
         "loss of thrust with speed": "d" not in keys,
     }
     if some := [name for name, is_missing in lacks.items() if is_missing]:
-        yield f"Thrusters as machines: there is no {', '.join(some)}."
+        yield f"Thrusters as machines: there is no {listed(some, 'or')}."
     static = [
         "" if "m_a" in keys else "added mass",
         "static drag",
         "" if layout.has_dead_time else "a delay at the start",
     ]
-    yield f"As terms of their own: {', '.join(filter(None, static))}; β < 1 stands for a slow start."
+    yield f"As terms of their own: {listed(filter(None, static))}; β < 1 stands for a slow start."
     if "heave" in layout.kinds and not layout.restoring:
         load = "Beyond the constant load F_0_w, buoyancy" if "F_0_w" in layout.coefficients else "Buoyancy"
         yield f"{load} is neutral."
     yield "The tether pulls at nothing unless it is connected as loads."
     yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.kinds else ''}"
-    moving = (
-        "A current is steady, horizontal and everywhere the same" if "V_N" in layout.inputs else "The water is at rest"
-    )
-    yield f"{moving}."
+    level = "" if layout.has_attitude else ", horizontal"
+    yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
 
 
-def mirrored(layout: Layout) -> str:
+def _mirrored(layout: Layout) -> str:
     """Return, in words, which thrust curves and axes behave in reverse as forward."""
     curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
     axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
