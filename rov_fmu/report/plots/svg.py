@@ -38,19 +38,21 @@ PALETTE = {
     "grey": ("#84919c", "#8796a3"),
     "teal": ("#12877b", "#4fd0c0"),
     "blue": ("#0a5cad", "#6db3f2"),
-    "violet": ("#8444b8", "#c99af0"),
+    "violet": ("#8e1eff", "#ac6bff"),
     "orange": ("#c43e12", "#ff9468"),
     "steel": ("#22303d", "#4d6172"),
     "metal": ("#5d6f7e", "#8497a6"),
 }
 """The colours on a light and on a dark page, by role. A plot in a page refers to the role, so it follows the page."""
 LIGHT = {role: light for role, (light, _) in PALETTE.items()}
-LINES = ("blue", "orange", "teal", "violet", "steel", "grey")
+LINES = ("blue", "orange", "teal", "violet", "steel")
 """The colours of lines, in the order of their use. They differ for colour-blind people, too."""
+_LARGEST = 10.0
+"""Commands beyond this are pulse widths in µs and no fractions."""
 KNOTS = 3600.0 / 1852.0
 """Knots in 1 m/s."""
 _FONTS = "system-ui, sans-serif"
-_STYLE: Any = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "mathtext.fontset": "dejavusans",
@@ -116,19 +118,24 @@ def add_knots(ax: Axes) -> None:
 
 
 def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any]) -> None:
-    """Draw the commands of all thrusters (fractions) as steps in one small panel. Equal commands share a line."""
+    """Draw the commands of all thrusters as steps in one small panel: fractions in percent, or pulse widths.
+
+    Equal commands share a line.
+    """
+    is_pulse = any(np.max(np.abs(values), initial=0.0) > _LARGEST for values in commands.values())
+    factor = 1.0 if is_pulse else 100.0
     groups: dict[bytes, list[str]] = {}
     for name, values in commands.items():
         groups.setdefault(np.asarray(values, float).round(4).tobytes(), []).append(name)
     for names in groups.values():
         label = ", ".join(names)
-        ax.plot(time, 100.0 * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
-    ax.set_title("Commands (%)", loc="left")
+        ax.plot(time, factor * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
+    ax.set_title("Commands (µs)" if is_pulse else "Commands (%)", loc="left")
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     ax.locator_params("y", nbins=4)
 
 
-def with_even_text(draw: Draw, size: float = _STYLE["font.size"]) -> Draw:
+def with_even_text(draw: Draw, size: float = STYLE["font.size"]) -> Draw:
     """Return a function that draws the same figure with all text in one size, in points."""
 
     def drawn(figure: Figure) -> None:
@@ -187,7 +194,7 @@ def saved(
     """
     file = BytesIO()
     margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
-    with context(["default", _STYLE, {"svg.hashsalt": salt, **margins, **style}]), without_font_warnings():
+    with context(["default", STYLE, {"svg.hashsalt": salt, **margins, **style}]), without_font_warnings():
         figure = Figure(figsize=size, layout="constrained", facecolor=background)
         draw(figure)
         _arrange(figure, how["format"])
