@@ -230,4 +230,5 @@ class VehicleModel(Vehicle):
             tuple(name for name in recorded if name in layout.state),
             np.flatnonzero(found.failed < len(commands.time)),
             {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
+            "us" if layout.pulse else "1",
         )

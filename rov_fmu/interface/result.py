@@ -64,6 +64,8 @@ class Result(Mapping[str, Array]):
     """The numbers of the vehicles whose motion could not be computed to the end; their arrays end with NaN."""
     commands: Mapping[str, Array] = field(default_factory=dict)
     """The commands of one vehicle at the times, as its inputs have them; empty for many vehicles."""
+    command_unit: str = "1"
+    """Their unit: 1 for fractions, us for pulse widths."""
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of a variable. Raises UnknownNameError, a KeyError, if it was not recorded."""
@@ -172,7 +174,7 @@ class Result(Mapping[str, Array]):
                 add_knots(panel)
             panel.legend(loc="center left", bbox_to_anchor=(1.13, 0.5))
         if commands:
-            draw_commands(axes[-1], self.time, commands)
+            draw_commands(axes[-1], self.time, commands, self.command_unit)
         axes[-1].set_xlabel("time (s)")
 
     def _moving(self) -> tuple[str, ...]:

@@ -1,19 +1,18 @@
 """The identification report: one HTML file with the verdicts, the answers, the predictions, and all that is known."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date, datetime, timezone
 from functools import partial
 from itertools import count
-from math import isfinite
 from pathlib import Path
 
 from markupsafe import Markup
 
 from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
-from rov_fmu.identify.result import Answer, AxisResult, Identification, Point, Prediction
-from rov_fmu.io.messages import Progress, listed, silent
+from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction
+from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
 from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
@@ -31,8 +30,6 @@ _PLOTS: Mapping[str, Callable[..., None]] = {
 }
 _BROAD = 7.2
 """The width of the large picture on a wide page, inches."""
-_MOST_FILES = 6
-"""The number of files that the first screen names."""
 
 
 def report_output(results: Identification, path: Path, on_progress: Progress = silent) -> Output:
@@ -53,7 +50,6 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
     shown = _shown(results.axes)
     drawn = count()
     total = len(curves) + sum(2 * bool(r.answers) + len(r.predictions) for r in results.axes) + 2 * bool(shown)
-    low, high = results.vehicle.command_range
 
     def plot(label: str, kind: str, size: tuple[float, float] = _SIZE, salt: str = "", **content: object) -> Markup:
         on_progress(f"drawing: {label}", next(drawn) / total)
@@ -64,11 +60,9 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         vehicle=results.vehicle,
         results=results,
         made=made or _today(),
-        data=_data(results),
         findings=findings.by_heading(results.findings),
         next_tests=findings.next_tests(results.axes),
         shown=shown,
-        picture_title=_picture_title(shown),
         forces=curves,
         plot=plot,
         picture=_picture(results, shown, partial(plot, "Main prediction", "overview")) if shown else None,
@@ -77,10 +71,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,
-        tested=f"{low:.0%} to {high:.0%}",
-        beyond=listed(f"{share:.0%}" for share in findings.SHARES if not low <= share <= high),
         answer_at=findings.answer_at,
-        answers_of_both=_answers_of_both,
         by=_by,
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
         relative_error=findings.relative_error,
@@ -103,19 +94,6 @@ def _shown(axes: Sequence[AxisResult]) -> list[Prediction]:
     return found or [p for p in mains if p.file == file]
 
 
-def _picture_title(shown: Sequence[Prediction]) -> str:
-    """Return what the large picture shows, in sentences with the share of the samples in each band."""
-    if not shown:
-        return ""
-    spans = [f"the {p.quantity}, anew every {p.span:g} s" if isfinite(p.span) else f"the {p.quantity}" for p in shown]
-    shares = listed(f"{p.coverage:.0%} for {p.axis.name}" for p in shown)
-    return (
-        f"Unseen motion: {listed(spans)} of {shown[0].file}, predicted from the commands alone by a fit to "
-        f"{shown[0].by}. The bands should contain 95% of the samples; they contain {shares}. No other log is predicted "
-        f"less accurately."
-    )
-
-
 def _picture(results: Identification, shown: Sequence[Prediction], plot: Callable[..., Markup]) -> Markup:
     """Return the large picture twice, broad and for phones, of which the page shows one."""
     log = next((log for log in results.folder.logs if log.file == shown[0].file), None)
@@ -126,26 +104,6 @@ def _picture(results: Identification, shown: Sequence[Prediction], plot: Callabl
         for key, size in sizes.items()
     ]
     return Markup("").join(drawn)
-
-
-def _data(results: Identification) -> str:
-    """Return in a sentence from which data the vehicle is."""
-    points = sum(len(result.points) for result in results.axes)
-    logs = [log.file for log in results.folder.logs]
-    counted = {"log": len(logs), "force": len(results.forces), "point": points}
-    parts = [f"{number} {noun}{'s' * (number > 1)}" for noun, number in counted.items() if number]
-    if logs:
-        named = logs[:_MOST_FILES] + [f"{len(logs) - _MOST_FILES} more"] * (len(logs) > _MOST_FILES)
-        parts[0] += f" of {results.seconds:.0f} s ({listed(named)})"
-    low, high = results.vehicle.command_range
-    return f"{listed([*parts, f'commands of {low:.0%} to {high:.0%}'])}.".capitalize()
-
-
-def _answers_of_both(result: AxisResult) -> Iterator[tuple[Answer, str]]:
-    """Yield the answers of an axis in the order of the command, each followed by that of the other vehicle."""
-    for answer in sorted(result.answers, key=lambda a: a.command):
-        yield answer, "this fit"
-        yield from ((other, "compared") for other in result.compared if other.command == answer.command)
 
 
 def _by(p: Point, other: Vehicle) -> float | None:

@@ -27,11 +27,6 @@ class Script:
     text: Markup
     policy: str
 
-    @property
-    def element(self) -> Markup:
-        """The element of the page."""
-        return Markup("<script>{}</script>").format(self.text)
-
 
 def inline_script(*names: str, folder: Path = _TEMPLATES) -> Script:
     """Return scripts, one after the other, without what only readers of their source need."""

@@ -132,10 +132,10 @@ def test_the_first_screen_has_verdicts_answers_the_worst_prediction_and_the_data
     words = unfolded(page)
     for part in (
         "Yaw: do not useThe bands contain only 40 % of the unseen data. Two starts disagree.",
-        "the heading, anew every 10 s of log_2.csv, predicted from the commands alone by a fit to the other log",
+        "the heading (anew every 10 s) of log_2.csv, predicted from the commands alone by a fit to the other log",
         "The bands should contain 95 % of the samples; they contain 95 % for surge, 90 % for heave and 40 % for yaw.",
         "Identification from two dive logs · 2026-11-23",
-        "2 logs of 120 s (log_1.csv and log_2.csv), 3 forces, 9 points and commands of 20 % to 70 %.",
+        "2 logs of 120 s (log_1.csv, log_2.csv), 3 forces, 9 points, commands of 20 % to 70 %.",
         "The tests had commands of 20 % to 70 %: the speed at 100 % is extrapolated.",
         "Yaw: hold 0.6 for 8 s, then −0.6 for 8 s. V_ss at 50 %, now ±60 %, becomes ±30 %.",
         "Yaw: the prediction of the heading in log_2.csv is off by 52 ° (RMS)",

@@ -280,8 +280,8 @@ def _draw_arm(ax: Axes, at: Point, size: float) -> None:
 
 def _draw_scale(ax: Axes, size: float) -> None:
     """Draw a scale bar with a length of 1, 2 or 5 times a power of 10."""
-    decade = 10.0 ** next(n for n in range(3, -4, -1) if 10.0**n <= 0.6 * size)
-    length = next(step * decade for step in (5.0, 2.0, 1.0) if step * decade <= 0.6 * size)
+    lengths = (step * 10.0**n for n in range(3, -4, -1) for step in (5.0, 2.0, 1.0))
+    length = next(length for length in lengths if length <= 0.6 * size)
     y, x = ax.get_ylim()[0] - 0.08 * size, ax.get_xlim()[0]
     ax.plot([x, x + length], [y, y], color=LIGHT["muted"], linewidth=2.0, solid_capstyle="butt")
     ax.text(x + length + 0.06 * size, y, f"{length:g} m", color=LIGHT["muted"], ha="left", va="center", fontsize=8.5)

@@ -47,8 +47,6 @@ PALETTE = {
 LIGHT = {role: light for role, (light, _) in PALETTE.items()}
 LINES = ("blue", "orange", "teal", "violet", "steel")
 """The colours of lines, in the order of their use. They differ for colour-blind people, too."""
-_LARGEST = 10.0
-"""Commands beyond this are pulse widths in µs and no fractions."""
 KNOTS = 3600.0 / 1852.0
 """Knots in 1 m/s."""
 _FONTS = "system-ui, sans-serif"
@@ -117,20 +115,19 @@ def add_knots(ax: Axes) -> None:
     knots.yaxis.set_major_locator(MaxNLocator(5))
 
 
-def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any]) -> None:
-    """Draw the commands of all thrusters as steps in one small panel: fractions in percent, or pulse widths.
+def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = "1") -> None:
+    """Draw the commands of all thrusters as steps in one small panel: fractions in percent, or pulse widths in µs.
 
     Equal commands share a line.
     """
-    is_pulse = any(np.max(np.abs(values), initial=0.0) > _LARGEST for values in commands.values())
-    factor = 1.0 if is_pulse else 100.0
+    factor, shown = (100.0, "%") if unit == "1" else (1.0, "µs")
     groups: dict[bytes, list[str]] = {}
     for name, values in commands.items():
         groups.setdefault(np.asarray(values, float).round(4).tobytes(), []).append(name)
     for names in groups.values():
         label = ", ".join(names)
         ax.plot(time, factor * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
-    ax.set_title("Commands (µs)" if is_pulse else "Commands (%)", loc="left")
+    ax.set_title(f"Commands ({shown})", loc="left")
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     ax.locator_params("y", nbins=4)
 
