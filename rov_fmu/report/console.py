@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
-from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -83,7 +82,7 @@ def print_table(found: Table, out: Console | None = None) -> None:
     cells."""
     out = out or console()
     if not out.is_terminal:
-        out.width = max(out.width, Measurement.get(out, out.options.update(max_width=10_000), found).maximum)
+        out.width = max(out.width, out.measure(found, options=out.options.update(max_width=10_000)).maximum)
     out.print(found)
 
 
@@ -162,8 +161,9 @@ def _model(cell: Cell) -> Iterator[str]:
 
 def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:
     """Return an empty table with a first column, then columns of numbers, then columns of texts."""
-    plain: Any = {"title_style": "", "caption_style": "", "title_justify": "left", "caption_justify": "left"}
-    result = Table(title=title or None, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, **plain)
+    result = Table(title=title or None, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    result.title_style = result.caption_style = ""
+    result.title_justify = result.caption_justify = "left"
     result.add_column(Text(first), overflow="fold")
     for header in numbers:
         result.add_column(Text(header), justify="right", overflow="fold")

@@ -49,7 +49,6 @@ class Parts:
         """Say that a part is done."""
         with self._lock:
             began, task = self._running.pop(name)
-            self._steps.pop(name, None)
         if self._display and task is not None:
             self._display.update(task, completed=1.0, description=one_line(name), count="")
         else:
@@ -106,7 +105,7 @@ def parts() -> Iterator[Parts]:
         BarColumn(bar_width=12),
         TextColumn("{task.fields[count]}", markup=False),
         TimeElapsedColumn(),
-        TimeRemainingColumn(compact=True),
+        TimeRemainingColumn(),
     )
     display = Progress(*columns, console=out, transient=True, expand=True)
     display.start()

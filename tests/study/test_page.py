@@ -136,6 +136,23 @@ def test_the_plots_fill_the_page_with_text_of_one_size(done: Path, visit: Callab
     assert not shown.problems()
 
 
+def test_the_plots_show_the_values_under_the_pointer(done: Path, visit: Callable[..., Visit]) -> None:
+    shown = visit(width=1440)
+    shown.page.goto((done / "study.html").as_uri())
+    read = {}
+    for label in ("Distribution of end", "Trajectories of y"):
+        plot = shown.page.locator(f'.broad svg[aria-label="{label}"]')
+        plot.scroll_into_view_if_needed()
+        plot.hover()
+        read[label] = shown.page.locator(".values span").all_inner_texts()
+    assert re.search(r"runs \(%\): share \d+", read["Distribution of end"][1])
+    median = re.search(r": 5 % (−?[\d.]+); 95 % (−?[\d.]+); median (−?[\d.]+)$", read["Trajectories of y"][1])
+    assert median
+    low, high, middle = (float(text.replace("−", "-")) for text in median.groups())
+    assert low < middle < high
+    assert not shown.problems()
+
+
 def test_long_words_break(done: Path, tmp_path: Path, visit: Callable[..., Visit]) -> None:
     check_breaks_long_words((done / "study.html").read_text(encoding="utf-8"), tmp_path / "study.html", visit)
 

@@ -123,7 +123,7 @@ def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = 
     factor, shown = (100.0, "%") if unit == "1" else (1.0, "µs")
     groups: dict[bytes, list[str]] = {}
     for name, values in commands.items():
-        groups.setdefault(np.asarray(values, float).round(4).tobytes(), []).append(name)
+        groups.setdefault(np.asarray(values, float).tobytes(), []).append(name)
     for names in groups.values():
         label = ", ".join(names)
         ax.plot(time, factor * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
@@ -231,9 +231,10 @@ def _mark(figure: Figure) -> None:
         panel = {"box": place, "x": ax.get_xlim(), "y": ax.get_ylim(), "title": title or ax.get_ylabel()}
         ax.set_gid(json.dumps(panel | {"along": ax.get_xlabel() or figure.axes[-1].get_xlabel()}))
         ax.xaxis.set_gid('{"ticks": "x"}')
-        for line in ax.lines:
-            if not str(line.get_label()).startswith("_"):
-                line.set_gid(json.dumps({"line": line.get_label()}))
+        named = [(line.get_label(), [line]) for line in ax.lines] + [(bars.get_label(), bars) for bars in ax.containers]
+        for label, artists in named:
+            for artist in artists if not str(label).startswith("_") else ():
+                artist.set_gid(json.dumps({"line": label}))
 
 
 def _without_ballast(svg: bytes) -> str:
