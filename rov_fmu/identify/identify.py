@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
-from rov_fmu.identify.findings import facts, findings_of, warnings
+from rov_fmu.identify.findings import told
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
@@ -45,7 +45,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
     fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
     on_progress("predicting what was left out", 0.85)
-    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior)]
+    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior, against if against else None)]
     unexplained = disturbances(fit.objective, fit.best, fit.posterior)
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
     vehicle, coefficients = identified_vehicle(tests, fit)
@@ -57,7 +57,10 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
-        axes.append(_axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out))
+        one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out)
+        if against and against.layout.has(axis):
+            one = replace(one, compared=assess.answers_of_file(against, axis))
+        axes.append(one)
     names = tuple(vehicle.estimates)
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings]),
@@ -76,11 +79,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         agreement=fit.difference,
         slips=wrong,
     )
-    findings = findings_of(found)
-    provenance = vehicle.provenance
-    assert provenance
-    told = provenance.model_copy(update={"warnings": warnings(findings), "facts": facts(findings)})
-    return replace(found, findings=findings, vehicle=replace(vehicle, provenance=told))
+    return told(found)
 
 
 def _axis(

@@ -7,7 +7,7 @@ from math import isfinite
 import numpy as np
 
 from rov_fmu.engine.filter import DivergedError, Record
-from rov_fmu.identify.assess import COMMANDS
+from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import NextTest
@@ -65,8 +65,8 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
 
 
 def _widths(slopes: Array, covariance: Array) -> Array:
-    """Return the relative half-widths of some intervals."""
-    return np.asarray(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)))
+    """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
+    return np.asarray(np.maximum(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)), EXACT))
 
 
 def _hold(motions: Sequence[AxisAlone], axis: Axis, limits: TankLimits) -> float:

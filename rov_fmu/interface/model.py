@@ -209,7 +209,8 @@ class VehicleModel(Vehicle):
         vehicles = number_of_vehicles(values)
         try:
             attitude = QUATERNION if layout.has_attitude else ()
-            recording = [*recorded, *(name for name in attitude if name not in recorded)]
+            others = (*attitude, *(() if many else layout.commands))
+            recording = [*recorded, *(name for name in others if name not in recorded)]
             found = simulate(self, commands.time, values, recording, vehicles=vehicles, workers=workers)
         except MemoryError as error:
             size = 8e-9 * vehicles * len(commands.time) * len(recorded)
@@ -228,4 +229,6 @@ class VehicleModel(Vehicle):
             {name: units[name] for name in recorded},
             tuple(name for name in recorded if name in layout.state),
             np.flatnonzero(found.failed < len(commands.time)),
+            {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
+            "us" if layout.pulse else "1",
         )

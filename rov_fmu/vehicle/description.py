@@ -142,5 +142,11 @@ class Provenance(Strict):
     """What the data do not determine, and what speaks against the model, in sentences."""
     facts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
     """What was found, and what was done with the data, in sentences."""
+    verdicts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """Whether the model of each axis may be trusted, with the reasons."""
+    errors: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """The errors of predictions of unseen data."""
+    tested: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`."""
     report: Annotated[Path, BeforeValidator(_report), _NAME_OF_REPORT] | None = None
     """The name of the report, a file beside this one. A build puts it into the FMU."""

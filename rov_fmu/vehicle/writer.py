@@ -21,6 +21,8 @@ from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Alternative, Estimated, ke
 from rov_fmu.vehicle.thrust_table import CurrentTable
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
+_TOLD = ("verdicts", "errors", "tested", "warnings", "facts")
+"""The lists of sentences in [provenance]."""
 _DECIMALS = 6
 """The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
 _DIGITS = 6
@@ -51,7 +53,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
     if made:
         report = {"report": name_of(made.report, folder)} if made.report else {}
-        told = _texts("warnings", made.warnings) | _texts("facts", made.facts)
+        told = {key: value for name in _TOLD for key, value in _texts(name, getattr(made, name)).items()}
         head = {"tool": made.tool, "method": made.method} | report | told
         document["provenance"] = {**head, "inputs": dict(made.inputs)}
     text: str = tomlkit.dumps(document)

@@ -63,7 +63,7 @@ def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleM
     described = native_content(changed).files["modelDescription.xml"].decode()
     assert f'description="{videoray.description} ({expected})"' in described
     page = documentation_page(changed)
-    assert page.count(expected) == 2
+    assert page.count(expected) == 3, "the card has it, too"
     assert page.count("<td>set by hand</td>") == 2
     assert videoray["a_d_u"] != 10.0
     assert "set by hand" not in videoray.summary
@@ -124,8 +124,24 @@ def test_a_plot_has_a_panel_for_each_unit(
     result = videoray.simulate_many(TIMES, AHEAD, coefficients={"a_d_u": [8.0, 10.0]})
     drawn = result.plot(["u", "w", "x", "u"], figure)
     assert figure is None or drawn is figure
-    assert [(axes.get_ylabel(), len(axes.lines)) for axes in drawn.axes] == [("m/s", 4), ("m", 2)]
+    titles = [(axes.get_title(loc="left"), len(axes.lines)) for axes in drawn.axes]
+    assert titles == [("Velocity (m/s)", 4), ("Position (m)", 2)]
     np.testing.assert_array_equal(np.asarray(drawn.axes[0].lines[1].get_ydata()), result["u"][1])
+
+
+def test_a_plot_has_words_degrees_and_the_commands_and_nothing_that_stays_0(six: VehicleModel) -> None:
+    result = six.simulate(np.linspace(0.0, 2.0, 5), {"N_ext": 1.0, next(iter(six.layout.commands)): 0.2})
+    drawn = result.plot(figure=Figure())
+    titles = [axes.get_title(loc="left") for axes in drawn.axes]
+    assert titles[-1] == "Commands (%)"
+    assert {"Rate of turn (°/s)", "Angle (°)", "Thrust (N)"} <= {*titles}
+    labels = {line.get_label(): line for axes in drawn.axes for line in axes.lines}
+    assert np.asarray(labels["heading (psi)"].get_ydata())[-1] == pytest.approx(np.degrees(result["psi"][-1]))
+    assert np.max(labels[next(iter(six.layout.commands))].get_ydata()) == 20.0
+    assert not {*QUATERNION} & {*labels}
+    still = six.simulate([0.0, 1.0]).plot(figure=Figure())
+    shown = [line for axes in still.axes for line in axes.lines]
+    assert len(shown) == 1 or all(np.any(line.get_ydata()) for line in shown)
 
 
 def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.identify.findings import facts, findings_of, warnings
+from rov_fmu.identify.findings import told
 from rov_fmu.identify.result import (
     Answer,
     AxisResult,
@@ -66,7 +66,7 @@ def answers(scale: float, share: float) -> tuple[Answer, ...]:
         V = scale * c
         return Answer(SURGE, c, known(V), known(0.5 / abs(c)), known(2.0 * V))
 
-    return tuple(map(answer, (-0.7, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7)))
+    return tuple(map(answer, (-1.0, -0.5, -0.3, 0.3, 0.5, 1.0)))
 
 
 def axis_result(
@@ -164,15 +164,6 @@ def without_findings() -> Identification:
         objective=-1234.5,
         agreement=0.0,
     )
-
-
-def told(result: Identification) -> Identification:
-    """Return a result with its findings, which the vehicle has too, as `identify` puts them together."""
-    findings = findings_of(result)
-    made = result.vehicle.provenance
-    assert made
-    made = made.model_copy(update={"warnings": warnings(findings), "facts": facts(findings)})
-    return replace(result, findings=findings, vehicle=replace(result.vehicle, provenance=made))
 
 
 @cache

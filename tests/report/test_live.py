@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.module import web_module
+from rov_fmu.fmu.archive import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.catalogue import HEAVE, Axis

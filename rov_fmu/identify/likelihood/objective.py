@@ -123,9 +123,12 @@ class Objective:
 
     # ---- One log ----
 
-    def run(self, z: Array, number: int, **how: object) -> Run:
-        """Run the filter through a log. The options are those of `Filter.run`. Raises DivergedError."""
-        parameters = self.table.of_log(z.tolist(), self.logs[number])
+    def run(self, z: Array, number: int, *, table: Table | None = None, **how: object) -> Run:
+        """Run the filter through a log, if given with the coefficients of another table.
+
+        The other options are those of `Filter.run`. Raises DivergedError.
+        """
+        parameters = (table or self.table).of_log(z.tolist(), self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
 
     def concerns(self, parameter: Parameter, number: int) -> bool:

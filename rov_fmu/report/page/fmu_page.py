@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
-from itertools import chain, groupby
+from itertools import groupby
 from math import isclose, isfinite
 from typing import Any
 
@@ -15,12 +15,11 @@ from matplotlib.axes import Axes
 from rov_fmu.engine.compile import INTERFACES
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import REPORT
+from rov_fmu.fmu.card import card, card_text, reversing
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
 from rov_fmu.model.catalogue import ARM, Axis
-from rov_fmu.model.forces import EXPECTED, effects_of
-from rov_fmu.model.layout import Layout
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
 from rov_fmu.report.page.pictures import pictures
@@ -39,8 +38,6 @@ from rov_fmu.report.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
-_AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
-"""The order in which the page names the missing axes."""
 _PANEL = (3.7, 2.9)  # inches
 _PICTURES = {
     "from_above.svg": "The vehicle from above: x forward, y to starboard",
@@ -56,7 +53,11 @@ def documentation(
 ) -> dict[str, bytes]:
     """Return the page and the pictures by their path in the FMU. Raises FileError."""
     text = documentation_page(vehicle, native=native, fmi=fmi, interface=interface, module=module)
-    return {"documentation/index.html": text.encode(), **pictures(vehicle)}
+    return {
+        "documentation/index.html": text.encode(),
+        "documentation/model_card.txt": card_text(vehicle).encode(),
+        **pictures(vehicle),
+    }
 
 
 def documentation_page(
@@ -89,18 +90,15 @@ def documentation_page(
         groups=[
             list(group) for _, group in groupby(variables(vehicle), lambda v: (v.causality, v.variability, v.initial))
         ],
-        reversing=_reversing,
+        reversing=reversing,
         settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
-        other_axes=listed(name for name in _AXES if name not in layout.kinds).capitalize(),
+        card=card(vehicle),
         coupled=listed(equations.coupled(layout)),
         has_full_mass=any(line.coupled for line in shown.motion),
         equations=shown,
         mathml=equations.MathML(layout),
         choices=equations.choices,
-        mirrored=_mirrored(layout),
-        has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
-        missing=[effect.missed for effect in EXPECTED if effect not in effects_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         arm=[vehicle[name] for name in ARM] if layout.has_arm else None,
         live=live([Flown(vehicle, module)]) if module else None,
@@ -206,30 +204,6 @@ def _is_cut_off(cell: Cell) -> bool:
     if cell.printed is None or cell.rounds_to_printed or not isfinite(cell.computed):
         return False
     return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed
-
-
-def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Return the thrust curves that push backward at small commands, and the command at which they change sign."""
-    found = []
-    for curve in layout.curves:
-        for end, words in (("", ""), ("_reverse", " in reverse")):
-            a, b = (values.get(curve.coefficient(key + end), 0.0) for key in ("a_t", "b_t"))
-            if b < 0.0 < a and f"a_t{end}" in curve.keys:
-                dead = values.get(curve.coefficient("c_0" + end), 0.0) if "c_0" in curve.keys else 0.0
-                found.append((f"{curve.name} thrust{words}", dead - b / a))
-    return found
-
-
-def _mirrored(layout: Layout) -> str:
-    """Return, in words, which thrust curves and axes behave in reverse as forward."""
-    curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
-    axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
-    found = []
-    if curves:
-        found.append("thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}")
-    if axes:
-        found.append("drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}")
-    return " and ".join(found)
 
 
 def _is_tuned(vehicle: Vehicle) -> bool:

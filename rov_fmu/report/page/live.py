@@ -1,9 +1,7 @@
 """The live section of a page: the model as WebAssembly, the data of the vehicle, and the scripts that fly it."""
 
 import base64
-import hashlib
 import json
-import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +17,7 @@ from rov_fmu.model.catalogue import Axis
 from rov_fmu.model.layout import Layout, Thruster
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
-from rov_fmu.report.templates import number, page, pretty_unit
+from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
 from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, Entry, LogColumn, columns_of_log
 from rov_fmu.tank.readers.tables import rules_of_page
@@ -31,8 +29,6 @@ _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
 _SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
-# The comments, types and indents are for readers of the source. They are a third of it, and are left out of the page.
-_FOR_READERS = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ |^ +|^\n")
 
 
 @dataclass(frozen=True)
@@ -78,14 +74,13 @@ def live(flown: Sequence[Flown]) -> Live:
     pilot = flown[0].vehicle
     data = [_data(one) for one in flown]
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    script = _FOR_READERS.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    script = inline_script(*_SCRIPTS, folder=MODULE_SOURCES)
     tests, start = data[0]["tests"], dict(data[0]["variables"])
     names = _names(flown)
     return Live(
         data=Markup(text),
-        script=Markup(script),
-        policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
+        script=script.text,
+        policy=f"{script.policy} 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
         keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
         places=_places(pilot),

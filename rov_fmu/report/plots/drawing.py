@@ -1,8 +1,8 @@
 """Drawings of the vehicle's thrusters from its geometry: from above and from starboard."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from math import atan2, cos, degrees, hypot, sin
+from math import atan2, copysign, cos, degrees, hypot, sin
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -11,11 +11,12 @@ from matplotlib.path import Path
 
 from rov_fmu.model.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.model.layout import Thruster
-from rov_fmu.report.plots.labels import AROUND, Place, Space
 from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Point = tuple[float, float, float]
+Place = tuple[float, float]
+_Box = tuple[Place, Place]
 
 VIEWS = {"from above": (SWAY, HEAVE, -1), "from starboard": (HEAVE, SWAY, 1)}
 """For each view: the axis that points down, the axis along the line of sight, and 1 if this axis points toward the
@@ -24,6 +25,12 @@ _LETTERS = {SURGE: "x", SWAY: "y", HEAVE: "z"}
 _INDEX = {axis: n for n, axis in enumerate(AXES.values())}
 _SMALLEST = 0.05
 """The least size of a vehicle, m."""
+_HEIGHT = 0.17
+"""The height of a line of text, inches."""
+_GAP = 0.045
+"""The least distance between a name and what it names, inches."""
+_AROUND = ((1.0, 0.0), (0.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+"""The directions in which a label may stand: right, up, down, left, and between these."""
 _WIDTH = 3.7
 """The width of a drawing, inches."""
 
@@ -111,61 +118,60 @@ def size_of(vehicle: Vehicle) -> float:
 
 
 def _arranged(vehicle: Vehicle, view: str, inch: float) -> Scene:
-    """Return a view with its labels placed, in a drawing in which an inch is `inch` metres."""
+    """Return a view with its labels placed, in a drawing in which an inch is `inch` metres.
+
+    The label of a thruster stands at the end of the arrow of its force, or beside it where another label stands there.
+    """
     down, sight, toward = VIEWS[view]
     size = size_of(vehicle)
-    space = Space(inch, [(-1.2 * size, 0.0)])  # the least width of a drawing
     marks = list(_marks(vehicle, down, sight, toward))
     from_above = down is SWAY
-    ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}
-    for end in ends.values():
-        space.line((0.0, 0.0), end)
-    turn = _turn(size) if from_above and vehicle.layout.has(YAW) else None
-    if turn:
-        tail, tip = turn
-        space.line(tail, (1.27 * size, 0.0))
-        space.line((1.27 * size, 0.0), tip)
-    for mark in marks:
-        space.ring(mark.at, 0.1 * size)
-        if not mark.toward:
-            space.line(mark.at, mark.tip(size))
-    labels = _arm_labels(vehicle, space, size) if from_above and vehicle.layout.has_arm else []
-    for axis, end in ends.items():
+    circles = [(mark.at, (0.1 * size, 0.1 * size)) for mark in marks]
+    boxes: list[_Box] = []
+    labels: list[tuple[str, Place, str]] = []
+
+    def name(words: str, width: float, color: str, at: Place, distance: float, *directions: Place) -> None:
+        half = width * inch / 2.0, _HEIGHT * inch / 2.0
+        gap = distance + _GAP * inch
+        places = []
+        for dx, dy in directions:
+            x, y = (part / (hypot(dx, dy) or 1.0) for part in (dx, dy))
+            places.append((at[0] + x * gap + _side(x) * half[0], at[1] + y * gap + _side(y) * half[1]))
+        best = min(places, key=lambda place: [_overlaps((place, half), some) for some in (boxes, circles)])
+        labels.append((words, best, color))
+        boxes.append((best, half))
+
+    if from_above and vehicle.layout.has_arm:
+        x, y, _ = _armed(vehicle)
+        gamma, side = atan2(abs(y), -x), -1.0 if y < 0.0 else 1.0
+        far = 0.38 * size
+        name("$R$", 0.1, "muted", (0.68 * x, 0.68 * y - 0.12 * side * size), 0.0, (0.0, 0.0))
+        at = -far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)
+        name(r"$\gamma$", 0.1, "muted", at, 0.0, (0.0, 0.0))
+    for axis, end in ((SURGE, (1.4 * size, 0.0)), (down, (0.0, 0.9 * size))):
         words = rf"${_LETTERS[axis]}, {axis.velocity}$" if vehicle.layout.has(axis) else f"${_LETTERS[axis]}$"
-        ahead = end[0] / hypot(*end), end[1] / hypot(*end)
-        labels.append((words, space.name(0.3 if "," in words else 0.1, [(end, 0.0, [ahead, *AROUND])]), "ink"))
-    if turn:
-        at = space.name(0.3, [(tip, 0.0, [AROUND[5], AROUND[2], AROUND[0]]), (tail, 0.0, [AROUND[4], AROUND[1]])])
-        labels.append((r"$\psi, r$", at, "ink"))
-    labels += [(mark.label, _place_label(mark, space, size), "blue") for mark in marks]
-    (left, right), (high, low) = space.limits()
+        name(words, 0.3 if "," in words else 0.1, "ink", end, 0.0, (end[0] and 1.0, end[1] and 1.0), *_AROUND)
+    if from_above and vehicle.layout.has(YAW):
+        name(r"$\psi, r$", 0.3, "ink", _turn(size)[1], 0.0, (0.0, 1.0), *_AROUND)
+    for mark in marks:
+        at, distance = (mark.at, 0.1 * size) if mark.toward else (mark.tip(size), 0.0)
+        name(mark.label, mark.width, "blue", at, distance, mark.along, *_AROUND)
+    edges = [(1.4 * size, 0.9 * size), (-1.2 * size, 0.0), *(mark.tip(size) for mark in marks if not mark.toward)]
+    edges += [(x + sign * w, y + sign * h) for (x, y), (w, h) in boxes + circles for sign in (-1.0, 1.0)]
+    along, across = zip(*edges, strict=True)
     edge = 0.06 * inch
-    low += (0.3 if _has_scale(vehicle) else 0.06) * inch
-    return Scene(view, marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
+    low = max(across) + (0.3 if _has_scale(vehicle) else 0.06) * inch
+    return Scene(view, marks, labels, size, ((min(along) - edge, max(along) + edge), (low, min(across) - edge)))
 
 
-def _arm_labels(vehicle: Vehicle, space: Space, size: float) -> list[tuple[str, Place, str]]:
-    """Return the labels of R and γ, and reserve the space of the arm and of these labels."""
-    x, y, _ = _armed(vehicle)
-    space.line((0.0, 0.0), (x, y))
-    space.line((0.0, 0.0), (1.15 * x, 0.0))
-    gamma, far, side = atan2(abs(y), -x), 0.38 * size, -1.0 if y < 0.0 else 1.0
-    of_R = 0.68 * x, 0.68 * y - 0.12 * side * size
-    of_gamma = -far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)
-    for at in (of_R, of_gamma):
-        space.box(at, 0.1)
-    return [("$R$", of_R, "muted"), (r"$\gamma$", of_gamma, "muted")]
+def _side(part: float) -> float:
+    """Return -1, 0 or 1: the side of a point on which a label is, along one coordinate of the direction to it."""
+    return 0.0 if abs(part) < 0.3 else copysign(1.0, part)
 
 
-def _place_label(mark: _Mark, space: Space, size: float) -> Place:
-    """Return the centre of the label of a mark: near the thruster, or at the tip of its arrow."""
-    if mark.toward:
-        return space.name(mark.width, [(mark.at, 0.1 * size, AROUND)])
-    dx, dy = (part / (hypot(*mark.along) or 1.0) for part in mark.along)
-    sides = sorted([(dy, -dx), (-dy, dx)], key=lambda direction: direction[1])
-    near_thruster = mark.at, 0.1 * size, [(-dx, -dy), *sides, *AROUND]
-    near_tip = mark.tip(size), 0.0, [(dx, dy), *AROUND]
-    return space.name(mark.width, [near_thruster, near_tip])
+def _overlaps(one: _Box, others: Iterable[_Box]) -> int:
+    """Return how many boxes, each with its centre and half its size, overlap one of them."""
+    return sum(all(abs(one[0][n] - box[0][n]) < one[1][n] + box[1][n] for n in (0, 1)) for box in others)
 
 
 def _has_scale(vehicle: Vehicle) -> bool:
@@ -275,8 +281,8 @@ def _draw_arm(ax: Axes, at: Point, size: float) -> None:
 
 def _draw_scale(ax: Axes, size: float) -> None:
     """Draw a scale bar with a length of 1, 2 or 5 times a power of 10."""
-    decade = 10.0 ** next(n for n in range(3, -4, -1) if 10.0**n <= 0.6 * size)
-    length = next(step * decade for step in (5.0, 2.0, 1.0) if step * decade <= 0.6 * size)
+    lengths = (step * 10.0**n for n in range(3, -4, -1) for step in (5.0, 2.0, 1.0))
+    length = next(length for length in lengths if length <= 0.6 * size)
     y, x = ax.get_ylim()[0] - 0.08 * size, ax.get_xlim()[0]
     ax.plot([x, x + length], [y, y], color=LIGHT["muted"], linewidth=2.0, solid_capstyle="butt")
     ax.text(x + length + 0.06 * size, y, f"{length:g} m", color=LIGHT["muted"], ha="left", va="center", fontsize=8.5)
