@@ -81,9 +81,12 @@ def print_table(found: Table, out: Console | None = None) -> None:
     """Print a table with its title and its caption. A pipe or a file gets whole lines, and a narrow terminal wraps
     cells."""
     out = out or console()
-    if not out.is_terminal:
-        out.width = max(out.width, out.measure(found, options=out.options.update(max_width=10_000)).maximum)
-    out.print(found)
+    if out.is_terminal:
+        out.print(found)
+        return
+    out.width = max(out.width, out.measure(found, options=out.options.update(max_width=10_000)).maximum)
+    for line in out.render_lines(found, pad=False):
+        out.print("".join(segment.text for segment in line).rstrip(), soft_wrap=True)
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:

@@ -42,7 +42,6 @@ def page(template: str, **content: object) -> str:
         _TEMPLATES,
         number=number,
         text=text,
-        two_digits=two_digits,
         unit=pretty_unit,
         with_interval=with_interval,
         sentence=sentence,
@@ -78,11 +77,6 @@ def _with_signs(text: str) -> str:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
         text = f"{mantissa}10{str(int(exponent)).translate(RAISED)}"
     return text.replace("-", "−")
-
-
-def two_digits(value: float) -> str:
-    """Return a number for readers with two significant digits: 420 and 0.010."""
-    return _with_signs(uncertainty.significant(value, 2)) if isfinite(value) else number(None)
 
 
 def text(value: float | None, form: str) -> str:

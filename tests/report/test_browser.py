@@ -124,6 +124,9 @@ def test_what_is_folded_opens_by_a_click_or_a_link_and_on_paper(report: Path, vi
     table = page.locator("#predictions table")
     assert not table.is_visible()
     page.emulate_media(media="print")
+    page.set_viewport_size({"width": 720, "height": 1000})
+    assert page.locator(".picture .broad svg").is_visible(), "a page of A4 is as wide as a screen"
+    assert not page.locator(".picture .narrow svg").is_visible()
     box = table.bounding_box()
     assert box is not None
     assert box["height"] > 50

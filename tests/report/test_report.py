@@ -19,7 +19,7 @@ from lxml import html
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify import assess
-from rov_fmu.identify.findings import STOPPING, next_tests, told
+from rov_fmu.identify.findings import STOPPING, next_tests, size_in_words, told
 from rov_fmu.identify.result import AxisResult, Effect, Identification
 from rov_fmu.io.output import write_whole
 from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
@@ -27,7 +27,7 @@ from rov_fmu.report import report
 from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
-from rov_fmu.report.templates import number, readable, sentence, two_digits, with_interval
+from rov_fmu.report.templates import number, readable, sentence, with_interval
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
@@ -262,10 +262,11 @@ def test_numbers_that_are_not_known_are_dashes() -> None:
 
 def test_errors_keep_two_digits() -> None:
     """0.010 m beside a noise of 0.0099 m does not look like a coarser number."""
-    assert [two_digits(value) for value in (0.0099, 0.01, 0.4, 1.0, 417.0, -0.5)] == [
-        *("0.0099", "0.010", "0.40", "1.0", "420", "−0.50")
+    assert [size_in_words(value, "m") for value in (0.0099, 0.01, 0.4, 1.0, 417.0, -0.5)] == [
+        *("0.0099 m", "0.010 m", "0.40 m", "1.0 m", "420 m", "-0.50 m")
     ]
-    assert two_digits(inf) == number(nan) == "–"
+    assert number(inf) == number(nan) == "–"
+    assert number(-0.0) == "0"
 
 
 def test_a_value_without_an_end_is_infinite() -> None:

@@ -33,7 +33,7 @@ from rov_fmu.report.plots.steps import (
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.report.plots.svg import LIGHT, image, inline_svg, with_formulas
+from rov_fmu.report.plots.svg import LIGHT, image, inline_svg
 from rov_fmu.report.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -232,7 +232,7 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     if table and table.steady:
         points = [(float(c), float(V)) for c, V in table.steady.items()]
         ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
-    finish(ax, rf"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", "command (%)")
+    finish(ax, f"{axis.name.capitalize()}: steady velocity ({axis.unit})", "command (%)")
     ax.set_xlim(least, 100)
 
 
@@ -244,7 +244,7 @@ def plot_steps(
     if differs_by_direction(vehicle, axis):
         steps += [Step(-step.command) for step in steps]
     draw_steps(ax, axis, steps, [(vehicle, "-")])
-    with_formulas(ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left"))
+    ax.set_title(f"{axis.name.capitalize()}: velocity ({axis.unit})", loc="left")
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:
