@@ -13,8 +13,8 @@ from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
 from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, Layout, VehicleAxis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE
+from rov_fmu.model.layout import Layout, VehicleAxis
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -131,7 +131,7 @@ def _measured(paper: Vehicle, refit: Vehicle) -> Table:
     found = _table("", "V_ss, the paper's", "V_ss, refit", "Tau, the paper's", "Tau, refit")
     for t in load_tables(paper):
         cells = [
-            _furthest(_off(t.response(v.rov, row.command)[n], measured(row)) for row in t.rows)
+            _furthest(_off(t.response(v, row.command)[n], measured(row)) for row in t.rows)
             for n, measured in enumerate((lambda row: row.scaled.V_ss.measured, lambda row: row.scaled.Tau.measured))
             for v in (paper, refit)
         ]
@@ -165,7 +165,7 @@ def _t200(vehicle: Vehicle) -> Table:
     a, b = symmetric()
     curve = vehicle.layout.curves[0]
     models = {
-        "shipped": np.array([vehicle.rov.curve_force(curve, float(x)) for x in c]),
+        "shipped": np.array([vehicle.curve_force(curve, float(x)) for x in c]),
         "one symmetric quadratic": (a * abs(c) + b) * c,
     }
     found = _table("", "RMS forward", "RMS in reverse", "furthest", "at 99 % forward")
@@ -180,7 +180,7 @@ def _t200(vehicle: Vehicle) -> Table:
 def _lag(vehicle: Vehicle) -> Table:
     t = np.array([0.0, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.4])
     _, rise = step(TransferFunction(*TRANSFER), T=np.linspace(0.0, 0.4, 401))
-    lag = 1.0 - np.exp(-t / vehicle.rov["T_t200"])
+    lag = 1.0 - np.exp(-t / vehicle["T_t200"])
     found = _table("after", *(f"{x * 1e3:.0f} ms" for x in t[1:]))
     found.append(("published, third order", *(f"{rise[round(x * 1e3)]:.0%}" for x in t[1:])))
     found.append(("shipped, first order", *(f"{x:.0%}" for x in lag[1:])))
@@ -205,11 +205,11 @@ def _top_speeds(six: Vehicle, eight: Vehicle) -> Table:
     found = _table("full command", six.name, eight.name)
     for axis in (form.axis for form in six.layout.axes):
         for command, way in ((1.0, axis.positive), (-1.0, axis.negative)):
-            speeds = [abs(v.rov.response(axis, command)[0]) for v in (six, eight)]
+            speeds = [abs(v.response(axis, command)[0]) for v in (six, eight)]
             found.append((f"{axis.name}, {way}", *(f"{speed:.2f} {axis.unit}" for speed in speeds)))
     thrust = sum(abs(thruster.effect(SURGE)) * OWN_THRUST for thruster in eight.layout.thrusters)
-    full = eight.rov.held(SURGE, 1.0)
-    own = replace(full, C=full.C * thrust / eight.rov.force(SURGE, 1.0)).steady_velocity()
+    full = eight.held(SURGE, 1.0)
+    own = replace(full, C=full.C * thrust / eight.force(SURGE, 1.0)).steady_velocity()
     found.append((f"surge, {SURGE.positive}, with {OWN_THRUST} N a thruster", "", f"{own:.2f} m/s"))
     return found
 
@@ -231,7 +231,7 @@ LEVEL = -1.0
 """The z_B of a vehicle that stays level, as if an autopilot held it."""
 
 
-def fly(rov: Rov) -> tuple[dict[str, float], float]:
+def fly(rov: Vehicle) -> tuple[dict[str, float], float]:
     """Return where the manoeuvre ends, and the length of the track in the plane (m)."""
     layout = rov.layout
     sticks = [layout.signs(AXES[name]) for name in ("surge", "sway", "yaw", "heave")]
@@ -247,14 +247,14 @@ def fly(rov: Rov) -> tuple[dict[str, float], float]:
     return {name: float(values[-1]) for name, values in found.items()}, float(way)
 
 
-def run(rov: Rov, times: np.ndarray, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def run(rov: Vehicle, times: np.ndarray, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Return the states and the attitude over time."""
     layout = rov.layout
     record = [*layout.state, *(name for name in ("phi", "theta", "psi") if name in layout.calculated)]
     return dict(zip(record, simulate(rov, times, values, record).values[:, 0], strict=True))
 
 
-def without(rov: Rov, *, coupling: bool = False, lag: bool = False, shape: bool = False) -> Rov:
+def without(rov: Vehicle, *, coupling: bool = False, lag: bool = False, shape: bool = False) -> Vehicle:
     """The vehicle without its coupling, without its lag, with one symmetric quadratic for its thrust."""
     (curve,) = rov.layout.curves
     values = dict(rov.coefficients)
@@ -265,11 +265,11 @@ def without(rov: Rov, *, coupling: bool = False, lag: bool = False, shape: bool 
     if lag:
         keys = tuple(key for key in keys if key != "T")
     layout = replace(rov.layout, curves=(replace(curve, keys=keys),), coupled=rov.layout.coupled and not coupling)
-    return Rov(layout, {name: values[name] for name in layout.coefficients})
+    return Vehicle(layout, {name: values[name] for name in layout.coefficients})
 
 
 def _left_out(vehicle: Vehicle) -> Table:
-    level = vehicle.rov.replaced({"z_B": LEVEL})
+    level = vehicle.replaced({"z_B": LEVEL})
     whole, way = fly(level)
     found = _table("left out", "position", "heading", "depth")
     cases = {
@@ -277,8 +277,8 @@ def _left_out(vehicle: Vehicle) -> Table:
         "Coriolis and Munk terms": without(level, coupling=True),
         "lag of the thrust": without(level, lag=True),
         "all three": without(level, coupling=True, lag=True, shape=True),
-        "the autopilot, with buoyancy 5 cm above the centre of mass": vehicle.rov.replaced({"z_B": -0.05}),
-        "the autopilot": vehicle.rov,
+        "the autopilot, with buoyancy 5 cm above the centre of mass": vehicle.replaced({"z_B": -0.05}),
+        "the autopilot": vehicle,
     }
     for name, rov in cases.items():
         end, _ = fly(rov)
@@ -316,7 +316,7 @@ def _published_motion(six: Vehicle, eight: Vehicle) -> Table:
             angles = dict(zip(("phi", "theta", "psi"), euler_angles(rotation(state[6:10])), strict=True))
             wanted.append(float({**dict(zip("uvwpqr", state, strict=False)), **angles}[name]))
         start = {"phi_0": phi, "theta_0": theta} if vehicle.layout.has_attitude else {}
-        moved = run(vehicle.rov, np.array([0.0, *AFTER]), {**loads, **start})[name][1:]
+        moved = run(vehicle, np.array([0.0, *AFTER]), {**loads, **start})[name][1:]
         scale, unit = (degrees(1.0), "°") if name in ("phi", "theta") else (1.0, " m/s")
         cells = [f"{scale * value:.3f}{unit}" for value in wanted]
         furthest = max(
@@ -327,7 +327,7 @@ def _published_motion(six: Vehicle, eight: Vehicle) -> Table:
     return found
 
 
-def of_wu(rov: Rov, below: float, above: float) -> Rov:
+def of_wu(rov: Vehicle, below: float, above: float) -> Vehicle:
     """The BlueROV2 with Wu's roll and pitch: thrusters below, and buoyancy above the centre of mass (m)."""
     layout = rov.layout
     forms = {form.axis: replace(form, keys=tuple(key for key in form.keys if key != "F_0")) for form in layout.axes}
@@ -344,7 +344,7 @@ def of_wu(rov: Rov, below: float, above: float) -> Rov:
         values[axis.inertia] = WU.mass[i]
         rows = {"m_a": WU.added_mass, "b_d": WU.linear, "a_d": WU.quadratic, "alpha": 6 * (1.0,), "beta": 6 * (1.0,)}
         values |= {axis.coefficient(key): row[i] for key, row in rows.items()}
-    return Rov(layout, {name: values[name] for name in layout.coefficients})
+    return Vehicle(layout, {name: values[name] for name in layout.coefficients})
 
 
 AHEAD = (0.1, 0.2, 0.3, 0.5, 1.0)
@@ -355,11 +355,11 @@ def _tilting(six: Vehicle, eight: Vehicle) -> Table:
     """How far vehicles without control tilt under thrust ahead."""
     found = _table("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))
     cases = {
-        "Heavy": eight.rov,
-        "Heavy, buoyancy 5 cm above": eight.rov.replaced({"z_B": -0.05}),
-        "Wu's roll and pitch: thrusters 8.5 cm below, buoyancy 2 cm above": of_wu(six.rov, 0.085, WU.above),
-        "the same with thrusters at the centre of mass": of_wu(six.rov, 0.0, WU.above),
-        "the same with the heights of bluerov2_gz: 1.1 cm below, 4.9 cm above": of_wu(six.rov, 0.011, 0.049),
+        "Heavy": eight,
+        "Heavy, buoyancy 5 cm above": eight.replaced({"z_B": -0.05}),
+        "Wu's roll and pitch: thrusters 8.5 cm below, buoyancy 2 cm above": of_wu(six, 0.085, WU.above),
+        "the same with thrusters at the centre of mass": of_wu(six, 0.0, WU.above),
+        "the same with the heights of bluerov2_gz: 1.1 cm below, 4.9 cm above": of_wu(six, 0.011, 0.049),
     }
     for title, rov in cases.items():
         cells = []

@@ -19,7 +19,7 @@ from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.io.toml_file import Strict
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Text
 from rov_fmu.report.page.pictures import diagram
@@ -45,7 +45,7 @@ _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number",
 def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
-    named = {"vehicle": "FileHead", "provenance": "Made", "estimated": "Estimated"} | {
+    named = {"vehicle": "FileHead", "provenance": "Provenance", "estimated": "Estimated"} | {
         f"axis_{name}": f"_{name.capitalize()}" for name in AXES
     }
     named |= {
@@ -129,7 +129,7 @@ def filled(page: str) -> str:
 
 def drawings() -> dict[Path, str]:
     """The drawings of the vehicles, those of the FMU's diagram, by their paths."""
-    return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one.rov) for name, one in DRAWN.items()}
+    return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one) for name, one in DRAWN.items()}
 
 
 def _gallery() -> str:

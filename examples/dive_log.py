@@ -16,9 +16,8 @@ import click
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.pool import Array, swim
 
 LAG = 0.15
@@ -62,9 +61,9 @@ class Dive:
         return np.column_stack([c * u - s * v + CURRENT[0], s * u + c * v + CURRENT[1], w])
 
 
-def bluerov2() -> Rov:
+def bluerov2() -> Vehicle:
     """Return the simulated vehicle."""
-    k = load_vehicle(SHIPPED["bluerov2"]).rov
+    k = load_vehicle(SHIPPED["bluerov2"])
     return k.replaced({"T_t200": LAG})
 
 

@@ -12,8 +12,9 @@ from pathlib import Path
 import click
 import numpy as np
 
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.pool import Array, swim
 
 _CURVE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0")
@@ -26,7 +27,7 @@ _LAYOUT = Layout(
         Thruster("t", "top", (0.0, 0.0, 1.0)),
     ),
 )
-OTTER = Rov(
+OTTER = Vehicle(
     _LAYOUT,
     {
         "m_rov": 8.2,

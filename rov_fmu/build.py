@@ -15,9 +15,8 @@ from rov_fmu.engine.compile import (
     compile_all,
     host_platform,
 )
-from rov_fmu.fmu.archive import archive, native_content, python_content
+from rov_fmu.fmu.archive import archive, native_content, python_content, web_module
 from rov_fmu.fmu.model_description import NATIVE
-from rov_fmu.fmu.module import web_module
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.file_kinds import FMU, check_written
@@ -82,7 +81,7 @@ def build(
     """
     if not isinstance(vehicle, Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
-    check_coefficients(vehicle.layout, vehicle.rov.coefficients)
+    check_coefficients(vehicle.layout, vehicle.coefficients)
     if backend not in BACKENDS:
         raise OptionError(f"there is no backend {shown(backend)}, only {', '.join(BACKENDS)}")
     native = backend == "native"

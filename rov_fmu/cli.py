@@ -32,7 +32,7 @@ from rov_fmu.io.messages import (
     shown,
 )
 from rov_fmu.io.output import check_targets, write_whole
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
 
@@ -386,7 +386,7 @@ def _warn(message: str) -> None:
 )
 def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.fmu.module import web_module
+    from rov_fmu.fmu.archive import web_module
     from rov_fmu.io.output import Output
     from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page

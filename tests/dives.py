@@ -5,11 +5,10 @@ from math import radians
 
 import numpy as np
 
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.tank.logs import channel, commands, log
 from verification.references.pool import Array, swim
 
@@ -17,7 +16,7 @@ LAG = 0.15
 """The lag of the thrusters, s."""
 CURRENT = (0.06, -0.03)
 """The velocity of the water north and east, m/s."""
-TRUTH: Rov = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"T_t200": LAG})
+TRUTH: Vehicle = load_vehicle(SHIPPED["bluerov2"]).replaced({"T_t200": LAG})
 AXES = (SURGE, SWAY, HEAVE, YAW)
 RATE = 10.0
 NOISE = {"velocity": 0.01, "distance": 0.02, "depth": 0.005, "heading": radians(0.3)}

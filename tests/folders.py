@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rov_fmu.identify import beginning
-from rov_fmu.model.layout import YAW, Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import YAW, Axis
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.readers.tank_tables import Row
+from rov_fmu.vehicle.vehicle import Vehicle
 
 HEAD = """
 [vehicle]
@@ -62,7 +62,7 @@ def small_folder(folder: Path) -> Path:
     return folder_of(folder, DOWN, tables)
 
 
-def responses(k: Rov, axis: Axis) -> dict[str, str]:
+def responses(k: Vehicle, axis: Axis) -> dict[str, str]:
     """Return tables of steady velocities and time constants of a vehicle, in closed form."""
     rows = [(c, *k.response(axis, c)) for c in COMMANDS]
     steady = "".join(f"{c},{V:.6f}\n" for c, V, _ in rows)

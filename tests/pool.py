@@ -7,8 +7,8 @@ from math import radians
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.model.layout import AXIS, CURVE, Axis, coefficient_name
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXIS, CURVE, Axis, coefficient_name
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import Measured
 from verification.references.pool import Array, swim
 
@@ -25,7 +25,7 @@ NOISE = {"depth": 0.005, "heading": radians(0.5), "distance": 0.02, "velocity": 
 """The standard deviations of the sensors: m, rad, m, m/s."""
 
 
-def with_more(k: Rov, **values: float) -> Rov:
+def with_more(k: Vehicle, **values: float) -> Vehicle:
     """Return the vehicle with other coefficients, including new ones such as F_0_w, T_top or a_t_rear_reverse."""
     axes, curves = [], []
     for form in k.layout.axes:
@@ -36,7 +36,7 @@ def with_more(k: Rov, **values: float) -> Rov:
         curves.append(replace(curve, keys=(*curve.keys, *more)))
     layout = replace(k.layout, axes=tuple(axes), curves=tuple(curves))
     assert values.keys() <= layout.coefficients.keys()
-    return Rov(layout, {**k.coefficients, **values})
+    return Vehicle(layout, {**k.coefficients, **values})
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Run:
 
 
 def run(
-    k: Rov,
+    k: Vehicle,
     axis: Axis,
     plan: Plan,
     rate: float,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.closed_form import axis_of
 
 NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
@@ -87,7 +87,7 @@ def write_log(folder: Path, name: str, recording: Measured) -> Path:
     return path
 
 
-def clean(k: Rov, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
+def clean(k: Vehicle, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
     """Run a plan from rest, one exact step per sample."""
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
     v, s = 0.0, 0.0

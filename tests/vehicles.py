@@ -6,29 +6,18 @@ from dataclasses import replace
 from itertools import combinations, permutations
 from math import hypot, prod, sqrt
 from pathlib import Path
+from typing import TypeVar
 
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import (
-    AXES,
-    AXIS,
-    HEAVE,
-    PITCH,
-    RESTORING,
-    ROLL,
-    Curve,
-    Layout,
-    Thruster,
-    VehicleAxis,
-    cross_name,
-    cross_of,
-)
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 Values = Mapping[str, float]
+_Vehicle = TypeVar("_Vehicle", bound=Vehicle)
 State = dict[str, float]
-Case = tuple[Rov, State, State, float]
+Case = tuple[Vehicle, State, State, float]
 """A vehicle, its inputs and states, and the length of a step."""
 
 _DRAG = ("a_d", "b_d")
@@ -93,7 +82,7 @@ _CURVE_NUMBERS = {
 }
 
 
-def numbered(layout: Layout, **values: float) -> Rov:
+def numbered(layout: Layout, **values: float) -> Vehicle:
     """Return a vehicle with the Heavy's numbers, except for the given values, and without tuning."""
     numbers = {
         curve.coefficient(key): _CURVE_NUMBERS.get(key, _OTHER_NUMBER) for curve in layout.curves for key in curve.keys
@@ -106,15 +95,15 @@ def numbered(layout: Layout, **values: float) -> Rov:
         column = 0 if key == "m_a" else 1
         numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))
     numbers |= _BODY_NUMBERS | values
-    return Rov(
+    return Vehicle(
         layout,
         {name: 1.0 if declaration.tunable else numbers[name] for name, declaration in layout.coefficients.items()},
     )
 
 
-def pulsed(rov: Rov, pulse: tuple[float, float, float]) -> Rov:
+def pulsed(rov: _Vehicle, pulse: tuple[float, float, float]) -> _Vehicle:
     """Return a vehicle whose commands are pulse widths."""
-    return Rov(replace(rov.layout, pulse=pulse), rov.coefficients)
+    return replace(rov, layout=replace(rov.layout, pulse=pulse))
 
 
 def _axes(names: str, keys: tuple[str, ...] = _DRAG) -> tuple[VehicleAxis, ...]:
@@ -128,7 +117,7 @@ def _rov(
     keys: tuple[str, ...] = _DRAG,
     coupled: bool = False,
     mix: Mapping[str, Mapping[str, float]] | None = None,
-) -> Rov:
+) -> Vehicle:
     return numbered(Layout(_axes(axes, keys), (curve,), thrusters, mix or {}, coupled))
 
 
@@ -139,7 +128,7 @@ SIX_AXES = EVERYTHING.with_name("six_axes.toml")
 
 def four_axes(vehicle: Vehicle) -> Vehicle:
     """Return a vehicle without roll and pitch, if it has them: its net weight is then a constant load in heave."""
-    rov = vehicle.rov
+    rov = vehicle
     if not rov.layout.has_attitude:
         return vehicle
     forms = tuple(
@@ -152,13 +141,14 @@ def four_axes(vehicle: Vehicle) -> Vehicle:
     sources = {**vehicle.sources, "F_0_w": vehicle.sources["W"]}
     return replace(
         vehicle,
-        rov=Rov(layout, {name: values[name] for name in layout.coefficients}),
+        layout=layout,
+        coefficients={name: values[name] for name in layout.coefficients},
         sources={name: sources[name] for name in layout.coefficients},
     )
 
 
-VIDEORAY = load_vehicle(SHIPPED["videoray"]).rov
-HEAVY = four_axes(load_vehicle(SHIPPED["bluerov2_heavy"])).rov
+VIDEORAY = load_vehicle(SHIPPED["videoray"])
+HEAVY = four_axes(load_vehicle(SHIPPED["bluerov2_heavy"]))
 """The BlueROV2 Heavy without roll and pitch: four axes with lag and coupling."""
 VEHICLES = {
     "VideoRay": VIDEORAY,
@@ -201,22 +191,32 @@ SIX = numbered(
 """A vehicle with six axes and every effect."""
 
 
-def with_axes(axes: str) -> Rov:
+def with_axes(axes: str) -> Vehicle:
     """Return the vehicle SIX with only some of its axes, nothing between them, and no weight."""
     forms = tuple(form for form in SIX.layout.axes if form.axis.velocity in axes)
     return numbered(replace(SIX.layout, axes=forms, cross=(), restoring=()))
 
 
-def frictionless(rov: Rov) -> Rov:
+def frictionless(rov: Vehicle) -> Vehicle:
     """Return a vehicle without drag, lift and constant loads."""
     lift = {cross_name(*of) for of in rov.layout.cross if of[0] == "lift"}
     return rov.replaced({name: 0.0 for name in rov.coefficients if name[:3] in ("a_d", "b_d", "F_0") or name in lift})
 
 
-def a_vehicle(rov: Rov) -> Vehicle:
+def a_vehicle(rov: Vehicle) -> Vehicle:
     """Return a vehicle file's content with these coefficients and placeholders for all texts."""
     sources = dict.fromkeys(rov.coefficients, "A tank test")
-    return Vehicle("An ROV", "an_rov", "1", "A test", "A tank", rov, sources, (0.1, 1.0), {}, None)
+    return Vehicle(
+        rov.layout,
+        rov.coefficients,
+        name="An ROV",
+        identifier="an_rov",
+        version="1",
+        description="A test",
+        source="A tank",
+        sources=sources,
+        command_range=(0.1, 1.0),
+    )
 
 
 # ---- Random vehicles ----
@@ -227,7 +227,7 @@ def spread(rng: random.Random, low: float, high: float, zero: float = 0.0) -> fl
     return 0.0 if rng.random() < zero else float(10.0 ** rng.uniform(low, high))
 
 
-def random_body(rng: random.Random, axes: str) -> Rov:
+def random_body(rng: random.Random, axes: str) -> Vehicle:
     """Return a coupled vehicle with these axes, about as large as the Heavy, and with effects chosen at random.
 
     It may have entries of the mass matrix and damping between its axes, lift, weight and buoyancy with their centres,
@@ -254,7 +254,7 @@ def random_body(rng: random.Random, axes: str) -> Rov:
     signed = {
         name: value * rng.choice([-1.0, 1.0]) for name, value in numbers.items() if cross_of(name) or name[2:] in "GB"
     }
-    return Rov(layout, numbers | signed)
+    return Vehicle(layout, numbers | signed)
 
 
 def random_layout(rng: random.Random) -> Layout:
@@ -279,7 +279,7 @@ def random_layout(rng: random.Random) -> Layout:
     return Layout(forms, tuple(curves), tuple(thrusters), mix, {"u", "v", "r"} <= set(axes) and rng.random() < 0.7)
 
 
-def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
+def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Vehicle:
     """Return a vehicle whose mass and drag both matter. One drag coefficient in six is zero."""
     layout = layout or random_layout(rng)
     numbers = {}
@@ -299,10 +299,10 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
         else:
             numbers[name] = rng.uniform(0.1, 1.5)
         assert declaration.minimum <= numbers[name] <= declaration.maximum, name
-    return Rov(layout, numbers)
+    return Vehicle(layout, numbers)
 
 
-def random_inputs(rng: random.Random, rov: Rov) -> State:
+def random_inputs(rng: random.Random, rov: Vehicle) -> State:
     """Return commands of both signs, some beyond full thrust and some zero, loads, and a current."""
     found = {}
     for name in rov.layout.inputs:
@@ -315,7 +315,7 @@ def random_inputs(rng: random.Random, rov: Rov) -> State:
     return found
 
 
-def random_state(rng: random.Random, rov: Rov) -> State:
+def random_state(rng: random.Random, rov: Vehicle) -> State:
     """Return velocities of a vehicle's usual size, some of them zero, a pose near the origin, and lagging forces."""
     sizes = {"x": 20.0, "y": 20.0, "z": 20.0, "psi": 3.0, "p": 1.5, "q": 1.5, "r": 1.5}
     found = {}
@@ -334,17 +334,17 @@ def random_quaternion(rng: random.Random, length: float = 1.0) -> State:
     return {name: length * part / hypot(*parts) for name, part in zip(QUATERNION, parts, strict=True)}
 
 
-def random_case(rng: random.Random, rov: Rov, shortest: float = -6.0, longest: float = 0.3) -> Case:
+def random_case(rng: random.Random, rov: Vehicle, shortest: float = -6.0, longest: float = 0.3) -> Case:
     """Return a step of 10^shortest to 10^longest seconds. One in six begins at rest."""
     state = at_rest(rov) if rng.random() < 1 / 6 else random_state(rng, rov)
     return rov, random_inputs(rng, rov), state, spread(rng, shortest, longest)
 
 
-def at_rest(rov: Rov) -> State:
+def at_rest(rov: Vehicle) -> State:
     """Return all states: each is 0, except for the quaternion of a level vehicle that heads north."""
     return dict(rov.layout.at_rest)
 
 
-def still(rov: Rov) -> State:
+def still(rov: Vehicle) -> State:
     """Return all inputs, each 0."""
     return dict.fromkeys(rov.layout.inputs, 0.0)

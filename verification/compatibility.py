@@ -20,7 +20,7 @@ from fmpy.validation import validate_fmu
 from rov_fmu.build import build
 from rov_fmu.engine.simulation import Array
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import AXES, PITCH, ROLL
+from rov_fmu.model.catalogue import AXES, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.interoperability.manoeuvre import STEP, TIMES, Manoeuvre

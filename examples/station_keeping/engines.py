@@ -30,7 +30,7 @@ NAMES = [(component, name) for component, names in OUTPUTS.items() for name in n
 def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
     """The engine and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
     values = parameter_sets()[parameters]
-    rov = load_vehicle(VIDEORAY).rov
+    rov = load_vehicle(VIDEORAY)
     layout, given = rov.layout, values["rov"]
     rov = rov.replaced({name: given[name] for name in layout.coefficients})
     inputs = dict.fromkeys(layout.inputs, 0.0) | {name: given[name] for name in layout.inputs if name in given}

@@ -46,7 +46,7 @@ OUTPUTS = {
 
 def parameter_sets() -> dict[str, dict[str, Values]]:
     """Name to the values of each component: Table 9, and the same with α = β = 1."""
-    table9 = dict(load_vehicle(VIDEORAY).rov.coefficients)
+    table9 = dict(load_vehicle(VIDEORAY).coefficients)
     untuned = {name: 1.0 if name.startswith(("alpha", "beta")) else value for name, value in table9.items()}
     return {
         DEFAULT: {"rov": {**table9, **SEA}, "autopilot": MISSION},

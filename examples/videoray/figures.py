@@ -20,13 +20,12 @@ from matplotlib.figure import Figure
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.model.layout import SURGE
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import SURGE
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 COLUMNS = {"single": 3.5, "double": 7.16}
 """The widths of the columns of a journal, in inches: those of the IEEE (89 and 182 mm)."""
@@ -101,8 +100,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def paper_figures() -> Iterator[PaperFigure]:
     """Yield Figures 5 to 9 and 11 of the paper, the steps of surge, and V_ss of the paper's model and of the refit."""
-    vehicle, refit = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["videoray_refit"]).rov
-    k, tables = vehicle.rov, tables_by_axis(vehicle)
+    vehicle, refit = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["videoray_refit"])
+    k, tables = vehicle, tables_by_axis(vehicle)
     unweighted = vehicle.alternatives["unweighted_rear_thrust"].values
     yield PaperFigure(
         "figure_5",
@@ -152,7 +151,7 @@ def _measured_taus(table: ResponseTable) -> str:
     return f"Points: measured Tau, at 63 % of the measured V_ss{missing}."
 
 
-def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable, *, has_legend: bool) -> None:
+def _steady(ax: Axes, k: Vehicle, refit: Vehicle, table: ResponseTable, *, has_legend: bool) -> None:
     """Draw V_ss over the command along an axis: the paper's model, the refit, and the paper's measurements."""
     axis, commands = table.axis, range(0, 101, 2)
     of_paper, of_refit = ([rov.response(axis, command / 100.0)[0] for command in commands] for rov in (k, refit))
@@ -169,18 +168,18 @@ def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable, *, has_legend: b
     ax.set_xlim(0, 100)
 
 
-def _rear_thrust(ax: Axes, k: Rov, unweighted: tuple[float, float]) -> None:
+def _rear_thrust(ax: Axes, k: Vehicle, unweighted: tuple[float, float]) -> None:
     _curve(ax, 100.0, 1.0, unweighted, "--", "grey", "all points (8)")
     _curve(ax, 100.0, 1.0, (k["a_t_rear"], k["b_t_rear"]), "-", "blue", "weighted (9)")
     finish(ax, "", "command (%)", "$F_l + F_r$ (N)")
 
 
-def _top_thrust(ax: Axes, k: Rov) -> None:
+def _top_thrust(ax: Axes, k: Vehicle) -> None:
     _curve(ax, 100.0, 1.0, (k["a_t_top"], k["b_t_top"]), "-", "blue", "(10)")
     finish(ax, "", "command (%)", "$F_t$ (N)")
 
 
-def _drag(ax: Axes, k: Rov, table: ResponseTable) -> None:
+def _drag(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
     axis = table.axis
     names = (axis.coefficient("a_d"), axis.coefficient("b_d"))
     v = np.array([float(V) for V in table.steady.values()])
@@ -193,7 +192,7 @@ def _drag(ax: Axes, k: Rov, table: ResponseTable) -> None:
     finish(ax, "", f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
 
 
-def _steps(ax: Axes, k: Rov, table: ResponseTable) -> None:
+def _steps(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
     axis = table.axis
     steps = [measured_step(table, Decimal(command)) for command in _STEPS]
     draw_steps(ax, axis, steps, [(untuned(k), "--"), (k, "-")])

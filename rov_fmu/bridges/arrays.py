@@ -10,7 +10,7 @@ import numpy as np
 
 from rov_fmu.bridges.rates import Functions, force_names, forces_of_commands, rates_of
 from rov_fmu.io.messages import InputError, did_you_mean
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,30 +20,30 @@ class _Library:
     """Makes one vector of its components, each a number or an array."""
 
 
-def rates(rov: Rov, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
+def rates(vehicle: Vehicle, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
     """Return the time derivatives of the states, as described in `VehicleModel.rates`."""
-    layout = rov.layout
+    layout = vehicle.layout
     library = _library_of((x, forces, *p.values()))
     values = {
-        **_coefficients(rov, p),
+        **_coefficients(vehicle, p),
         **_components("x", x, tuple(layout.state)),
         **_components("forces", forces, force_names(layout)),
     }
     return library.stack(rates_of(layout, values, library.functions))
 
 
-def forces(rov: Rov, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
+def forces(vehicle: Vehicle, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
     """Return the forces for the inputs, as described in `VehicleModel.forces`."""
-    layout = rov.layout
+    layout = vehicle.layout
     _check_names("inputs", inputs, layout.inputs)
     library = _library_of((*inputs.values(), *p.values()))
-    values = {**_coefficients(rov, p), **layout.usual_inputs, **inputs}
+    values = {**_coefficients(vehicle, p), **layout.usual_inputs, **inputs}
     return library.stack(forces_of_commands(layout, values, library.functions))
 
 
-def _coefficients(rov: Rov, p: Mapping[str, Any]) -> dict[str, Any]:
-    _check_names("p", p, rov.layout.coefficients)
-    return {**rov.coefficients, **p}
+def _coefficients(vehicle: Vehicle, p: Mapping[str, Any]) -> dict[str, Any]:
+    _check_names("p", p, vehicle.layout.coefficients)
+    return {**vehicle.coefficients, **p}
 
 
 def _check_names(what: str, given: Mapping[str, Any], known: Iterable[str]) -> None:

@@ -84,7 +84,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         commands = {name: command_of(fractions[:, n])[:, None] for n, name in enumerate(self.commands)}
         start = {name: self.state[:, n, None] for n, name in enumerate(self.states)}
         values = {**self.coefficients, **commands, **start}
-        found = simulate(self.vehicle.rov, [0.0, self.length], values, self.states, vehicles=self.num_envs)
+        found = simulate(self.vehicle, [0.0, self.length], values, self.states, vehicles=self.num_envs)
         after = found.values[:, :, 1].T
         failed = ~(np.abs(after) <= BOUND).all(axis=1) & ~begun
         moved = ~(failed | begun)

@@ -206,7 +206,7 @@ def _picture(vehicle: Vehicle, shares: Mapping[str, float]) -> "SceneEntity":
 
 def hull_size(vehicle: Vehicle) -> Array:
     """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
-    corners = np.abs([place(vehicle.rov, thruster) for thruster in vehicle.layout.thrusters])
+    corners = np.abs([place(vehicle, thruster) for thruster in vehicle.layout.thrusters])
     size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
     return size
 
@@ -223,7 +223,7 @@ def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iter
         turned, _ = Rotation.align_vectors([jet], [[1.0, 0.0, 0.0]])
         length = abs(share) * longest
         yield ArrowPrimitive(
-            pose=Pose(position=_vector(_TO_FRD.apply(place(vehicle.rov, thruster))), orientation=_quaternion(turned)),
+            pose=Pose(position=_vector(_TO_FRD.apply(place(vehicle, thruster))), orientation=_quaternion(turned)),
             shaft_length=0.8 * length,
             shaft_diameter=0.04 * longest,
             head_length=0.2 * length,

@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
+from rov_fmu.model.catalogue import delayed_name
 from rov_fmu.model.equation import Equation, equation_of
 from rov_fmu.model.expression import ARRAYS, Expression, Name, compiled
-from rov_fmu.model.layout import Layout, ThrustTable, delayed_name
+from rov_fmu.model.layout import Layout, ThrustTable
 from rov_fmu.model.step import cubic
 
 Functions = Mapping[str, Callable[..., Any]]

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rov_fmu import __version__
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.templates import render
+from rov_fmu.model.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
 from rov_fmu.model.forces import (
     COUPLING,
     DEAD_BAND,
@@ -34,8 +35,7 @@ from rov_fmu.model.forces import (
     WEIGHT,
     effects_of,
 )
-from rov_fmu.model.layout import AXES, BODY, FAINT, HEAVE, REVERSE, Thruster, VehicleAxis, cross_name
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.layout import FAINT, Thruster, VehicleAxis
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -126,14 +126,13 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
     Raises InputError about a vehicle that Gazebo cannot have at all.
     """
-    rov = vehicle.rov
-    if mistake := next(_impossible(rov), None):
+    if mistake := next(_impossible(vehicle), None):
         raise InputError(f"{vehicle.identifier}: {mistake}")
-    gravity, volume = _gravity(rov), _volume(rov)
-    link = _link(rov, volume)
-    added = _added_mass(rov, link.matrix)
-    propellers = [propeller for propeller in (_propeller(rov, t) for t in rov.layout.thrusters) if propeller]
-    notes = tuple(_notes(rov, added, propellers, explicit=explicit))
+    gravity, volume = _gravity(vehicle), _volume(vehicle)
+    link = _link(vehicle, volume)
+    added = _added_mass(vehicle, link.matrix)
+    propellers = [propeller for propeller in (_propeller(vehicle, t) for t in vehicle.layout.thrusters) if propeller]
+    notes = tuple(_notes(vehicle, added, propellers, explicit=explicit))
     small, radius = _PROPELLER
     text = render(
         "model.sdf.j2",
@@ -151,29 +150,29 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
         body=_Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
         propeller=_Link(link.mass * small, np.zeros(3), link.mass * small * radius**2 * np.eye(3)),
         fluid_added_mass={} if explicit else dict(_in_link(added)),
-        disable_coriolis=explicit and not rov.layout.coupled,
-        buoyancy={"centre": _centre(rov, "B"), "size": [volume ** (1.0 / 3.0)] * 3},
-        hydrodynamics=_damping(rov, link) | (dict(_in_plugin(added)) if explicit else {}),
+        disable_coriolis=explicit and not vehicle.layout.coupled,
+        buoyancy={"centre": _centre(vehicle, "B"), "size": [volume ** (1.0 / 3.0)] * 3},
+        hydrodynamics=_damping(vehicle, link) | (dict(_in_plugin(added)) if explicit else {}),
         thrusters=propellers,
     )
     return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
 
 
-def _impossible(rov: Rov) -> Iterator[str]:
+def _impossible(vehicle: Vehicle) -> Iterator[str]:
     """Yield a line about each reason why Gazebo cannot have the vehicle."""
-    if "m_rov" not in rov.coefficients:
+    if "m_rov" not in vehicle.coefficients:
         yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
         return
-    for name in (form.axis.coefficient("beta") for form in rov.layout.axes):
-        if rov[name] == 0.0:
+    for name in (form.axis.coefficient("beta") for form in vehicle.layout.axes):
+        if vehicle[name] == 0.0:
             yield f"{name} = 0: must be more than 0 for Gazebo, because m/{name} is a mass"
-    thrusters = {thruster.name for thruster in rov.layout.thrusters}
-    for name in (t.name for t in rov.layout.thrusters if f"{t.name}_joint" in thrusters):
+    thrusters = {thruster.name for thruster in vehicle.layout.thrusters}
+    for name in (t.name for t in vehicle.layout.thrusters if f"{t.name}_joint" in thrusters):
         yield f"thruster.{name}_joint: choose another name for Gazebo, where the joint of {name} has this name"
-    if _volume(rov) <= 0.0:
-        weight = rov["m_rov"] * _gravity(rov)
+    if _volume(vehicle) <= 0.0:
+        weight = vehicle["m_rov"] * _gravity(vehicle)
         least = "must be less than the weight for Gazebo, because the Buoyancy plugin only pushes upwards"
-        yield f"the net weight of {_net_weight(rov):g} N {least}: {weight:g} N"
+        yield f"the net weight of {_net_weight(vehicle):g} N {least}: {weight:g} N"
 
 
 # ---- Mass ------------------------------------------------------------------------------------------------------------
@@ -189,40 +188,40 @@ def _of_point(mass: float, position: Array) -> Array:
     return mass * _cross(position).T @ _cross(position)
 
 
-def _net_weight(rov: Rov) -> float:
+def _net_weight(vehicle: Vehicle) -> float:
     """Return the load that acts downwards in the earth frame, N: weight less buoyancy, and F_0 of a level vehicle."""
-    if not rov.layout.has(HEAVE):
+    if not vehicle.layout.has(HEAVE):
         return 0.0
-    weight = rov["W"] - rov["B"] if rov.layout.restoring else 0.0
-    if rov.layout.has_attitude:
+    weight = vehicle["W"] - vehicle["B"] if vehicle.layout.restoring else 0.0
+    if vehicle.layout.has_attitude:
         return weight
-    return weight + rov.coefficients.get(HEAVE.coefficient("F_0"), 0.0)
+    return weight + vehicle.coefficients.get(HEAVE.coefficient("F_0"), 0.0)
 
 
-def _gravity(rov: Rov) -> float:
+def _gravity(vehicle: Vehicle) -> float:
     """Return the gravity of the world, m/s2: that of the vehicle file's weight."""
-    return rov.coefficients.get("W", 0.0) / rov["m_rov"] or _GRAVITY
+    return vehicle.coefficients.get("W", 0.0) / vehicle["m_rov"] or _GRAVITY
 
 
-def _volume(rov: Rov) -> float:
+def _volume(vehicle: Vehicle) -> float:
     """Return the volume of the displaced water, m3, which gives the net weight."""
-    return (rov["m_rov"] - _net_weight(rov) / _gravity(rov)) / DENSITY
+    return (vehicle["m_rov"] - _net_weight(vehicle) / _gravity(vehicle)) / DENSITY
 
 
-def _centre(rov: Rov, of: str) -> Array:
+def _centre(vehicle: Vehicle, of: str) -> Array:
     """Return the centre of mass (G) or of buoyancy (B) in Gazebo's frame; the origin if the vehicle stays level."""
-    if not rov.layout.has_attitude:
+    if not vehicle.layout.has_attitude:
         return np.zeros(3)
-    return _SIGNS[:3] * [rov.coefficients.get(f"{axis}_{of}", 0.0) for axis in "xyz"]
+    return _SIGNS[:3] * [vehicle.coefficients.get(f"{axis}_{of}", 0.0) for axis in "xyz"]
 
 
-def _link(rov: Rov, volume: float) -> _Link:
+def _link(vehicle: Vehicle, volume: float) -> _Link:
     """Return the body of a vehicle, without added mass.
 
     About an axis that the vehicle lacks, its moment of inertia is so large that it hardly turns.
     """
-    mass, centre = rov["m_rov"], _centre(rov, "G")
-    own = [rov.coefficients.get(axis.inertia) for axis in AXES.values() if axis.is_rotation]
+    mass, centre = vehicle["m_rov"], _centre(vehicle, "G")
+    own = [vehicle.coefficients.get(axis.inertia) for axis in AXES.values() if axis.is_rotation]
     typical = max((moment for moment in own if moment), default=mass * volume ** (2.0 / 3.0) / 6.0)
     about_origin = np.diag([_HELD_INERTIA * typical if moment is None else moment for moment in own])
     inertia = about_origin - _of_point(mass, centre)
@@ -232,22 +231,22 @@ def _link(rov: Rov, volume: float) -> _Link:
     return _Link(mass, centre, inertia)
 
 
-def _added_mass(rov: Rov, rigid: Array) -> Array:
+def _added_mass(vehicle: Vehicle, rigid: Array) -> Array:
     """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
     found = np.zeros((6, 6))
-    forms = rov.layout.by_velocity
+    forms = vehicle.layout.by_velocity
     for i, a in enumerate(_VELOCITIES):
         for j, b in enumerate(_VELOCITIES):
             if a in forms and b in forms:
-                mass = rov.effective_inertia(forms[a]) if a == b else _off_diagonal(rov, a, b)
+                mass = vehicle.effective_inertia(forms[a]) if a == b else _off_diagonal(vehicle, a, b)
                 found[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
     size = np.sqrt(np.diag(rigid))
     return np.where(np.abs(found) < FAINT * np.outer(size, size), 0.0, found)
 
 
-def _off_diagonal(rov: Rov, a: str, b: str) -> float:
+def _off_diagonal(vehicle: Vehicle, a: str, b: str) -> float:
     """Return an entry of the effective mass matrix."""
-    return rov.parameters.get(f"mass_{a}{b}", rov.parameters.get(f"mass_{b}{a}", 0.0))
+    return vehicle.parameters.get(f"mass_{a}{b}", vehicle.parameters.get(f"mass_{b}{a}", 0.0))
 
 
 def _in_link(added: Array) -> Iterator[tuple[str, float]]:
@@ -286,7 +285,7 @@ def _divergence(added: Array, rigid: Array) -> Iterator[str]:
 # ---- Damping ---------------------------------------------------------------------------------------------------------
 
 
-def _damping(rov: Rov, link: _Link) -> dict[str, float]:
+def _damping(vehicle: Vehicle, link: _Link) -> dict[str, float]:
     """Return the terms of the Hydrodynamics plugin: xU of U, xUabsU of U|U|, xUU of U U, yUR of U R.
 
     U|U| and U U together give quadratic drag that depends on the direction.
@@ -300,17 +299,17 @@ def _damping(rov: Rov, link: _Link) -> dict[str, float]:
         found[name] = found.get(name, 0.0) + value * np.prod(signs)
 
     for n, v in enumerate(_VELOCITIES):
-        form = rov.layout.by_velocity.get(v)
+        form = vehicle.layout.by_velocity.get(v)
         if form is None:
             add(v, -link.matrix[n, n] / _HELD_TIME, v)
             continue
-        b, a = (_both_ways(rov, form, key) for key in ("b_d", "a_d"))
+        b, a = (_both_ways(vehicle, form, key) for key in ("b_d", "a_d"))
         add(v, -sum(b) / 2.0, v)
         add(v, -sum(a) / 2.0, v, v, magnitude=True)
         if a[0] != a[1]:
             add(v, (a[1] - a[0]) / 2.0, v, v)
-    for key, axis, *others in rov.layout.cross:
-        value = rov[cross_name(key, axis, *others)]
+    for key, axis, *others in vehicle.layout.cross:
+        value = vehicle[cross_name(key, axis, *others)]
         if key == "b_d":
             add(axis, -value, others[0])
         elif key == "a_d":
@@ -320,15 +319,15 @@ def _damping(rov: Rov, link: _Link) -> dict[str, float]:
     return found
 
 
-def _both_ways(rov: Rov, form: VehicleAxis, key: str) -> tuple[float, float]:
+def _both_ways(vehicle: Vehicle, form: VehicleAxis, key: str) -> tuple[float, float]:
     """Return a drag coefficient for positive and for negative velocities."""
-    return rov[form.coefficient(key)], rov[form.coefficient(key + REVERSE)]
+    return vehicle[form.coefficient(key)], vehicle[form.coefficient(key + REVERSE)]
 
 
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
 
 
-def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
+def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
     """Return a thruster with alpha folded in, or None if it has no force.
 
     Its force along each axis is multiplied by alpha of the axis, so is its moment about each axis, and a moment about
@@ -336,8 +335,8 @@ def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
     """
     effects = np.zeros(6)
     for n, (v, axis) in enumerate(zip(_VELOCITIES, AXES.values(), strict=True)):
-        if v in rov.layout.by_velocity:
-            effects[n] = rov[axis.coefficient("alpha")] * rov.effect(thruster, axis)
+        if v in vehicle.layout.by_velocity:
+            effects[n] = vehicle[axis.coefficient("alpha")] * vehicle.effect(thruster, axis)
         elif not axis.is_rotation:
             effects[n] = thruster.effect(axis)
     effects *= _SIGNS
@@ -347,14 +346,14 @@ def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
         return None
     direction = force / scale
     given = _SIGNS[:3] * (thruster.position or (0.0, 0.0, 0.0))
-    curve = rov.layout.curve_of[thruster.name]
+    curve = vehicle.layout.curve_of[thruster.name]
     return _Propeller(
         name=thruster.name,
         description=thruster.description or f"thruster {thruster.name}",
         direction=direction,
         position=np.cross(force, moment) / scale**2 + direction * (direction @ given),
         scale=scale,
-        newtons={c: scale * rov.curve_force(curve, c) for c in _COMMANDS},
+        newtons={c: scale * vehicle.curve_force(curve, c) for c in _COMMANDS},
         lost=abs(float(direction @ moment)) / scale,
     )
 
@@ -362,36 +361,36 @@ def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
 # ---- What Gazebo does otherwise --------------------------------------------------------------------------------------
 
 
-def _notes(rov: Rov, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+def _notes(vehicle: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield what the vehicle file says and Gazebo does otherwise, and how alpha and beta were folded in."""
-    yield from _notes_of_tuning(rov, added, propellers, explicit=explicit)
-    yield from _notes_of_commands(rov)
-    yield from _notes_of_motion(rov, propellers, explicit=explicit)
+    yield from _notes_of_tuning(vehicle, added, propellers, explicit=explicit)
+    yield from _notes_of_commands(vehicle)
+    yield from _notes_of_motion(vehicle, propellers, explicit=explicit)
 
 
-def _notes_of_tuning(rov: Rov, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+def _notes_of_tuning(vehicle: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield how alpha and beta were folded in."""
     scaled = [
         f"{propeller.scale:.4g} F_{propeller.name}" for propeller in propellers if abs(propeller.scale - 1.0) > FAINT
     ]
     if scaled:
         yield f"alpha: the plugins take {', '.join(scaled)} newtons, and the thrusters' places scale the moments"
-    if idle := {thruster.name for thruster in rov.layout.thrusters} - {propeller.name for propeller in propellers}:
+    if idle := {thruster.name for thruster in vehicle.layout.thrusters} - {propeller.name for propeller in propellers}:
         yield f"left out: thrusters whose force alpha makes 0: {', '.join(sorted(idle))}"
     place = "the Hydrodynamics plugin" if explicit else "<fluid_added_mass>"
-    for form in rov.layout.axes:
+    for form in vehicle.layout.axes:
         axis, beta = form.axis, form.axis.coefficient("beta")
-        if rov[beta] != 1.0:
+        if vehicle[beta] != 1.0:
             n, unit = _VELOCITIES.index(axis.velocity), BODY[axis.inertia].unit
             yield (
-                f"{beta} = {rov[beta]:g}: the effective inertia in {axis.name} "
-                f"is {rov.effective_inertia(form):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
+                f"{beta} = {vehicle[beta]:g}: the effective inertia in {axis.name} "
+                f"is {vehicle.effective_inertia(form):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
             )
 
 
-def _notes_of_commands(rov: Rov) -> Iterator[str]:
+def _notes_of_commands(vehicle: Vehicle) -> Iterator[str]:
     """Yield what stands between a command and the thrust, which the Thruster plugin takes in newtons."""
-    layout = rov.layout
+    layout = vehicle.layout
     keys = {key for curve in layout.curves for key in curve.keys}
     parts = {
         "the thrust curve": True,
@@ -408,15 +407,15 @@ def _notes_of_commands(rov: Rov) -> Iterator[str]:
             yield f"left out: {effect.words}"
 
 
-def _notes_of_motion(rov: Rov, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield what the plugins and Gazebo's rigid body do otherwise with the motion."""
-    layout = rov.layout
+    layout = vehicle.layout
     for form in layout.axes:
-        forward, back = _both_ways(rov, form, "b_d")
+        forward, back = _both_ways(vehicle, form, "b_d")
         if forward != back:
             names = f"{form.coefficient('b_d')} and {form.coefficient('b_d' + REVERSE)}"
             yield f"{names}: linear drag has their mean in both directions"
-        if rov.coefficients.get(form.coefficient("F_0")):
+        if vehicle.coefficients.get(form.coefficient("F_0")):
             if form.axis is HEAVE and not layout.has_attitude:
                 yield "the constant load F_0_w is in the buoyancy"
             else:

@@ -18,9 +18,9 @@ from rov_fmu.engine.stepper import Stepper
 from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.vehicle.thrust_table import CurrentTable
+from rov_fmu.vehicle.vehicle import Vehicle
 
 GRAVITY = 9.80665
 """The acceleration of gravity in ArduPilot, m/s2."""
@@ -55,7 +55,7 @@ _LOGGED = {
 class Setup:
     """What a flight begins with."""
 
-    rov: Rov
+    vehicle: Vehicle
     servos: Servos
     start: Mapping[str, float] = field(default_factory=dict)
     """Inputs that are held, states and Euler angles at the start, in SI units, by name."""
@@ -79,7 +79,7 @@ class Log:
 
     def __init__(self, setup: Setup, most_rows: int) -> None:
         """Begin a log, whose rows end after the first `most_rows`."""
-        layout = setup.rov.layout
+        layout = setup.vehicle.layout
         self._interval, self._most_rows = setup.log_interval, most_rows
         self._motion = [title for title, axis in _LOGGED.items() if layout.has(axis)]
         self._titles = ["time [s]", *(f"{name} [1]" for name in layout.commands), *self._motion]
@@ -118,10 +118,10 @@ class Flight:
 
     def __init__(self, setup: Setup, most_rows: int) -> None:
         """Begin at time 0 s, with a log of at most so many rows. Raises BuildError when there is no engine."""
-        self._setup, layout = setup, setup.rov.layout
+        self._setup, layout = setup, setup.vehicle.layout
         self._names = [name for name in _MOTION if name in layout.state or name in layout.angles]
         self._names += [f"der({name})" for name in _RATES if name in layout.state]
-        self._stepper = Stepper(setup.rov, setup.start, self._names)
+        self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self._held = {**layout.usual_inputs, **setup.start}
         currents = setup.electric_currents
@@ -139,7 +139,7 @@ class Flight:
 
     def step(self, packet: ServoPacket) -> bytes:
         """Move on by one frame and return the reply. Raises InputError if the motion cannot be computed."""
-        h, layout = 1.0 / max(packet.frame_rate, _LEAST_RATE), self._setup.rov.layout
+        h, layout = 1.0 / max(packet.frame_rate, _LEAST_RATE), self._setup.vehicle.layout
         commands, fractions = [], []
         for name, servo in self._commands.items():
             if servo is None:
@@ -162,7 +162,7 @@ class Flight:
 
     def _fraction(self, pulse: int) -> float:
         """Return the command from -1 to 1 of a pulse (µs), by the vehicle's own pulses if it has them."""
-        layout = self._setup.rov.layout
+        layout = self._setup.vehicle.layout
         if layout.pulse and pulse not in NO_OUTPUT:
             return layout.fraction_of(pulse)
         return max(-1.0, min(1.0, _usual_fraction(pulse)))

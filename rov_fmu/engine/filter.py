@@ -16,8 +16,9 @@ from rov_fmu.engine.compile import FILTER_FILE
 from rov_fmu.engine.library import load_library
 from rov_fmu.engine.simulation import places_of
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, YAW, Axis
+from rov_fmu.model.layout import Layout
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intc]
@@ -145,15 +146,15 @@ class DivergedError(Exception):
 class Filter:
     """The filter of one layout. The runs of different parameters are independent, so threads may share it."""
 
-    def __init__(self, rov: Rov, longest: float = 0.1, changing: float = 0.0125, share: float = 0.5) -> None:
+    def __init__(self, vehicle: Vehicle, longest: float = 0.1, changing: float = 0.0125, share: float = 0.5) -> None:
         """Load the filter. Raises BuildError.
 
         `longest` is the longest step of the mean, s, and `changing` that in which a command changes. No step is longer
         than this share of the fastest time constant.
         """
-        layout = rov.layout
+        layout = vehicle.layout
         self.layout, self._steps = layout, (longest, changing, share)
-        library = load_library(rov, FILTER_FILE)
+        library = load_library(vehicle, FILTER_FILE)
         sizes = (ctypes.c_int * 6)()
         library.filter_sizes(sizes)
         self.states, axes, sensors, self.variables, self.inputs, self.held = sizes

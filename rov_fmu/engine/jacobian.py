@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.model import step
-from rov_fmu.model.layout import Layout, delayed_name
+from rov_fmu.model.catalogue import delayed_name
+from rov_fmu.model.layout import Layout
 from rov_fmu.model.printed import loaded
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class StepJacobian:
 
 
 def step_jacobian(
-    rov: Rov,
+    vehicle: Vehicle,
     inputs: Mapping[str, float],
     state: Mapping[str, float],
     h: float,
@@ -51,20 +52,20 @@ def step_jacobian(
 ) -> StepJacobian:
     """Return the states after h > 0 seconds with the inputs held, and their derivatives.
 
-    The states and inputs are in the order of `rov.layout.state` and `rov.layout.inputs`. `coefficients` are the names
-    of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with a
-    dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
+    The states and inputs are in the order of `vehicle.layout.state` and `vehicle.layout.inputs`. `coefficients` are the
+    names of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with
+    a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
 
     Raises ValueError when the motion overflows or takes too many substeps, and InputError when a coefficient is
     unknown.
     """
-    layout = rov.layout
+    layout = vehicle.layout
     for name in coefficients:
-        if name not in rov.coefficients:
-            raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*rov.coefficients])}")
+        if name not in vehicle.coefficients:
+            raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*vehicle.coefficients])}")
     names = [*layout.state, *layout.inputs, *coefficients]
-    numbers = np.hstack([[[{**rov.coefficients, **inputs, **state}[name]] for name in names], np.eye(len(names))])
-    known = {**rov.coefficients, **dict(zip(names, map(Dual, numbers), strict=True))}
+    numbers = np.hstack([[[{**vehicle.coefficients, **inputs, **state}[name]] for name in names], np.eye(len(names))])
+    known = {**vehicle.coefficients, **dict(zip(names, map(Dual, numbers), strict=True))}
     if layout.has_dead_time:
         known |= {delayed_name(name): known[name] for name in layout.commands}
     with np.errstate(all="ignore"):  # an overflow ends the motion

@@ -16,22 +16,22 @@ from rov_fmu.engine.compile import ENGINE_FILE, BuildError, compile_engine, engi
 from rov_fmu.engine.source import sources
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _LOADED: dict[str, ctypes.CDLL] = {}
 """The libraries that this process has loaded, by the file and the layout of the vehicle."""
 _LOADING = Lock()
 
 
-def load_library(rov: Rov, file: Path = ENGINE_FILE) -> ctypes.CDLL:
+def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     """Return the library of a vehicle made from a file of the engine. It does not depend on the coefficients.
 
     Raises BuildError when it cannot be compiled or loaded.
     """
-    key = f"{file.name} {rov.layout!r}"
+    key = f"{file.name} {vehicle.layout!r}"
     with _LOADING:
         if key not in _LOADED:
-            texts = {**sources(rov.layout), file.name: file.read_text(encoding="utf-8")}
+            texts = {**sources(vehicle.layout), file.name: file.read_text(encoding="utf-8")}
             try:
                 _LOADED[key] = _load(texts)
             except OSError as error:

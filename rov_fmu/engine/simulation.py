@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.engine.library import load_library
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 _POLL = 0.5
@@ -60,7 +60,7 @@ def usable_cores() -> int:
 
 
 def simulate(
-    rov: Rov,
+    vehicle: Vehicle,
     time: ArrayLike,
     values: Mapping[str, Any] = MappingProxyType({}),
     record: Sequence[str] | None = None,
@@ -80,13 +80,13 @@ def simulate(
 
     Raises BuildError when the engine cannot be compiled. The arguments are not checked.
     """
-    layout = rov.layout
+    layout = vehicle.layout
     record = list(layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
     shape = vehicles, len(times)
     places = places_of(layout)
     numbers = np.zeros(len(places))
-    for name, number in {**layout.usual_inputs, **rov.coefficients}.items():
+    for name, number in {**layout.usual_inputs, **vehicle.coefficients}.items():
         if name in places:
             numbers[places[name]] = number
     tables = tables_of(numbers)
@@ -101,7 +101,7 @@ def simulate(
     recorded = np.array([places[name] for name in record], np.intc)
     result = np.empty((len(record), *shape))
     failed = np.empty(vehicles, np.intp)
-    run = load_library(rov).simulate
+    run = load_library(vehicle).simulate
     run.restype = None
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (tables, times, recorded, result, failed)]
     stop = ctypes.c_int(0)
@@ -118,8 +118,8 @@ def simulate(
             run_part(first)
     else:
         _run_parts(run_part, firsts, workers, stop)
-    for vehicle in np.flatnonzero(failed < len(times)):
-        result[:, vehicle, failed[vehicle] :] = np.nan
+    for one in np.flatnonzero(failed < len(times)):
+        result[:, one, failed[one] :] = np.nan
     return Trajectories(result, failed)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rov_fmu.engine.library import load_library
 from rov_fmu.engine.simulation import places_of, tables_of
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 class Stepper:
@@ -19,33 +19,33 @@ class Stepper:
     All arrays and pointers are made once, so a step costs little more than its computation.
     """
 
-    def __init__(self, rov: Rov, start: Mapping[str, float], record: Sequence[str]) -> None:
+    def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
         """Begin at time 0 s. `start` contains inputs and states in SI units, and Euler angles at the start, by name.
 
         Others have their usual values. `record` names the variables that each step returns. The arguments are not
         checked. Raises BuildError when the engine cannot be compiled.
         """
-        layout = rov.layout
+        layout = vehicle.layout
         self._commands = tuple(layout.commands)
-        self._dead_time = rov["T_d"] if layout.has_dead_time else 0.0
+        self._dead_time = vehicle["T_d"] if layout.has_dead_time else 0.0
         # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
-        rov = Rov(replace(layout, has_dead_time=False), rov.coefficients)
-        places, states = places_of(rov.layout), [*rov.layout.state]
+        vehicle = Vehicle(replace(layout, has_dead_time=False), vehicle.coefficients)
+        places, states = places_of(vehicle.layout), [*vehicle.layout.state]
         self._numbers = np.zeros(len(places))
-        continued = [f"{name}_0" for name in rov.layout.continued]  # the heading of a vehicle with an attitude
+        continued = [f"{name}_0" for name in vehicle.layout.continued]  # the heading of a vehicle with an attitude
         tables = tables_of(self._numbers)
-        for name, value in {**rov.coefficients, **rov.layout.usual_inputs, **start}.items():
+        for name, value in {**vehicle.coefficients, **vehicle.layout.usual_inputs, **start}.items():
             if name in places:
                 self._numbers[places[name]] = value
-        kept = [*states, *rov.layout.continued]
+        kept = [*states, *vehicle.layout.continued]
         recorded = np.array([places[name] for name in (*kept, *record)], np.intc)
         self._kept = np.array([places[name] for name in (*states, *continued)])
-        self._inputs = {name: places[name] for name in rov.layout.inputs}
+        self._inputs = {name: places[name] for name in vehicle.layout.inputs}
         self._result = np.empty((len(recorded), 2))
         self._times = np.zeros(2)
         self._failed = np.empty(1, np.intp)
         self._arrays = tables, recorded, ctypes.c_int(0)  # keeps the arrays alive while C uses their addresses
-        self._simulate = load_library(rov).simulate
+        self._simulate = load_library(vehicle).simulate
         self._simulate.restype = None
         used = (tables, self._times, recorded, self._result, self._failed)
         sizes = map(ctypes.c_ssize_t, (2, 1, 0, 1, len(recorded)))

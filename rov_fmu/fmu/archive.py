@@ -9,8 +9,9 @@ from io import BytesIO
 from types import MappingProxyType
 from uuid import UUID
 
-from rov_fmu.engine.compile import C_SOURCES, INTERFACES, UNITY_FILE, fmi_headers
+from rov_fmu.engine.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
 from rov_fmu.engine.source import generated_sources, unused_sources
+from rov_fmu.engine.source import sources as motion_sources
 from rov_fmu.fmu.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.fmu.python_flavour import python_files, python_sources
 from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
@@ -18,6 +19,7 @@ from rov_fmu.fmu.variables import interface_header, variables
 from rov_fmu.io.paths import LICENSE
 from rov_fmu.io.picture import read_png
 from rov_fmu.io.reading import read_bytes
+from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -47,7 +49,7 @@ def native_content(
     vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2, interface: str = "both"
 ) -> Content:
     """Return the FMU in C for one of INTERFACES. `pages` are further files, by their paths."""
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
     left_out = (other_version, *unused_sources(vehicle.layout))
     paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
@@ -57,7 +59,7 @@ def native_content(
     interfaces = {name: NATIVE[fmi][name] for name in INTERFACES[interface]}
     describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi, [*interfaces])
+    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, [*interfaces])
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:
@@ -68,7 +70,7 @@ def native_content(
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
     """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     sources = python_sources(vehicle, declared)
     describe = partial(model_description, vehicle, declared, interfaces=PYTHON, note=PYTHON_NOTE)
     guid = _guid(describe(guid=""), sources)
@@ -106,6 +108,15 @@ def _fmi_license(fmi: int) -> bytes:
     start = text.index("Copyright (C)")
     lines = text[start : text.index("*/", start)].splitlines()
     return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
+
+
+def web_module(layout: Layout) -> bytes:
+    """Return the C of the FMU's motion, unchanged, as a WebAssembly module for the page that flies the vehicle.
+
+    The page passes the coefficients to it. Raises BuildError.
+    """
+    page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
+    return compile_module(page | motion_sources(layout))
 
 
 def archive(files: Mapping[str, bytes]) -> bytes:

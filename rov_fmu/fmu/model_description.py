@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from rov_fmu import __version__
 from rov_fmu.engine.compile import UNITY_FILE
+from rov_fmu.fmu.card import card_text
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable, unit_of
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION
@@ -115,6 +116,7 @@ def model_description(
         type_name=_type_name,
         log_categories=LOG_CATEGORIES,
         experiment=_EXPERIMENT,
+        card=card_text(vehicle),
         variables=variables,
         number=number,
         numbers=lambda names: " ".join(str(number[name]) for name in names),

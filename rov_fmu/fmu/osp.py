@@ -8,7 +8,8 @@ from pathlib import Path
 
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Layout
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.model.layout import Layout
 
 _ELEMENTS = {
     "1": "Generic",

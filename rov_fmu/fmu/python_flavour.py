@@ -13,7 +13,7 @@ from pythonfmu import FmuBuilder
 from rov_fmu.engine.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.model.layout import delayed_name
+from rov_fmu.model.catalogue import delayed_name
 from rov_fmu.model.printed import printed
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -12,11 +12,11 @@ from math import hypot, isfinite, sqrt
 from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION, start_formulas
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
 from rov_fmu.model.equation import Term, equation_of
 from rov_fmu.model.expression import Name, compiled
 from rov_fmu.model.forces import COUPLING, LIFT, RESTORING, Effect
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -64,9 +64,9 @@ class ExperimentFiles:
 
 def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     """Return the files by their path in the FMU. Raises DataFileError."""
-    sets = {"tuned": vehicle.rov}
-    if any(vehicle.rov[name] != 1.0 for name in _tunable(vehicle.rov)):
-        sets["untuned"] = untuned(vehicle.rov)
+    sets = {"tuned": vehicle}
+    if any(vehicle[name] != 1.0 for name in _tunable(vehicle)):
+        sets["untuned"] = untuned(vehicle)
     files: dict[str, str] = {}
     experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files), *_attitude(vehicle, files)]
     descriptions = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
@@ -105,14 +105,14 @@ def _related(source: str, kind: str, role: str, description: str) -> dict[str, s
     return {"type": kind, "source": source, "role": role, "description": description}
 
 
-def _tunable(rov: Rov) -> list[str]:
-    return [name for name, declaration in rov.layout.coefficients.items() if declaration.tunable]
+def _tunable(vehicle: Vehicle) -> list[str]:
+    return [name for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
 
 
-def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[ExperimentFiles]:
+def _step_responses(vehicle: Vehicle, sets: Mapping[str, Vehicle], files: dict[str, str]) -> Iterator[ExperimentFiles]:
     """Write the experiments in which one axis steps to a constant command from rest."""
     tables = {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
     for axis in (form.axis for form in vehicle.layout.axes if vehicle.layout.signs(form.axis)):
@@ -122,7 +122,7 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
             rows = {float(row.command): row for row in table.rows}
         for percent, row in rows.items():
             stem = f"{axis.name}_{percent:g}".replace("-", "minus_")
-            inputs = vehicle.rov.held_inputs(axis, percent / 100.0)
+            inputs = vehicle.held_inputs(axis, percent / 100.0)
             time_units = {name: _time_unit(rov, axis, percent / 100.0, inputs) for name, rov in sets.items()}
             longest = max(time_units.values()) * _MULTIPLES[-1]
             for name, rov in sets.items():
@@ -150,14 +150,14 @@ def _commands(vehicle: Vehicle) -> list[float]:
     return [round(share * largest, 6) for share in (0.4, 1.0, -1.0)]
 
 
-def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
+def _time_unit(vehicle: Vehicle, axis: Axis, command: float, inputs: Values) -> float:
     """Return Tau plus the longest lag, but at most _LONGEST_TAU and `_horizon`, to three digits (s)."""
-    lag = max((rov[curve.coefficient("T")] for curve in rov.layout.curves if curve.has_lag), default=0.0)
-    Tau = min(rov.response(axis, command)[1] + lag, _LONGEST_TAU, _horizon(rov, inputs))
+    lag = max((vehicle[curve.coefficient("T")] for curve in vehicle.layout.curves if curve.has_lag), default=0.0)
+    Tau = min(vehicle.response(axis, command)[1] + lag, _LONGEST_TAU, _horizon(vehicle, inputs))
     return float(f"{Tau:.3g}")
 
 
-def _horizon(rov: Rov, inputs: Values) -> float:
+def _horizon(vehicle: Vehicle, inputs: Values) -> float:
     """Return the longest time of an experiment, s.
 
     It is _HORIZON times the shortest time constant, or the time in which the vehicle turns by _HORIZON radians if that
@@ -165,51 +165,51 @@ def _horizon(rov: Rov, inputs: Values) -> float:
 
     The time constant of a restoring force is that of the oscillation that follows from it.
     """
-    rates = _swings(rov)
-    rates += [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
-    for form, motion in zip(rov.layout.axes, rov.motions(inputs), strict=True):
+    rates = _swings(vehicle)
+    rates += [1.0 / vehicle[c.coefficient("T")] for c in vehicle.layout.curves if c.has_lag]
+    for form, motion in zip(vehicle.layout.axes, vehicle.motions(inputs), strict=True):
         A, B = motion.drag(motion.C)
         turning = sqrt(abs(motion.C)) if form.axis.is_rotation else 0.0
         rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
         V = motion.steady_velocity()
         if form.axis.is_rotation and isfinite(V):
             rates.append(abs(V))
-        if rov.layout.coupled and isfinite(V) and not rov.layout.has_attitude:
-            couplings = (abs(k) for _, k in _terms(rov, rov.layout.velocities, COUPLING))
+        if vehicle.layout.coupled and isfinite(V) and not vehicle.layout.has_attitude:
+            couplings = (abs(k) for _, k in _terms(vehicle, vehicle.layout.velocities, COUPLING))
             rates.append(_COUPLING_FACTOR * sum(couplings) * abs(V))
-    if rov.layout.has_attitude:
-        rates.append(_coupling_rate(rov, inputs))
-    horizon = 0.5 * _HORIZON if rov.layout.has_attitude else _HORIZON
+    if vehicle.layout.has_attitude:
+        rates.append(_coupling_rate(vehicle, inputs))
+    horizon = 0.5 * _HORIZON if vehicle.layout.has_attitude else _HORIZON
     return horizon / max(rates) if any(rates) else _LONGEST_TAU
 
 
-def _swings(rov: Rov) -> list[float]:
+def _swings(vehicle: Vehicle) -> list[float]:
     """Return the angular frequencies of the oscillations by restoring forces (1/s)."""
-    rotations = [form.axis.velocity for form in rov.layout.axes if form.axis.is_rotation]
-    return [sqrt(abs(k)) for _, k in _terms(rov, rotations, RESTORING)]
+    rotations = [form.axis.velocity for form in vehicle.layout.axes if form.axis.is_rotation]
+    return [sqrt(abs(k)) for _, k in _terms(vehicle, rotations, RESTORING)]
 
 
-def _terms(rov: Rov, velocities: Iterable[str], *effects: Effect) -> Iterator[tuple[Term, float]]:
+def _terms(vehicle: Vehicle, velocities: Iterable[str], *effects: Effect) -> Iterator[tuple[Term, float]]:
     """Yield the terms of some effects in the accelerations along axes, and the values of their coefficients."""
-    rows = equation_of(rov.layout).rows
+    rows = equation_of(vehicle.layout).rows
     for term in (term for v in velocities for term in rows[v]):
         if term.effect in effects and isinstance(term.coefficient, Name):
-            yield term, rov.parameters[term.coefficient.identifier]
+            yield term, vehicle.parameters[term.coefficient.identifier]
 
 
-def _coupling_rate(rov: Rov, inputs: Values) -> float:
+def _coupling_rate(vehicle: Vehicle, inputs: Values) -> float:
     """Return how fast axes of a vehicle with an attitude change each other's velocities near the steady ones (1/s).
 
     Velocities are multiplied by the roots of their effective masses, as in the kinetic energy, to compare all axes.
     """
     root, size = {}, {}
-    for form, motion in zip(rov.layout.axes, rov.motions(inputs), strict=True):
+    for form, motion in zip(vehicle.layout.axes, vehicle.motions(inputs), strict=True):
         v, V = form.axis.velocity, motion.steady_velocity()
-        root[v] = sqrt(rov.effective_inertia(form))
+        root[v] = sqrt(vehicle.effective_inertia(form))
         size[v] = root[v] * abs(V) if isfinite(root[v] * V) else 0.0
     changes = []
-    for v in rov.layout.velocities:
-        for term, value in _terms(rov, [v], COUPLING, LIFT):
+    for v in vehicle.layout.velocities:
+        for term, value in _terms(vehicle, [v], COUPLING, LIFT):
             a, b = term.factors
             k = value * root[v] / (root[a] * root[b])
             changes += [k * size[a], k * size[b]]
@@ -217,10 +217,10 @@ def _coupling_rate(rov: Rov, inputs: Values) -> float:
 
 
 def _description(
-    rov: Rov, axis: Axis, percent: float, name: str, table: ResponseTable | None, row: ResponseRow | None
+    vehicle: Vehicle, axis: Axis, percent: float, name: str, table: ResponseTable | None, row: ResponseRow | None
 ) -> str:
     """Describe an experiment, with its V_ss and Tau beside those of the tables."""
-    V_ss, Tau = rov.response(axis, percent / 100.0)
+    V_ss, Tau = vehicle.response(axis, percent / 100.0)
     model = row and (row.scaled if name == "tuned" else row.non_linear)
 
     def published(cell: Cell | None) -> str:
@@ -228,9 +228,9 @@ def _description(
         found = ", ".join(f"{origin} {value}" for origin, value in values.items() if value is not None)
         return f" ({found})" if found else ""
 
-    neglected = ["the lag"] if rov.layout.lagging else []
-    neglected += ["the dead time"] if rov.layout.has_dead_time else []
-    neglected += ["righting moments"] if rov.layout.has_attitude and rov.layout.restoring else []
+    neglected = ["the lag"] if vehicle.layout.lagging else []
+    neglected += ["the dead time"] if vehicle.layout.has_dead_time else []
+    neglected += ["righting moments"] if vehicle.layout.has_attitude and vehicle.layout.restoring else []
     without = f", without {' and '.join(neglected)}" if neglected else ""
     return (
         f"{f'Table {table.number}: ' if table else ''}{axis.name}, {percent:g} % from rest{', ' * bool(name)}{name}: "
@@ -252,7 +252,7 @@ _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
 
 def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFiles]:
     """Write an experiment in which all axes move, with loads, a current and reversals, until all inputs are zero."""
-    rov, layout = vehicle.rov, vehicle.layout
+    layout = vehicle.layout
     phases = []
     for shares, load in _PHASES:
         fractions = dict.fromkeys(layout.commands, 0.0)
@@ -265,11 +265,11 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
             commands
             | {name: declaration.start + 0.05 * load * declaration.nominal for name, declaration in others.items()}
         )
-    length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
+    length = float(f"{min(_PHASE, *(_horizon(vehicle, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
     held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
-    trajectory = _trajectory(rov, held)
+    trajectory = _trajectory(vehicle, held)
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
     compared = layout.velocities | _pose_without_quaternion(layout) | layout.lagging
     files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, compared))
@@ -292,18 +292,18 @@ _ATTITUDE = {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0}
 
 def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFiles]:
     """Write an experiment in which a vehicle with roll or pitch starts tilted and turned, with all inputs zero."""
-    rov, layout = vehicle.rov, vehicle.layout
+    layout = vehicle.layout
     if not layout.has_attitude:
         return
     still = layout.usual_inputs
-    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, rov.motions(still), strict=True) if f.axis.is_rotation)
-    length = float(f"{0.5 / max(0.5 / _PHASE, *loads, *_swings(rov)):.1g}")
+    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, vehicle.motions(still), strict=True) if f.axis.is_rotation)
+    length = float(f"{0.5 / max(0.5 / _PHASE, *loads, *_swings(vehicle)):.1g}")
     start = compiled(start_formulas())(_ATTITUDE)
     state = layout.at_rest | {name: start[name] for name in QUATERNION} | {"psi": _ATTITUDE["psi_0"]}
     rows = []
     for t in (0.0, 0.5 * length, length):
-        after = rov.step(still, state, t) if t else state
-        rows.append((t, after | {name: rov.calculated(still, after)[name] for name in layout.angles}))
+        after = vehicle.step(still, state, t) if t else state
+        rows.append((t, after | {name: vehicle.calculated(still, after)[name] for name in layout.angles}))
     files["attitude.ssv"] = render(
         "parameters.ssv.j2", name="attitude", values={name: repr(angle) for name, angle in _ATTITUDE.items()}
     )
@@ -323,14 +323,14 @@ def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFil
 # ---- Trajectories ----------------------------------------------------------------------------------------------------
 
 
-def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
+def _trajectory(vehicle: Vehicle, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
     """Return the states from rest at the times of each phase, during which the inputs are held."""
-    line = rov.delay_line()
-    found: list[_Row] = [(0.0, rov.layout.at_rest)]
+    line = vehicle.delay_line()
+    found: list[_Row] = [(0.0, vehicle.layout.at_rest)]
     for inputs, times in phases:
         for t in times:
             before, state = found[-1]
-            found.append((t, line.step(rov, inputs, state, before, t - before)))
+            found.append((t, line.step(vehicle, inputs, state, before, t - before)))
     return found
 
 

@@ -9,14 +9,15 @@ The value reference of a variable is its place in this order: from 0 in FMI 2.0,
 from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from math import degrees, isfinite
+from math import isfinite
 from typing import Any
 
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration
 from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Declaration, Layout, cited
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.layout import Layout
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,6 @@ class Unit:
     size: float = 1.0
     """The unit in SI units."""
 
-
-_KNOT = 1852.0 / 3600.0  # m/s
 
 _BASE = {
     "kg": {"kg": 1},
@@ -45,12 +44,6 @@ _BASE = {
 """The exponents of the FMI base units in each symbol of a unit."""
 _SIZES = {"us": 1e-6}
 """The sizes of the units that are not SI units."""
-_DISPLAYS = {
-    "1": ("%", 100.0),
-    "rad": ("deg", degrees(1.0)),
-    "m/s": ("knot", 1.0 / _KNOT),
-    "rad/s": ("deg/s", degrees(1.0)),
-}
 
 
 def unit_of(text: str) -> Unit:
@@ -63,7 +56,7 @@ def unit_of(text: str) -> Unit:
             for base, exponent in _BASE[name].items():
                 exponents[base] += sign * exponent * int(symbol[len(name) :] or 1)
     powers = {base: exponent for base, exponent in exponents.items() if exponent}
-    display, factor = _DISPLAYS.get(text, (None, 1.0))
+    display, factor = DISPLAYS.get(text, (None, 1.0))
     return Unit(powers, display, factor, _SIZES.get(text, 1.0))
 
 
@@ -120,9 +113,7 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
     """Return the unit and the description of the derivative of every state."""
     derivatives: dict[str, Declaration] = {}
     for axis in (own.axis for own in layout.axes):
-        derivatives[axis.velocity] = Declaration(
-            f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {cited(axis.equations[1])}"
-        )
+        derivatives[axis.velocity] = Declaration(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration")
     if layout.has_attitude:
         for name, direction in (("x", "northward"), ("y", "eastward"), ("z", "downward")):
             derivatives[name] = Declaration("m/s", f"Velocity over ground {direction}")
@@ -150,16 +141,16 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
     )
 
 
-def variables(rov: Rov) -> tuple[Variable, ...]:
+def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
-    layout = rov.layout
+    layout = vehicle.layout
     result: list[Variable] = []
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
         bounds = {
             end: x for end, x in (("minimum", declaration.minimum), ("maximum", declaration.maximum)) if isfinite(x)
         }
-        given = {"display_unit": unit_of(declaration.unit).display, **bounds, **rest}
+        given = {"display_unit": declaration.display_unit, **bounds, **rest}
         result.append(
             Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **given)
         )
@@ -196,7 +187,6 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             "output",
             "continuous",
             initial="calculated",
-            display_unit=None,
             dependencies=dependencies[name],
         )
     for name, declaration in layout.delayed.items():
@@ -208,8 +198,7 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             "parameter",
             "tunable" if declaration.tunable else "fixed",
             initial="exact",
-            start=rov[name],
-            display_unit=None if declaration.unit == "1" else unit_of(declaration.unit).display,
+            start=vehicle[name],
         )
     for name, declaration in layout.initial.items():
         add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)
@@ -228,9 +217,9 @@ LOG_CATEGORIES = {
 """The log categories by the standard's names (2.2.4), each with its description."""
 
 
-def interface_header(rov: Rov, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
+def interface_header(vehicle: Vehicle, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
     """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
-    declared = variables(rov)
+    declared = variables(vehicle)
     return render(
         "interface.h.j2",
         variables=declared,
@@ -239,7 +228,7 @@ def interface_header(rov: Rov, identifier: str, token: str, fmi: int, interfaces
         token=token,
         fmi=fmi,
         interfaces=interfaces,
-        ranges=rov.layout.voltage_ranges,
+        ranges=vehicle.layout.voltage_ranges,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

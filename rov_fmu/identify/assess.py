@@ -1,14 +1,16 @@
 """How far the model of each axis may be trusted: held-out predictions, answers and verdicts."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, log
 
 import numpy as np
+from scipy.stats.qmc import Sobol
 
 from rov_fmu.engine.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Shapes
 from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
 from rov_fmu.identify.likelihood.solve import Minimum, minimise, total
 from rov_fmu.identify.result import (
@@ -20,15 +22,18 @@ from rov_fmu.identify.result import (
     Slip,
     Verdict,
     Word,
+    coverage_of,
 )
 from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.layout import Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.uncertainty import NORMAL
+from rov_fmu.vehicle.uncertainty import LEVEL, NORMAL
+from rov_fmu.vehicle.vehicle import Vehicle
 
 COMMANDS = (0.3, -0.3, 0.5, -0.5)
-"""The commands of the answers."""
+"""The commands whose answers are judged."""
+ANSWERED = (*COMMANDS, 1.0, -1.0)
+"""The commands of all answers. Full thrust is often beyond the tests, so it does not count for the verdict."""
 AHEAD, SETTLING = 10.0, 5.0
 """Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
 _LEAST_GAIN = 0.03
@@ -39,11 +44,13 @@ _LOST = 1.8
 """The largest standard deviation of a heading, rad: that of a direction about which nothing is known."""
 _OF_THRUST = 0.7
 """The relative change of V_ss by that of the thrust: between 0.5, if drag is quadratic, and 1, if it is linear."""
-_EXACT_SPEED = 0.01
-"""A steady velocity is never claimed to better than 1 %."""
+EXACT = 0.01
+"""No answer is claimed to better than 1 %."""
 _REFIT_STEPS = 6
 """The steps of a fit without one log, which begins at the fit to all."""
 _STOPPED = 0.1
+_DRAWS = 256
+"""The number of vehicles that are drawn from the estimates of a vehicle file."""
 GOOD, USABLE = 0.8, 0.6
 """The least coverage of the bands for each verdict."""
 _WIDEST = {"good": 0.15, "usable": 0.3}
@@ -64,8 +71,14 @@ class _Part:
     words: str
 
 
-def predictions(objective: Objective, best: Minimum, posterior: Posterior) -> Iterator[Prediction]:
-    """Yield the prediction of each quantity of each log by a fit to all other data."""
+def predictions(
+    objective: Objective, best: Minimum, posterior: Posterior, against: Vehicle | None = None
+) -> Iterator[Prediction]:
+    """Yield the prediction of each quantity of each log by a fit to all other data, and by a vehicle to compare with.
+
+    That vehicle may have seen the log. It is left out where it has other thrusters or coefficients.
+    """
+    other = _other(objective.table, against)
     count = len(objective.logs)
     for n, one in enumerate(objective.logs):
         if count > 1:
@@ -76,12 +89,23 @@ def predictions(objective: Objective, best: Minimum, posterior: Posterior) -> It
             _, information = total(objective, again.z, [data for m, data in enumerate(best.data) if m != n])
             covariance = Posterior.of(objective.table, again.z, information).averaged.covariance
             covariance = _with_currents(objective, best, covariance, n)
-            yield from _predicted(objective, _Part(n, slice(None), words), _cautious(objective, again.z), covariance)
+            part = _Part(n, slice(None), words)
+            yield from _predicted(objective, part, _cautious(objective, again.z), covariance, other)
             continue
         half = len(best.data[n].innovations) // 2
         for part in (_Part(n, slice(half, None), "the first half"), _Part(n, slice(half), "the second half")):
             z, covariance = _without(objective, best, part)
-            yield from _predicted(objective, part, _cautious(objective, z), covariance)
+            yield from _predicted(objective, part, _cautious(objective, z), covariance, other)
+
+
+def _other(table: Table, against: Vehicle | None) -> Table | None:
+    """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
+    if not against or against.layout.gains != table.layout.gains:
+        return None
+    if not against.coefficients.keys() <= table.layout.coefficients.keys():
+        return None
+    values = against.coefficients
+    return replace(table, base={**table.base, **values}, exact=frozenset(values), shape_deviation=0.0)
 
 
 def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
@@ -115,7 +139,9 @@ def _cautious(objective: Objective, z: Array) -> Array:
     return moved
 
 
-def _predicted(objective: Objective, part: _Part, z: Array, covariance: Array) -> Iterator[Prediction]:
+def _predicted(
+    objective: Objective, part: _Part, z: Array, covariance: Array, other: Table | None
+) -> Iterator[Prediction]:
     """Yield the predictions of one part over its whole length, and of its positions over a shorter time."""
     one, record = objective.logs[part.log], objective.records[part.log]
     inside = np.zeros(len(record.time), bool)
@@ -125,6 +151,7 @@ def _predicted(objective: Objective, part: _Part, z: Array, covariance: Array) -
         try:
             run = objective.run(z, part.log, begin=begin, span=span)
             slopes = _slopes(objective, part.log, z, covariance, run, begin, span)
+            compared = objective.run(z, part.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
         later = inside & (record.time >= record.time[0] + begin)
@@ -153,6 +180,7 @@ def _predicted(objective: Objective, part: _Part, z: Array, covariance: Array) -
                 noise=objective.table.get(z.tolist(), "white noise", m.channel.quantity.name),
                 error=float(np.sqrt(np.mean(off**2))),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
+                compared=measured - compared.innovations[at] if compared else None,
             )
 
 
@@ -186,7 +214,7 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 # ---- Answers ---------------------------------------------------------------------------------------------------------
 
 
-def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...]:
+def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
     The values are those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the
@@ -194,27 +222,26 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...
     """
     table = posterior.table
 
-    def values(rov: Rov, shapes: Shapes) -> Array:
-        return np.array([_response(shapes.motion(rov, axis, c)) for c in COMMANDS])
+    def values(vehicle: Vehicle, shapes: Shapes) -> Array:
+        return np.array([_response(shapes.motion(vehicle, axis, c)) for c in ANSWERED])
 
     def logarithms(z: Array) -> Array:
-        fitted = values(Rov(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
+        fitted = values(Vehicle(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(np.abs(fitted)).ravel()
 
     slopes = posterior.slopes(logarithms, posterior.of_vehicle)
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-    variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(COMMANDS), 3)
+    variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
     # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
     variances[:, :2] += (_OF_THRUST * table.get(posterior.z.tolist(), "slow gain")) ** 2
     of_file = values(vehicle, NO_SHAPES)
     with np.errstate(divide="ignore", invalid="ignore"):
         beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z).reshape(of_file.shape)) / QUANTILE
-    errors = np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0)
+    errors = np.maximum(np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0), EXACT / QUANTILE)
     found = []
-    for command, error, (V, rise, stop) in zip(COMMANDS, errors, of_file.tolist(), strict=True):
-        half = max(QUANTILE * error[0], _EXACT_SPEED) / QUANTILE
-        steady = around(abs(V), abs(V) * half, positive=True)
+    for command, error, (V, rise, stop) in zip(ANSWERED, errors, of_file.tolist(), strict=True):
+        steady = around(abs(V), abs(V) * error[0], positive=True)
         signed = steady if V >= 0.0 else (-steady[1], -steady[0])
         found.append(
             Answer(
@@ -225,6 +252,26 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Rov) -> tuple[Answer, ...
                 (stop, around(stop, stop * error[2], positive=True)),
             )
         )
+    return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
+
+
+def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
+    """Return the answers of a vehicle file, without those that are not finite.
+
+    The intervals contain 95 % of the vehicles that its estimates allow; a file without estimates has none, so that they
+    have no width.
+    """
+    known = vehicle.uncertainty
+    drawn = known.drawn(Sobol(max(len(known.names), 1), rng=1).random(_DRAWS)[:, : len(known.names)])
+    rovs = [vehicle, *(vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
+    found = []
+    for command in ANSWERED:
+        values = np.array([_response(NO_SHAPES.motion(vehicle, axis, command)) for vehicle in rovs])
+        low, high = np.quantile(values[1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=0).tolist()
+        if not known.names:
+            low = high = values[0].tolist()
+        steady, rise, stop = zip(values[0].tolist(), zip(low, high, strict=True), strict=True)
+        found.append(Answer(axis, command, steady, rise, stop))
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 
@@ -264,10 +311,9 @@ def verdict(
 
     judged = [p for p in found if p.is_judged]
     if judged:
-        coverage = float(np.mean([p.coverage for p in judged]))
-        if coverage < GOOD:
-            words = f"The 95 % bands contain {coverage:.0%} of the unseen samples"
-            lower("usable" if coverage >= USABLE else "do not use", f"{words}.")
+        coverage = coverage_of(judged)
+        to: Word = "good" if coverage >= GOOD else "usable" if coverage >= USABLE else "do not use"
+        lower(to, f"The 95% bands contain {coverage:.0%} of the unseen samples.")
         moving = [p for p in judged if p.unchanged > _MOVING * p.noise]
         worse = [p for p in moving if p.error > p.unchanged]
         if worse and len(worse) * 2 > len(moving):
@@ -284,7 +330,7 @@ def verdict(
             "velocity": "An unknown slow velocity over ground is as large as {:.0%} of the vehicle's",
         }
         lower("do not use", f"{sentences[largest.kind].format(largest.share)} in {largest.file}.")
-    widths = [(a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in given]
+    widths = [(a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in given if a.command in COMMANDS]
     if not widths:
         lower("do not use", "No steady velocity is determined.")
     elif min(widths) > 2.0 * _WIDEST["usable"]:
@@ -295,7 +341,6 @@ def verdict(
         lower("do not use", f"Another unit or sign would explain the {slip.quantity} in {slip.file}.")
     if difference > DISAGREEMENT:
         lower("do not use", "Two starts of the fit led to different vehicles.")
-    if word == "good":
-        words = "Unseen motion stays inside the 95 % bands" if judged else "The tables determine the steady velocities"
-        reasons.append(f"{words}.")
+    if not reasons:
+        reasons.append("The tables determine the steady velocities; no unseen motion was predicted.")
     return Verdict(word, tuple(reasons))  # type: ignore[arg-type]

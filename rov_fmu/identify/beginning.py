@@ -15,15 +15,15 @@ from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorde
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import did_you_mean, first_of, lines_on
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import AXES, PITCH, REVERSE, ROLL, Axis, Curve, Layout, coefficient_name
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES, PITCH, REVERSE, ROLL, Axis, coefficient_name
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from rov_fmu.tank.folder import KINDS, Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
-from rov_fmu.vehicle.vehicle import VehicleFileError
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _QUADRATIC = 0.7
 """The share of the quadratic drag at a large velocity, where nothing else is known."""
@@ -55,7 +55,7 @@ class Tests:
 
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
-        layout = self.given.rov.layout
+        layout = self.given.vehicle.layout
         names = {curve.name for curve in layout.curves} if kind == "thrust" else {*layout.kinds}
         for (other, subject), some in self.folder.rows.items():
             if other == kind and subject in names:
@@ -201,35 +201,37 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
     given = tests.given
     deviations = given.description.tables.priors
-    rov = _extended(given.rov, given.base, tests, deviations)
-    logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, rov.layout)))]
-    fitted = [form.axis for form in rov.layout.axes if _is_fitted(form.axis, tests)]
-    driving = {t.curve for axis in fitted for t in rov.layout.drivers(axis)}
+    vehicle = _extended(given.vehicle, given.base, tests, deviations)
+    logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
+    fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
+    driving = {t.curve for axis in fitted for t in vehicle.layout.drivers(axis)}
     given_thrust = {name for name, quantity in given.description.known.items() if not quantity.interval}
     measured = [name for name, _ in tests.rows("thrust")]
-    driving = {c.name for c in rov.layout.curves if c.name in driving or c.name in measured}
+    driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
     curves = [
         curve
-        for curve in rov.layout.curves
+        for curve in vehicle.layout.curves
         if curve.name in driving
         and (curve.name in measured or not {curve.coefficient("a_t"), curve.coefficient("b_t")} <= given_thrust)
     ]
-    values = dict(rov.coefficients)
+    values = dict(vehicle.coefficients)
     for name, rows in tests.rows("thrust"):
-        rough = _rough_thrust(rov, next(c for c in rov.layout.curves if c.name == name), rows)
+        rough = _rough_thrust(vehicle, next(c for c in vehicle.layout.curves if c.name == name), rows)
         values |= {key: value for key, value in rough.items() if key not in given.known}
-    rov = Rov(rov.layout, values)
-    full = {form.axis.name: rov.strongest(form.axis) for form in rov.layout.axes}
+    vehicle = Vehicle(vehicle.layout, values)
+    full = {form.axis.name: vehicle.strongest(form.axis) for form in vehicle.layout.axes}
     guessed = []
     for axis in fitted:
         if any(axis.coefficient(key) not in given.base for key in ("a_d", "b_d")):
             guessed.append(axis.name)
-            values |= _rough_drag(rov, axis, tests, logs)
+            values |= _rough_drag(vehicle, axis, tests, logs)
     has_lag = any(name.startswith("T_") for name in given.base)
-    exact = _exact(given, rov.layout, measured)
+    exact = _exact(given, vehicle.layout, measured)
     errors = _thrust_errors(given, curves)
-    known = Beginning(rov.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors)
-    return known, logs, [*_table_rows(tests, rov)]
+    known = Beginning(
+        vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
+    )
+    return known, logs, [*_table_rows(tests, vehicle)]
 
 
 def _exact(given: GivenVehicle, layout: Layout, measured: Sequence[str]) -> frozenset[str]:
@@ -256,13 +258,13 @@ def _is_fitted(axis: Axis, tests: Tests) -> bool:
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
-def _extended(rov: Rov, base: Mapping[str, float], tests: Tests, deviations: Mapping[str, float]) -> Rov:
+def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviations: Mapping[str, float]) -> Vehicle:
     """Return the vehicle with every coefficient that a parameter may change, where each effect is absent."""
-    values = {name: base.get(name, value) for name, value in rov.coefficients.items()}
-    rov = Rov(
-        replace(rov.layout, mix={}, pulse=None, has_dead_time=False), rov.coefficients
+    values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
+    vehicle = Vehicle(
+        replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
     )  # a log tells thrusters' commands
-    layout = rov.layout
+    layout = vehicle.layout
     more: dict[str, float] = {}
     logged = {*tests.tested.logs}
     for form in layout.axes:
@@ -270,9 +272,9 @@ def _extended(rov: Rov, base: Mapping[str, float], tests: Tests, deviations: Map
         if axis.name in logged:
             more |= {axis.coefficient(f"{key}{REVERSE}"): values[axis.coefficient(key)] for key in ("a_d", "b_d")}
             more[axis.coefficient("F_0")] = base.get(axis.coefficient("F_0"), 0.0)
-    rov = _with_voltage(rov, base, tests)
-    layout = rov.layout
-    values = {**rov.coefficients, **values}
+    vehicle = _with_voltage(vehicle, base, tests)
+    layout = vehicle.layout
+    values = {**vehicle.coefficients, **values}
     exact = deviations.get("thrust") == 0.0
     for curve in layout.curves:
         if not curve.tables and not exact:
@@ -283,37 +285,37 @@ def _extended(rov: Rov, base: Mapping[str, float], tests: Tests, deviations: Map
         if logged:
             more[curve.coefficient("T")] = LEAST_LAG
     more = {name: base.get(name, value) for name, value in more.items()}
-    return rov.extended(more | values)
+    return vehicle.extended(more | values)
 
 
-def _with_voltage(rov: Rov, base: Mapping[str, float], tests: Tests) -> Rov:
+def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> Vehicle:
     """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it."""
     requests = tests.given.requests
     values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
-    if not values or rov.layout.voltage is not None:
-        return rov
+    if not values or vehicle.layout.voltage is not None:
+        return vehicle
     mean = float(np.mean([np.mean(some) for some in values]))
     if not requests.voltage and max(float(np.ptp(some)) for some in values) < _SAG * mean:
-        return rov
+        return vehicle
     more = {}
     is_exact = tests.given.description.tables.priors.get("voltage") == 0.0
-    for curve in rov.layout.curves:
+    for curve in vehicle.layout.curves:
         if len(curve.tables) < 2:
             measured_at = tests.given.description.measured_at.get(curve.name, mean)
             more[coefficient_name("V_0", curve.name)] = base.get(coefficient_name("V_0", curve.name), measured_at)
             more[coefficient_name("n_V", curve.name)] = USUAL_EXPONENT if is_exact else 0.0
-    powered = Rov(replace(rov.layout, voltage=round(mean, 3)), rov.coefficients)
+    powered = Vehicle(replace(vehicle.layout, voltage=round(mean, 3)), vehicle.coefficients)
     return powered.extended(more)
 
 
-def _rough_thrust(rov: Rov, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:
+def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:
     """Return the coefficients of a curve that fit its forces roughly, as the centre of their prior.
 
     Both directions share the ratio of a_t to b_t, which are not negative. What else the forces tell is the shape that
     the likelihood fits.
     """
-    astern = coefficient_name(f"a_t{REVERSE}", curve.name) in rov.layout.coefficients
-    c_0 = rov.coefficients.get(curve.coefficient("c_0"), 0.0)
+    astern = coefficient_name(f"a_t{REVERSE}", curve.name) in vehicle.layout.coefficients
+    c_0 = vehicle.coefficients.get(curve.coefficient("c_0"), 0.0)
     command, F = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
     c, F, is_back = np.maximum(np.abs(command) - c_0, 0.0), np.abs(F), astern & (command < 0.0)
     largest = max(float(F.max()), 1e-9)
@@ -335,34 +337,34 @@ def _rough_thrust(rov: Rov, curve: Curve, rows: Sequence[Row]) -> dict[str, floa
     return found
 
 
-def _rough_drag(rov: Rov, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
+def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
     """Return drag and β from a large velocity and the thrust in the tests, as the centre of their prior."""
     points = [(abs(row.value), row.command) for name, rows in tests.rows("steady") if name == axis.name for row in rows]
     V = max((value for value, _ in points), default=0.0) or typical(logs, axis) or 1.0
-    forces = [abs(rov.force(axis, command)) for _, command in points] or [*_forces(rov, axis, logs)]
+    forces = [abs(vehicle.force(axis, command)) for _, command in points] or [*_forces(vehicle, axis, logs)]
     F = float(np.quantile(forces, 0.9)) if forces else 0.0
-    F = F or 0.3 * rov.strongest(axis) or 1.0
+    F = F or 0.3 * vehicle.strongest(axis) or 1.0
     a, b = _QUADRATIC * F / V**2, (1.0 - _QUADRATIC) * F / V
     pairs = {"a_d": a, "b_d": b, f"a_d{REVERSE}": a, f"b_d{REVERSE}": b}
-    if axis.coefficient("m_a") not in rov.coefficients:
+    if axis.coefficient("m_a") not in vehicle.coefficients:
         pairs["beta"] = 1.0 / _ADDED
     return {
         name: value
         for key, value in pairs.items()
-        if (name := axis.coefficient(key)) in rov.layout.coefficients and name not in tests.given.known
+        if (name := axis.coefficient(key)) in vehicle.layout.coefficients and name not in tests.given.known
     }
 
 
-def _forces(rov: Rov, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
+def _forces(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
     """Yield the sizes of the thrust along an axis for some rows of the logs."""
     for one in (one for one in logs if axis.name in one.layout.kinds):
         some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]
-        yield from filter(None, np.abs(one.thrust(rov.coefficients, axis, some)).tolist())
+        yield from filter(None, np.abs(one.thrust(vehicle.coefficients, axis, some)).tolist())
 
 
-def _table_rows(tests: Tests, rov: Rov) -> Iterator[TableRow]:
+def _table_rows(tests: Tests, vehicle: Vehicle) -> Iterator[TableRow]:
     """Yield all rows of tables that count."""
-    curves = {curve.name: curve for curve in rov.layout.curves}
+    curves = {curve.name: curve for curve in vehicle.layout.curves}
     for kind in KINDS:
         if kind == "log":
             continue

@@ -9,7 +9,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, Sensor
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""

@@ -4,7 +4,8 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from math import isfinite, log, nan, sqrt
+from dataclasses import replace
+from math import inf, isfinite, log, nan, sqrt
 from typing import Literal, get_args
 
 import numpy as np
@@ -21,10 +22,11 @@ from rov_fmu.identify.result import (
     Interval,
     Logging,
     Point,
+    Prediction,
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
-from rov_fmu.model.layout import AXES, COUPLED_AXES
+from rov_fmu.model.catalogue import AXES, COUPLED_AXES
 from rov_fmu.tank import findings
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, SentenceForm
@@ -33,9 +35,6 @@ from rov_fmu.vehicle.uncertainty import significant, with_interval
 
 Heading = Literal["Warnings", "Doubts", "Facts"]
 
-LEAST_COVERAGE = 0.8
-"""A 95 % band that contains fewer of the unseen samples is too narrow. Their errors are correlated, so that a band of a
-good model may well contain only 85 %."""
 _CONTRADICTION = 0.15
 """Tables that differ by more than this from the model contradict it: batteries and scales explain less."""
 _FULL = 0.98
@@ -45,13 +44,20 @@ _NEGLIGIBLE = 0.01
 """A disturbance below this share of the thrust is not told."""
 _MOST_OUTLIERS = 0.005
 """Outliers are told if more of a sensor's samples are."""
+SHARES = (0.3, 0.5, 1.0)
+"""The commands of the answers that are told first: weak, half and full."""
+STOPPING = (
+    "The time is that from rest to 63% of the speed at 50%, without the lag of the thrusters. The way is that from "
+    "this speed to a tenth of it without thrust."
+)
+_WITHOUT_OUTLIERS = (0.005, 0.995)
+"""The quantiles between which a quantity counts as tested."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
 
 _OWN: dict[Heading, dict[str, SentenceForm]] = {
     "Warnings": {
-        "do not use": "{axes}: do not use the model of this motion. {reasons}",
         "worse than no change": (
             "{axes}: the prediction of the {quantity} in {files} is off by {error} (RMS), and a prediction of no "
             "change by {unchanged}"
@@ -60,10 +66,6 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         "second start": (
             "two fits from different starts ended at different vehicles, so the data do not decide between them. "
             "More or longer logs would"
-        ),
-        "narrow bands": (
-            "{axes}: the 95% bands contain only {coverage:.0%} of the unseen data, so errors are larger than the "
-            "model claims"
         ),
         "implausible inertia": (
             "{axes}: the vehicle moves as if its inertia were {factor} times {inertia}. Check {mass}, the positions "
@@ -115,7 +117,6 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         ),
     },
     "Facts": {
-        "coverage": "{axes}: the 95% bands contain {coverage:.0%} of the unseen data",
         "effect": "{of}the {name} is {value}{note}",
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
         "logging": (
@@ -123,8 +124,8 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         ),
     },
 }
-_FIRST = ("do not use", "worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip")
-"""The warnings that stand first: axes that must not be trusted, and wrong or missing data."""
+_FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip")
+"""The warnings that stand first: wrong predictions, and wrong or missing data."""
 _READ: dict[Heading, frozenset[str]] = {
     "Doubts": frozenset(
         {
@@ -195,6 +196,23 @@ def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     return {name: sentences(some) for name, some in groups.items()}
 
 
+def told(identification: Identification) -> Identification:
+    """Return an identification with its findings; its vehicle has them too, with its verdicts and errors."""
+    findings = findings_of(identification)
+    made = identification.vehicle.provenance
+    assert made
+    sentences_of = {
+        "warnings": warnings(findings),
+        "facts": facts(findings),
+        "verdicts": tuple(map(verdict_in_words, identification.axes)),
+        "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
+        "tested": tuple(_tested(identification)),
+    }
+    made = made.model_copy(update=sentences_of)
+    vehicle = replace(identification.vehicle, provenance=made)
+    return replace(identification, findings=findings, vehicle=vehicle)
+
+
 def warnings(found: Iterable[Finding]) -> tuple[str, ...]:
     """Return the sentences of warnings and doubts, as the vehicle file has them."""
     return sentences(finding for finding in found if heading(finding) != "Facts")
@@ -212,7 +230,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     """Return all findings of an identification with those about reading, the most important kinds first."""
     found = [*identification.folder.findings]
     for result in identification.axes:
-        found += [*_on_trust(result), *_on_predictions(result), *_on_coefficients(identification, result)]
+        found += [*_on_predictions(result), *_on_coefficients(identification, result)]
         found += _on_points(result)
     for curve, known in identification.curves.items():
         found += _not_identified(known, f"{curve} thrust", curve=curve)
@@ -231,6 +249,75 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for slip in identification.slips:
         found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
     return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
+
+
+def verdict_in_words(result: AxisResult) -> str:
+    """Return the verdict of an axis with its reasons: `surge: good. The 95% bands contain 97% ...`."""
+    return f"{result.axis.name}: {result.verdict.word}. {' '.join(map(with_stop, result.verdict.reasons))}"
+
+
+def with_stop(sentence: str) -> str:
+    """Return a sentence that ends with a full stop or a question mark."""
+    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
+
+
+def name_of(p: Prediction) -> str:
+    """Return the name of what is predicted: `heave depth, 10 s ahead`."""
+    quantity = p.quantity if p.axis.name in p.quantity else f"{p.axis.name} {p.quantity}"
+    return f"{quantity}, {p.span:g} s ahead" if isfinite(p.span) else quantity
+
+
+def error_in_words(p: Prediction) -> str:
+    """Return the error of a prediction beside that of a prediction of no change, and the share in the band."""
+    error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+    return (
+        f"{name_of(p)}: off by {error} (RMS) in {p.file}, and a prediction of no change by {unchanged}; "
+        f"{p.coverage:.0%} of the samples are inside the 95% band"
+    )
+
+
+def next_tests(axes: Sequence[AxisResult]) -> list[str]:
+    """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
+
+    If no test is useful, the sentence names the widest interval; without any test there is none.
+    """
+    tests = sorted((r.next_test for r in axes if r.next_test), key=lambda test: -test.now)
+    useful = [
+        f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
+        for test in tests
+        if test.is_useful
+    ]
+    nothing = "no test would narrow an interval by a tenth. The widest is that of {} of {}, ±{:.0%}."
+    return useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
+
+
+def with_error(known: tuple[float, Interval], unit: str) -> str:
+    """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`."""
+    value, interval = known
+    if not 0.0 < abs(value) < inf:
+        return "-"
+    half = max(abs(end / value - 1.0) for end in interval)
+    words, _, _ = in_words(value, interval, unit).partition(" (")
+    return f"{words} ±{half:.0%}" if half < 1.0 else f"{words} ±>100%"
+
+
+def _tested(identification: Identification) -> Iterator[str]:
+    """Yield the range of each velocity and depth in the logs and tables."""
+    ranges: dict[tuple[str, str], list[float]] = {}
+    for one in identification.folder.logs:
+        for channel in one.channels:
+            quantity = channel.quantity
+            if not (channel.unused or quantity.wraps or quantity.axis is None):
+                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
+                ranges.setdefault((quantity.name, quantity.unit), []).extend(ends)
+    for result in identification.axes:
+        for p in result.points:
+            if p.quantity == "V_ss":
+                ranges.setdefault((f"{result.axis.name} velocity", p.unit), []).append(p.measured)
+    for (name, unit), values in ranges.items():
+        factor, shown = in_degrees(unit)
+        low, high = (significant(factor * end, 2) for end in (min(values), max(values)))
+        yield f"{name}: {low} to {high}{unit_after(shown)}"
 
 
 def size_in_words(value: float, unit: str) -> str:
@@ -263,24 +350,13 @@ def answer_at(result: AxisResult, command: float) -> Answer | None:
     return next((answer for answer in result.answers if abs(answer.command - command) < 1e-6), None)
 
 
-def _on_trust(result: AxisResult) -> Iterator[Finding]:
-    axis = result.axis.name
-    if result.verdict.word == "do not use":
-        reasons = ". ".join(reason.rstrip(".") for reason in result.verdict.reasons)
-        yield Finding("do not use", axis, names={"reasons": reasons})
-    if not result.predictions:
-        yield Finding("nothing predicted", axis)
-    elif result.coverage >= LEAST_COVERAGE:
-        yield Finding("coverage", axis, numbers={"coverage": result.coverage})
-    elif result.coverage < LEAST_COVERAGE and result.verdict.word != "do not use":  # whose reasons tell this
-        yield Finding("narrow bands", axis, numbers={"coverage": result.coverage})
-
-
 def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     """Yield a finding for each prediction that is worse than one of no change.
 
     That a position drifts away over a whole log is told only if it is predicted well over a shorter time.
     """
+    if not result.predictions:
+        yield Finding("nothing predicted", result.axis.name)
     worse = [p for p in result.predictions if p.error > p.unchanged]
     warned = {(p.file, p.quantity) for p in worse if p.is_judged}
     for p in worse:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import (
+from rov_fmu.model.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -16,16 +16,15 @@ from rov_fmu.model.layout import (
     YAW,
     Axis,
     CoefficientKind,
-    Curve,
-    Layout,
     coefficient_name,
 )
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.description import Description, Requests
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.geometry import check_layout, check_part_names, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
+from rov_fmu.vehicle.vehicle import Vehicle
 
 UNKNOWN = 1.0
 """The value of a coefficient that is yet to be identified."""
@@ -38,7 +37,7 @@ class GivenVehicle:
     description: Description
     """The vehicle as rov.toml describes it."""
     head: Head
-    rov: Rov
+    vehicle: Vehicle
     """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
     their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
     needs. The fits add reverse thrust, dead band, lag and load if they find them."""
@@ -112,7 +111,7 @@ def _given(description: Description, head: Head, layout: Layout, known: Mapping[
     return GivenVehicle(
         description=description,
         head=head,
-        rov=Rov(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
+        vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
         thruster_sources={one.name: description.thruster_sources[one.name] for one in layout.driven},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},

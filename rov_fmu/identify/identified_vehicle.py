@@ -12,12 +12,13 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
-from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import REVERSE, Axis
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
-from rov_fmu.vehicle.vehicle import Provenance, Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
@@ -36,7 +37,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     values |= {  # a file has no smaller exponent
         c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
     }
-    rov = Rov(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
+    rov = Vehicle(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in given.known.items() if name in layout.coefficients}
     changed = _changed(fit, rov)
     coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
@@ -69,10 +70,10 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
                 correlation={k: round(v, 6) for k, v in others.items() if abs(v) > 1e-6},
             )
     validity = given.description.tables.validity
-    made = Provenance(f"rov-fmu {__version__} identify", METHOD, tests.inputs, data=_data(fit))
-    vehicle = Vehicle(
+    made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, inputs=dict(tests.inputs))
+    vehicle = replace(
+        rov,
         **dict(given.head),
-        rov=rov,
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
         alternatives={},
@@ -81,6 +82,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         intervals=intervals,
         estimates=estimates,
         provenance=made,
+        measured_from=_data(fit),
         voltage_source="" if layout.voltage is None else "Mean voltage of the logs",
         thruster_sources=given.thruster_sources,
     )
@@ -113,19 +115,19 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
     """
     table, (low, high) = fit.kept.table, fit.command_range
     coefficients = table.coefficients(z.tolist())
-    shapes, rov = table.shapes(z.tolist()), Rov(table.layout, coefficients)
+    shapes, vehicle = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
     for curve in fit.known.curves:
         if curve.name in shapes.of:
             c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
 
             def force(command: float, curve: Curve = curve) -> float:
-                return shapes.force(rov, curve, command)
+                return shapes.force(vehicle, curve, command)
 
             coefficients |= fitted(curve, force, c_0, low, high)
     return coefficients | {name: table.base[name] for name in table.exact}
 
 
-def _changed(fit: Fit, rov: Rov) -> list[str]:
+def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
     """Return the names of the coefficients of the vehicle that the parameters change."""
     z, changed = fit.posterior.z, dict[str, None]()
     before = _in_file(fit, z)
@@ -133,7 +135,7 @@ def _changed(fit: Fit, rov: Rov) -> list[str]:
         moved = z.copy()
         moved[n] += 0.1 * fit.posterior.table.parameters[n].deviation + 0.01
         changed |= dict.fromkeys(name for name, value in _in_file(fit, moved).items() if value != before[name])
-    return [name for name in rov.coefficients if name in changed]
+    return [name for name in vehicle.coefficients if name in changed]
 
 
 def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
@@ -178,13 +180,13 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
-    with_voltage = tests.given.rov.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    with_voltage = tests.given.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
     return replace(
         layout,
         voltage=layout.voltage if with_voltage else None,
-        mix=tests.given.rov.layout.mix,
-        pulse=tests.given.rov.layout.pulse,
-        has_dead_time=tests.given.rov.layout.has_dead_time,
+        mix=tests.given.vehicle.layout.mix,
+        pulse=tests.given.vehicle.layout.pulse,
+        has_dead_time=tests.given.vehicle.layout.has_dead_time,
         axes=tuple(replace(f, keys=tuple(k for k in f.keys if has_axis_key(f.axis, k))) for f in layout.axes),
         curves=tuple(replace(c, keys=tuple(k for k in c.keys if has_curve_key(c, k))) for c in layout.curves),
     )
@@ -203,7 +205,7 @@ def _data(fit: Fit) -> str:
     return " and ".join(parts) or "given values"
 
 
-def _coefficients(fit: Fit, rov: Rov, changed: Sequence[str]) -> Iterator[Coefficient]:
+def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterator[Coefficient]:
     """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
     names = [name for name in changed if not name.startswith("alpha_")]
     if not names:
@@ -213,18 +215,18 @@ def _coefficients(fit: Fit, rov: Rov, changed: Sequence[str]) -> Iterator[Coeffi
     for n, name in enumerate(names):
         error, before = float(np.sqrt(covariance[n, n])), float(np.sqrt(prior[n, n]))
         told = error / before if before > 0.0 else 0.0
-        declaration, value = rov.layout.coefficients[name], rov[name]
-        interval: Interval | None = _interval(rov, name, error)
+        declaration, value = vehicle.layout.coefficients[name], vehicle[name]
+        interval: Interval | None = _interval(vehicle, name, error)
         if not told <= _TOLD or not error > 0.0:
             interval = None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
         yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
 
 
-def _interval(rov: Rov, name: str, error: float) -> Interval:
+def _interval(vehicle: Vehicle, name: str, error: float) -> Interval:
     """Return the 95 % interval of a coefficient within its bounds."""
-    declaration = rov.layout.coefficients[name]
+    declaration = vehicle.layout.coefficients[name]
     if name.startswith("c_0"):
         error = max(error, EXACT_BAND / QUANTILE)
-    low, high = around(rov[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
+    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
     return max(low, declaration.minimum), min(high, declaration.maximum)

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
-from rov_fmu.identify.findings import facts, findings_of, warnings
+from rov_fmu.identify.findings import told
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
@@ -21,7 +21,7 @@ from rov_fmu.identify.unexplained.disturbances import disturbances, followed, un
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
-from rov_fmu.model.layout import SURGE, SWAY, Axis
+from rov_fmu.model.catalogue import SURGE, SWAY, Axis
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -45,20 +45,23 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
     fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
     on_progress("predicting what was left out", 0.85)
-    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior)]
+    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior, against)]
     runs = followed(fit.objective, fit.best.z)
     unexplained = disturbances(fit.objective, fit.best, fit.posterior, runs)
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
     vehicle, coefficients = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
-        if mistake := next(no_thrust(curve, vehicle.rov.coefficients, f"thrust_{curve.name}*.csv"), None):
+        if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = slips(tests, known, fit.objective, fit.best.z)
     held_out = held_out_rows(fit)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
-        axes.append(_axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out))
+        one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out)
+        if against and against.layout.has(axis):
+            one = replace(one, compared=assess.answers_of_file(against, axis))
+        axes.append(one)
     names = tuple(vehicle.estimates)
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings]),
@@ -67,7 +70,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         against=against,
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, map(curve.coefficient, curve.keys)) for curve in known.curves},
-        forces=tuple(points_of(tests, held_out, vehicle.rov, "thrust")),
+        forces=tuple(points_of(tests, held_out, vehicle, "thrust")),
         effects=tuple(effects_of(fit)),
         disturbances=tuple(slow),
         logging=tuple(loggers_of(fit)),
@@ -78,11 +81,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         unknown_forces=tuple(unknown_forces(fit.objective, runs)),
         slips=wrong,
     )
-    findings = findings_of(found)
-    provenance = vehicle.provenance
-    assert provenance
-    told = replace(provenance, warnings=warnings(findings), facts=facts(findings))
-    return replace(found, findings=findings, vehicle=replace(vehicle, provenance=told))
+    return told(found)
 
 
 def _axis(
@@ -97,13 +96,13 @@ def _axis(
     held_out: HeldOut,
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
-    answers = assess.answers(fit.averaged, axis, vehicle.rov)
+    answers = assess.answers(fit.averaged, axis, vehicle)
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
     points = [
-        *points_of(tests, held_out, vehicle.rov, "steady", axis.name),
-        *points_of(tests, held_out, vehicle.rov, "time_constant", axis.name),
+        *points_of(tests, held_out, vehicle, "steady", axis.name),
+        *points_of(tests, held_out, vehicle, "time_constant", axis.name),
     ]
     return AxisResult(
         axis=axis,

@@ -7,15 +7,15 @@ from math import isfinite
 import numpy as np
 
 from rov_fmu.engine.filter import DivergedError, Record
-from rov_fmu.identify.assess import COMMANDS
+from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import NextTest
 from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.layout import Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _STRENGTHS = (0.2, 0.4, 0.6, 0.8, 1.0)
 _HOLD, _REST = 8.0, 4.0
@@ -32,8 +32,8 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
 
     def motion(z: Array, command: float) -> AxisAlone:
         table = posterior.table
-        rov = Rov(table.layout, table.coefficients(z.tolist()))
-        return table.shapes(z.tolist()).motion(rov, axis, command)
+        vehicle = Vehicle(table.layout, table.coefficients(z.tolist()))
+        return table.shapes(z.tolist()).motion(vehicle, axis, command)
 
     def speed(z: Array, command: float) -> float:
         return motion(z, command).steady_velocity()
@@ -65,8 +65,8 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
 
 
 def _widths(slopes: Array, covariance: Array) -> Array:
-    """Return the relative half-widths of some intervals."""
-    return np.asarray(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)))
+    """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
+    return np.asarray(np.maximum(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)), EXACT))
 
 
 def _hold(motions: Sequence[AxisAlone], axis: Axis, limits: TankLimits) -> float:

@@ -3,12 +3,14 @@
 Nothing here is computed: `identify` puts the result together, and the findings (findings.py) are functions of it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import inf, nan
 from typing import Literal
 
-from rov_fmu.model.layout import Axis
+import numpy as np
+
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
@@ -85,11 +87,24 @@ class Prediction:
     """The RMS error."""
     coverage: float
     """The share of the samples inside the 95 % band."""
+    compared: Array | None = None
+    """The same prediction by the vehicle to compare with; None if it lacks the axis or has other thrusters."""
+
+    @property
+    def compared_error(self) -> float | None:
+        """The RMS error of the vehicle to compare with."""
+        return None if self.compared is None else float(np.sqrt(np.mean((self.measured - self.compared) ** 2)))
 
     @property
     def is_judged(self) -> bool:
         """True where the band says something: of a velocity over a recording, and of a position over 10 s."""
         return self.is_position == (self.span < inf)
+
+
+def coverage_of(predictions: Iterable[Prediction]) -> float:
+    """Return the share of samples inside their 95 % bands, over the predictions that are judged; NaN without any."""
+    judged = [p for p in predictions if p.is_judged]
+    return sum(p.coverage * len(p.time) for p in judged) / sum(len(p.time) for p in judged) if judged else nan
 
 
 @dataclass(frozen=True)
@@ -259,6 +274,8 @@ class AxisResult:
     """Held-out predictions; empty where the axis has only tables or a single short log."""
     points: tuple[Point, ...]
     next_test: NextTest | None
+    compared: tuple[Answer, ...] = ()
+    """The answers of the vehicle to compare with."""
 
     @property
     def main(self) -> Prediction | None:
@@ -272,8 +289,7 @@ class AxisResult:
     @property
     def coverage(self) -> float:
         """The share of all samples inside their 95 % bands, over the predictions that are judged; NaN without any."""
-        judged = [p for p in self.predictions if p.is_judged]
-        return sum(p.coverage * len(p.time) for p in judged) / sum(len(p.time) for p in judged) if judged else nan
+        return coverage_of(self.predictions)
 
 
 @dataclass(frozen=True, eq=False)

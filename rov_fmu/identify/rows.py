@@ -10,8 +10,9 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Point
-from rov_fmu.model.layout import Axis, Curve
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Curve
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _ROW_STEPS = 10
 """The steps of a fit without the rows of one command."""
@@ -20,7 +21,7 @@ HeldOut = Mapping[tuple[str, str, float], float]
 """The value of a row by a fit without it, by the quantity, the curve or axis, and the command."""
 
 
-def points_of(tests: Tests, held_out: HeldOut, rov: Rov, kind: str, only: str | None = None) -> Iterator[Point]:
+def points_of(tests: Tests, held_out: HeldOut, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
     """Yield the rows of tables with what the vehicle says about them, also held out."""
     quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
     for subject, rows in tests.rows(kind):
@@ -28,15 +29,17 @@ def points_of(tests: Tests, held_out: HeldOut, rov: Rov, kind: str, only: str | 
             continue
         for row in rows:
             of: Curve | Axis = (
-                next(c for c in rov.layout.curves if c.name == subject)
+                next(c for c in vehicle.layout.curves if c.name == subject)
                 if kind == "thrust"
-                else rov.layout.kinds[subject].axis
+                else vehicle.layout.kinds[subject].axis
             )
             one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
-            unit = "N" if kind == "thrust" else "s" if kind == "time_constant" else rov.layout.kinds[subject].axis.unit
+            unit = (
+                "N" if kind == "thrust" else "s" if kind == "time_constant" else vehicle.layout.kinds[subject].axis.unit
+            )
             out = held_out.get((quantity, subject, row.command), np.nan)
             counts = tests.counts(kind, subject, row.command)
-            numbers = row.command, row.value, one.model(rov, NO_SHAPES), out
+            numbers = row.command, row.value, one.model(vehicle, NO_SHAPES), out
             yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 
 
@@ -56,8 +59,8 @@ def held_out_rows(fit: Fit) -> HeldOut:
             most=_ROW_STEPS,
             with_noise=False,
         ).z
-        rov = Rov(objective.table.layout, objective.table.coefficients(z.tolist()))
+        vehicle = Vehicle(objective.table.layout, objective.table.coefficients(z.tolist()))
         shapes = objective.table.shapes(z.tolist())
         for row in (rows[n] for n in members):
-            found[row.quantity, row.subject.name, row.command] = row.model(rov, shapes)
+            found[row.quantity, row.subject.name, row.command] = row.model(vehicle, shapes)
     return found

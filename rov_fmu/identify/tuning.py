@@ -12,11 +12,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rov_fmu.identify.result import Interval
-from rov_fmu.model.layout import Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.uncertainty import quantile
+from rov_fmu.vehicle.vehicle import Vehicle
 
 ALPHA = 0.5, 2.0
 """The range of a plausible α. Thrust that is measured in a tank is known to better than a factor of 2; the paper has α
@@ -39,9 +39,9 @@ class Target:
     command: float
     value: float
 
-    def by(self, rov: Rov, axis: Axis) -> float:
+    def by(self, vehicle: Vehicle, axis: Axis) -> float:
         """Return the V_ss or the Tau of a vehicle at the command."""
-        V_ss, Tau = rov.response(axis, self.command)
+        V_ss, Tau = vehicle.response(axis, self.command)
         return V_ss if self.quantity == "V_ss" else Tau
 
 
@@ -50,23 +50,23 @@ class Tuning:
     """A vehicle with the α and β of one axis that suit the wanted points best."""
 
     axis: Axis
-    rov: Rov
+    vehicle: Vehicle
     points: Sequence[Target]
     intervals: Mapping[str, Interval | None]
     """The 95 % interval of each tuned coefficient, by its name; None if there are not more points than coefficients."""
 
 
-def tune(rov: Rov, axis: Axis, points: Sequence[Target]) -> Tuning:
+def tune(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Tuning:
     """Find α and β for wanted points. Without any Tau, β stays. Raises TuningError.
 
     The intervals of many points follow from their scatter, by Student's distribution.
     """
-    start = _closed_form(rov, axis, points)
+    start = _closed_form(vehicle, axis, points)
     kinds = ("alpha", "beta") if any(p.quantity == "Tau" for p in points) else ("alpha",)
     names = [axis.coefficient(kind) for kind in kinds]
-    highest = [log(rov.layout.coefficients[name].maximum) for name in names]
+    highest = [log(vehicle.layout.coefficients[name].maximum) for name in names]
 
-    def tuned(logs: Array) -> Rov:
+    def tuned(logs: Array) -> Vehicle:
         return start.replaced(dict(zip(names, np.exp(logs).tolist(), strict=True)))
 
     def errors(logs: Array) -> list[float]:
@@ -83,57 +83,57 @@ def tune(rov: Rov, axis: Axis, points: Sequence[Target]) -> Tuning:
     return Tuning(axis, tuned(fit.x), points, intervals)
 
 
-def _closed_form(rov: Rov, axis: Axis, points: Sequence[Target]) -> Rov:
+def _closed_form(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Vehicle:
     """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
-    if rov.held(axis, 1.0).B != rov.held(axis, 0.0).B:
+    if vehicle.held(axis, 1.0).B != vehicle.held(axis, 0.0).B:
         raise TuningError(
             f"{axis.name}: its thrust decreases with the speed of advance. Tuning cannot take this into "
             "account: remove d"
         )
     for p in points:
-        if reason := impossible(rov, axis, p):
+        if reason := impossible(vehicle, axis, p):
             raise TuningError(f"{axis.name}: {reason}")
-    alphas = [_holding(rov, axis, p.value) / rov.force(axis, p.command) for p in points if p.quantity == "V_ss"]
+    alphas = [_holding(vehicle, axis, p.value) / vehicle.force(axis, p.command) for p in points if p.quantity == "V_ss"]
     if not alphas:
         raise TuningError(f"{axis.name}: there is no V_ss, and alpha is tuned to V_ss")
-    tuned, beta = _with(rov, axis.coefficient("alpha"), alphas), axis.coefficient("beta")
+    tuned, beta = _with(vehicle, axis.coefficient("alpha"), alphas), axis.coefficient("beta")
     plain = tuned.replaced({beta: 1.0})  # Tau is proportional to 1/β
     betas = [p.by(plain, axis) / p.value for p in points if p.quantity == "Tau"]
     return _with(tuned, beta, betas) if betas else tuned
 
 
-def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
+def _with(vehicle: Vehicle, name: str, wanted: Sequence[float]) -> Vehicle:
     """Set a coefficient to the median of the wanted values, each of which must be possible. Raises TuningError."""
-    maximum = rov.layout.coefficients[name].maximum
+    maximum = vehicle.layout.coefficients[name].maximum
     for value in wanted:
         if not 0.0 < value <= maximum:
             raise TuningError(f"{name} would have to be {value:g}, but it must be above 0 and at most {maximum:g}")
-    return rov.replaced({name: float(np.median(wanted))})
+    return vehicle.replaced({name: float(np.median(wanted))})
 
 
-def _holding(rov: Rov, axis: Axis, V: float) -> float:
+def _holding(vehicle: Vehicle, axis: Axis, V: float) -> float:
     """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
-    plain, form = rov.replaced({axis.coefficient("beta"): 1.0}), rov.layout.kinds[axis.name]
+    plain, form = vehicle.replaced({axis.coefficient("beta"): 1.0}), vehicle.layout.kinds[axis.name]
     return -plain.effective_inertia(form) * plain.held(axis, 0.0).acceleration(V)
 
 
-def impossible(rov: Rov, axis: Axis, point: Target) -> str | None:
+def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
     """Return the reason why no tuning gives the point, or None."""
     c, value = point.command, point.value
     if not 0.0 < abs(c) <= 1.0:
         return f"a command of {c:g} must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
-    if not (force := rov.force(axis, c)):
-        dead = all("c_0" in rov.layout.curve_of[t.name].keys for t in rov.layout.drivers(axis))
+    if not (force := vehicle.force(axis, c)):
+        dead = all("c_0" in vehicle.layout.curve_of[t.name].keys for t in vehicle.layout.drivers(axis))
         return f"a command of {c:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"
     if point.quantity == "Tau":
         return None if 0.0 < value < inf else f"Tau = {value:g} s must be above 0"
     if not 0.0 < abs(value) < inf:
         return f"V_ss = {value:g} {axis.unit} must be a number other than 0"
-    if _holding(rov, axis, value) * force > 0.0:
+    if _holding(vehicle, axis, value) * force > 0.0:
         return None
-    form, allowed = rov.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"
+    form, allowed = vehicle.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"
     if "F_0" in form.keys:
-        drift = rov.held(axis, 0.0).steady_velocity()
+        drift = vehicle.held(axis, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
     thrust = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
     return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {thrust}"
@@ -141,9 +141,9 @@ def impossible(rov: Rov, axis: Axis, point: Target) -> str | None:
 
 def implausible(tuning: Tuning) -> Iterator[Finding]:
     """Yield a finding about each tuned coefficient that is implausible."""
-    axis, has_added = tuning.axis, "m_a" in tuning.rov.layout.kinds[tuning.axis.name].keys
+    axis, has_added = tuning.axis, "m_a" in tuning.vehicle.layout.kinds[tuning.axis.name].keys
     for kind, (low, high) in {"alpha": ALPHA, "beta": BETA_WITH_ADDED_MASS if has_added else BETA}.items():
-        value = tuning.rov[name := axis.coefficient(kind)]
+        value = tuning.vehicle[name := axis.coefficient(kind)]
         if name in tuning.intervals and not low <= value <= high:
             inertia = f"{1.0 / value:.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
             names = {kind: name, "push": axis.push, "unit": axis.unit, "inertia": inertia, "mass": axis.inertia}

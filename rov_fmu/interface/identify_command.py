@@ -72,5 +72,5 @@ def _vehicle_output(identification: Identification, path: Path, report: Path | N
     vehicle = identification.vehicle
     if report:
         assert vehicle.provenance
-        vehicle = replace(vehicle, provenance=replace(vehicle.provenance, report=report))
+        vehicle = replace(vehicle, provenance=vehicle.provenance.model_copy(update={"report": report}))
     return vehicle_output(vehicle, path)

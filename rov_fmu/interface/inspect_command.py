@@ -12,7 +12,8 @@ from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import NO_FILE, brief, first_of, one_line
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.io.templates import render
-from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL, Layout
+from rov_fmu.model.catalogue import AXES, BODY, PITCH, ROLL
+from rov_fmu.model.layout import Layout
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
@@ -151,7 +152,7 @@ def _axes(signals: Collection[str]) -> list[str]:
 def _body(vehicle: Vehicle) -> list[tuple[str, str, str]]:
     """Return the names, values and units of the coefficients of a vehicle's body."""
     units = {key: declaration.unit for key, declaration in vehicle.layout.coefficients.items()}
-    return [(key, f"{vehicle.rov[key]:g}", units[key]) for key in BODY if key in units]
+    return [(key, f"{vehicle[key]:g}", units[key]) for key in BODY if key in units]
 
 
 def _effects(vehicle: Vehicle | None, signals: Collection[str]) -> list[str]:

@@ -173,7 +173,7 @@ class VehicleModel(Vehicle):
 
         Raises InputError if a vector has another length, a coefficient is unknown, or JAX computes in single precision.
         """
-        return arrays.rates(self.rov, x, forces, p)
+        return arrays.rates(self, x, forces, p)
 
     def forces(self, inputs: Mapping[str, Any], p: Mapping[str, Any] = _NONE) -> Any:
         """Return the vector of forces that `rates` takes, for commands, loads and current.
@@ -184,7 +184,7 @@ class VehicleModel(Vehicle):
 
         Raises InputError if an input or a coefficient is unknown.
         """
-        return arrays.forces(self.rov, inputs, p)
+        return arrays.forces(self, inputs, p)
 
     def build(
         self,
@@ -213,7 +213,7 @@ class VehicleModel(Vehicle):
         many: bool,
     ) -> Result:
         layout = self.layout
-        check_coefficients(layout, self.rov.coefficients)  # `dataclasses.replace` does not check them
+        check_coefficients(layout, self.coefficients)  # `dataclasses.replace` does not check them
         times = checked_times("time", duration_times(time) if np.ndim(time) == 0 else time)
         commands = Commands(layout, times, inputs, many=many)
         values: dict[str, Array] = {
@@ -221,13 +221,14 @@ class VehicleModel(Vehicle):
             **checked_start(start, layout, many=many),
             **checked_values("coefficients", coefficients, layout.coefficients, many=many),
         }
-        units = {v.name: v.unit for v in variables(self.rov) if v.causality != "parameter"}
+        units = {v.name: v.unit for v in variables(self) if v.causality != "parameter"}
         recorded = checked_record(record, layout, units)
         vehicles = number_of_vehicles(values)
         try:
             attitude = QUATERNION if layout.has_attitude else ()
-            recording = [*recorded, *(name for name in attitude if name not in recorded)]
-            found = simulate(self.rov, commands.time, values, recording, vehicles=vehicles, workers=workers)
+            others = (*attitude, *(() if many else layout.commands))
+            recording = [*recorded, *(name for name in others if name not in recorded)]
+            found = simulate(self, commands.time, values, recording, vehicles=vehicles, workers=workers)
         except MemoryError as error:
             size = 8e-9 * vehicles * len(commands.time) * len(recorded)
             raise InputError(
@@ -245,4 +246,6 @@ class VehicleModel(Vehicle):
             {name: units[name] for name in recorded},
             tuple(name for name in recorded if name in layout.state),
             np.flatnonzero(found.failed < len(commands.time)),
+            {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
+            "us" if layout.pulse else "1",
         )

@@ -1,7 +1,7 @@
 """The result of a simulation: arrays by the names of the variables, which can become a data frame or a plot."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,12 +9,38 @@ from numpy.typing import NDArray
 
 from rov_fmu.io.messages import InputError, UnknownNameError, only
 from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.catalogue import AXES
+from rov_fmu.tank.columns import in_degrees
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+_QUANTITIES = {
+    "m/s": "velocity",
+    "deg/s": "rate of turn",
+    "m": "position",
+    "deg": "angle",
+    "m/s2": "acceleration",
+    "deg/s2": "angular acceleration",
+    "N": "force",
+    "N.m": "torque",
+    "1": "command",
+    "us": "command",
+}
+"""What a variable is, by its unit."""
+_SMALL = ("thrust", "command")
+"""The quantities of all thrusters, which share a small panel."""
+_WORDS = {axis.velocity: axis.name for axis in AXES.values()} | {
+    "x": "north",
+    "y": "east",
+    "z": "depth",
+    "phi": "roll",
+    "theta": "pitch",
+    "psi": "heading",
+}
+"""The variables that have a name in words."""
 _DASH = 4.0
 """The length of a dash, in widths of a line."""
 
@@ -36,6 +62,10 @@ class Result(Mapping[str, Array]):
     """The recorded variables that are states."""
     failed: NDArray[np.intp]
     """The numbers of the vehicles whose motion could not be computed to the end; their arrays end with NaN."""
+    commands: Mapping[str, Array] = field(default_factory=dict)
+    """The commands of one vehicle at the times, as its inputs have them; empty for many vehicles."""
+    command_unit: str = "1"
+    """Their unit: 1 for fractions, us for pulse widths."""
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of a variable. Raises UnknownNameError, a KeyError, if it was not recorded."""
@@ -90,41 +120,72 @@ class Result(Mapping[str, Array]):
         return pd.DataFrame({name: values.ravel() for name, values in self.arrays.items()}, index)
 
     def plot(self, names: str | Sequence[str] | None = None, figure: "Figure | None" = None) -> "Figure":
-        """Plot variables over time, one panel for each unit, and return the figure of Matplotlib.
+        """Plot variables over time, one panel for each quantity, and return the figure of Matplotlib.
 
-        `names` are the variables; the default is all. The default of `figure` is a new figure of pyplot.
+        `names` are the variables. The default is all that are ever different from 0, without the quaternion, and the
+        commands. Angles are in degrees, and knots stand beside m/s. The default of `figure` is a new figure of pyplot.
         """
-        if figure is None:
-            import matplotlib.pyplot as plt
+        from matplotlib.style import context
 
-            figure = plt.figure(layout="constrained")
-        chosen = self.names if names is None else (names,) if isinstance(names, str) else tuple(names)
+        from rov_fmu.report.plots.svg import STYLE
+
+        with context(STYLE):
+            if figure is None:
+                import matplotlib.pyplot as plt
+
+                figure = plt.figure(layout="constrained")
+            self._draw(figure, names)
+        return figure
+
+    def _draw(self, figure: "Figure", names: str | Sequence[str] | None) -> None:
+        from rov_fmu.report.plots.svg import LIGHT, LINES, add_knots, draw_commands
+        from rov_fmu.report.templates import in_words
+
+        chosen = self._moving() if names is None else (names,) if isinstance(names, str) else tuple(names)
         if not chosen:
             raise InputError("names: must name a variable")
-        by_unit: dict[str, dict[str, Array]] = {}
-        for name in chosen:
-            by_unit.setdefault(self.units[name] if name in self else "", {})[name] = self[name]
-        figure.set_size_inches(7.0, 1.0 + 1.6 * len(by_unit))
-        panels = figure.subplots(len(by_unit), sharex=True, squeeze=False)[:, 0]
-        for panel, (unit, variables) in zip(panels, by_unit.items(), strict=True):
+        panels: dict[tuple[str, str], dict[str, Array]] = {}
+        for name in dict.fromkeys(chosen):
+            values = self[name]
+            factor, unit = in_degrees(self.units[name])
+            panels.setdefault((_quantity(name, unit), unit), {})[name] = factor * values
+        commands = {name: values for name, values in self.commands.items() if names is None and np.any(values)}
+        heights = [0.6 if quantity in _SMALL else 1.0 for quantity, _ in panels] + [0.6] * bool(commands)
+        figure.set_size_inches(8.0, 1.0 + 1.6 * sum(heights))
+        axes = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for panel, ((quantity, unit), variables) in zip(axes, panels.items(), strict=False):
             dashes = _dashes([*variables.values()])
             for n, (name, values) in enumerate(variables.items()):
+                faint = 1.0 if values.ndim == 1 else 0.3
                 lines = panel.plot(
                     self.time,
                     values.T,
-                    color=f"C{n % 10}",
+                    color=LIGHT[LINES[n % len(LINES)]],
                     linestyle=dashes[n],
-                    linewidth=1.0,
-                    alpha=1.0 if values.ndim == 1 else 0.3,
+                    linewidth=1.2,
+                    alpha=faint,
                 )
-                lines[0].set_label(name)
+                lines[0].set_label(f"{_WORDS[name]} ({name})" if name in _WORDS else name)
             low, high = panel.dataLim.intervaly
             if max(abs(low), abs(high)) > 0.0 and high - low < 1e-3 * max(abs(low), abs(high)):  # constant
                 panel.set_ylim(min(0.0, 1.1 * low), max(0.0, 1.1 * high))
-            panel.set_ylabel("" if unit == "1" else unit)
-            panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        panels[-1].set_xlabel("time (s)")
-        return figure
+            panel.set_title(in_words(quantity, unit), loc="left")
+            if unit == "m/s":
+                add_knots(panel)
+            panel.legend(loc="center left", bbox_to_anchor=(1.13, 0.5))
+        if commands:
+            draw_commands(axes[-1], self.time, commands, self.command_unit)
+        axes[-1].set_xlabel("time (s)")
+
+    def _moving(self) -> tuple[str, ...]:
+        """Return the variables that are ever different from 0, without the quaternion; the first one if none is."""
+        moving = tuple(name for name in self.names if name not in QUATERNION and np.any(self.arrays[name]))
+        return moving or self.names[:1]
+
+
+def _quantity(name: str, unit: str) -> str:
+    """Return what a panel shows, in words."""
+    return "thrust" if name.startswith("F_") and unit == "N" else _QUANTITIES.get(unit, "")
 
 
 def _dashes(curves: Sequence[Array]) -> list[Any]:

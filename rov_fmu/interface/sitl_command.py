@@ -57,7 +57,7 @@ def serve(path: Path, options: Options) -> None:
             ) from error
         connection = Connection(setup, lambda words: print_message(f"rov-fmu: {words}"))
         address, port = server.getsockname()
-        for line in _listed(setup.servos, setup.rov.layout):
+        for line in _listed(setup.servos, setup.vehicle.layout):
             paragraph(console(), line)
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
 
@@ -96,7 +96,7 @@ def _setup(path: Path, options: Options) -> Setup:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = {name: float(value) for name, value in inputs.items()} | given.start
     currents, interval = vehicle.electric_currents, 1.0 / options.log_rate
-    return Setup(vehicle.rov, servos, start, currents, options.bottom, options.log, interval, options.force)
+    return Setup(vehicle, servos, start, currents, options.bottom, options.log, interval, options.force)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

@@ -10,10 +10,9 @@ from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import check_targets
-from rov_fmu.model.layout import TUNING, Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import TUNING, Axis
 from rov_fmu.tank.columns import columns_of, refuse_slips
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
 
 
@@ -39,17 +38,19 @@ def tune_vehicle(
         check_targets([output], [*([points] if points else []), *vehicle.files])
         check_written(output, VEHICLE_FILE)
     if points is not None:
-        wanted = read_points(points, vehicle.rov, axis)
+        wanted = read_points(points, vehicle, axis)
     elif command is None or V_ss is None:
         raise InputError("tune: give --command and --v-ss (and --tau), or --points")
     else:
         wanted = [Target("V_ss", command, V_ss)] + ([] if Tau is None else [Target("Tau", command, Tau)])
     try:
-        tuning = tune(vehicle.rov, axis, wanted)
+        tuning = tune(vehicle, axis, wanted)
     except TuningError as error:
         raise InputError(f"tune: {error}") from error
     if output:
-        write_tuned(path, output, {name: tuning.rov[name] for name in map(axis.coefficient, TUNING)}, source(wanted))
+        write_tuned(
+            path, output, {name: tuning.vehicle[name] for name in map(axis.coefficient, TUNING)}, source(wanted)
+        )
     return tuning
 
 
@@ -59,7 +60,7 @@ def source(wanted: Sequence[Target]) -> str:
     return f"Tuned to {points}{', ...' if len(wanted) > 2 else ''}"
 
 
-def read_points(path: Path, rov: Rov, axis: Axis) -> list[Target]:
+def read_points(path: Path, vehicle: Vehicle, axis: Axis) -> list[Target]:
     """Read wanted points from a CSV file with command, velocity and time constant, which may have blanks.
 
     Raises DataFileError.
@@ -73,7 +74,7 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> list[Target]:
         for n, value in enumerate(table.values.get(column, ())):
             if isfinite(value):
                 points.append(Target(quantity, table.values["command"][n], value))
-                if reason := impossible(rov, axis, points[-1]):
+                if reason := impossible(vehicle, axis, points[-1]):
                     raise table.error(n, column, reason)
     if not any(point.quantity == "V_ss" for point in points):
         raise DataFileError(f"{path}: no row has a velocity, and alpha is tuned to velocities")

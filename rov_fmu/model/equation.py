@@ -15,9 +15,10 @@ from functools import cached_property, lru_cache
 from itertools import combinations
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
+from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
 from .expression import Expression, Name, Names, call, directed, of, product, scaled, total
 from .forces import COUPLING, Effect, Force, forces_of, thrusts
-from .layout import HEAVE, SURGE, SWAY, YAW, Layout, ThrustTable, cross_name
+from .layout import Layout, ThrustTable
 from .mass import MassMatrix
 from .thrust import steady_name, thrust_formulas
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from itertools import chain
 
 from .attitude import entry
+from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
 from .expression import Expression, Name, Names, call, directed, product, scaled, total
-from .layout import FAINT, HEAVE, REVERSE, YAW, Axis, Curve, Layout, cross_name, effect_along
+from .layout import FAINT, Curve, Layout, effect_along
 from .thrust import steady_name
 
 

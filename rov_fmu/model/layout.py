@@ -1,314 +1,57 @@
-"""The layout of a vehicle, and the declarations of its coefficients and variables (standard library only).
+"""The layout of a vehicle: its axes, thrust curves, thrusters and fins, and which coefficients it has.
 
-A layout says which axes, thrust curves, thrusters and fins a vehicle has, and which coefficients. It does not contain
-the values of the coefficients.
-
-Signs and symbols follow Fossen/SNAME and the paper. The axes of the body frame are x forward, y starboard and z down.
-The earth frame is north-east-down. u, v, w are the velocities in surge, sway and heave through the water, and p, q, r
-are the angular velocities in roll, pitch and yaw. Heave is positive down.
-
-A coefficient is declared by its key in the vehicle file. Its name in the FMU also contains the axis or the curve to
-which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the curve t200 gives a_t_t200_reverse.
+A layout does not contain the values of the coefficients. `catalogue.py` declares the kinds of coefficients and
+variables. Standard library only.
 """
 
-import re
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, pi, sin
+from math import inf, sin
 from typing import TypeVar
 
-from .attitude import INITIAL, QUATERNION
+from .catalogue import (
+    ANGLES,
+    ANGLES_AT_START,
+    ARM,
+    AT_ZERO,
+    ATTITUDE,
+    AXIS,
+    BODY,
+    COMMANDS,
+    CURRENT,
+    CURRENT_DOWN,
+    CURVE,
+    FIN,
+    HEADING,
+    HEAVE,
+    LEAST_BETA,
+    PITCH,
+    POSITION,
+    RESTORING,
+    REVERSE,
+    ROLL,
+    SURGE,
+    SWAY,
+    TUNING,
+    YAW,
+    Axis,
+    Declaration,
+    cited,
+    coefficient_name,
+    command_declaration,
+    cross_declaration,
+    cross_name,
+    declarations_of,
+    delayed_declaration,
+    delayed_name,
+    load_declaration,
+    velocity_declaration,
+    voltage_declaration,
+)
 from .expression import unused
 from .step import interpolated
-
-# ---- Axes ------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Axis:
-    """A kind of axis: its symbols, units and texts."""
-
-    name: str
-    velocity: str
-    """The symbol of the velocity: u, v, w, p, q or r. The names of the coefficients of the axis end in it."""
-    unit: str
-    """The unit of the velocity."""
-    positive: str
-    """The direction of a positive velocity, force or torque."""
-    negative: str
-    """The opposite direction."""
-    position: str
-    """The name of the position along the axis, as a sensor measures it. Its rate is the velocity."""
-    position_unit: str
-    """The unit of that position."""
-    load: str
-    """The unit of force or torque."""
-    external: str
-    """The name of the input for a force or torque from outside."""
-    inertia: str
-    """The coefficient that resists acceleration, together with the added mass: m_rov, I_p, I_q or I_r."""
-    equations: tuple[str, str]
-    """The numbers of the paper's equations of drag and motion."""
-    place: int
-    """The index of the axis in a vector (x, y, z)."""
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient of the axis by its key: a_d, b_d_reverse, alpha ..."""
-        return coefficient_name(key, self.velocity)
-
-    @property
-    def is_rotation(self) -> bool:
-        """True when the vehicle turns about the axis instead of moving along it."""
-        return self.unit == "rad/s"
-
-    @property
-    def push(self) -> str:
-        """The word for the effect of thrusters along the axis: thrust or torque."""
-        return "torque" if self.is_rotation else "thrust"
-
-
-SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"), 0)
-SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"), 1)
-HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"), 2)
-ROLL = Axis(
-    "roll",
-    "p",
-    "rad/s",
-    "starboard side down",
-    "port side down",
-    "roll angle",
-    "rad",
-    "N.m",
-    "K_ext",
-    "I_p",
-    ("(18)", "(18)"),
-    0,
-)
-PITCH = Axis(
-    "pitch", "q", "rad/s", "bow up", "bow down", "pitch angle", "rad", "N.m", "M_ext", "I_q", ("(18)", "(18)"), 1
-)
-YAW = Axis(
-    "yaw",
-    "r",
-    "rad/s",
-    "bow to starboard",
-    "bow to port",
-    "heading",
-    "rad",
-    "N.m",
-    "N_ext",
-    "I_r",
-    ("(16)", "(18c)"),
-    2,
-)
-AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, ROLL, PITCH, YAW)}
-"""All kinds of axes by name, in the order of their states."""
-COUPLED_AXES = (SURGE, SWAY, YAW)
-"""The axes that the Coriolis and Munk terms couple in a vehicle without roll and pitch."""
-
-
-_PAPER = "Enevoldsen et al. 2018"
-
-
-def cited(reference: str) -> str:
-    """Return a reference with its source: a bare number in brackets, such as (9), is an equation of the paper."""
-    return f"equation {reference} of {_PAPER}" if re.fullmatch(r"\(\d+[a-z]?\)", reference) else reference
-
-
-# ---- Kinds of coefficients -------------------------------------------------------------------------------------------
-
-REVERSE = "_reverse"
-"""The end of the keys of coefficients for negative commands or velocities."""
-
-
-def cross_name(key: str, *velocities: str) -> str:
-    """Return the name in the FMU of a coefficient of two or three axes: m_a_uq, or Y_ur for lift."""
-    if key == "lift":
-        along, *factors = velocities
-        return f"{dict(zip('uvwpqr', 'XYZKMN', strict=True))[along]}_{''.join(factors)}"
-    return f"{key}_{''.join(velocities)}"
-
-
-def cross_of(name: str) -> tuple[str, ...] | None:
-    """Return the key and the velocities of a coefficient of two or three axes, by its name, or None."""
-    if found := re.fullmatch(r"(m_a|b_d|a_d)_([uvwpqr])([uvwpqr])", name):
-        return found.groups()
-    if found := re.fullmatch(r"([XYZKMN])_([uvwpqr])([uvwpqr])", name):
-        return ("lift", "uvwpqr"["XYZKMN".index(found[1])], found[2], found[3])
-    return None
-
-
-def cross_declaration(key: str, *velocities: str) -> "Declaration":
-    """Return the declaration of a coefficient of two or three axes."""
-    axes = {axis.velocity: axis for axis in AXES.values()}
-    first, *others = (axes[velocity] for velocity in velocities)
-    rotations = sum(axis.is_rotation for axis in (first, *others))
-    lengths = ".".join(axis.position_unit for axis in others)
-    return CROSS[key].declaration(
-        inertia=("kg", "kg.m", "kg.m2")[min(rotations, 2)],
-        load=first.load,
-        axis=first.name,
-        other=others[0].name,
-        axes=" and ".join(axis.name for axis in (others if key == "lift" else (first, *others))),
-        length=others[0].position_unit,
-        lengths={"m.m": "m2", "rad.rad": "rad2"}.get(lengths, "(m.rad)"),
-    )
-
-
-def delayed_name(command: str) -> str:
-    """Return the name of a command that acts after the dead time."""
-    return f"delayed_{command}"
-
-
-def coefficient_name(key: str, of: str) -> str:
-    """Return the name in the FMU of a coefficient of a curve or of an axis."""
-    stem = key.removesuffix(REVERSE)
-    return f"{stem}_{of}{key[len(stem) :]}"
-
-
-@dataclass(frozen=True)
-class Declaration:
-    """The declaration of a coefficient or a variable: SI unit, description, bounds (included), and a typical size."""
-
-    unit: str
-    description: str
-    minimum: float = -inf
-    maximum: float = inf
-    nominal: float = 1.0
-    tunable: bool = False
-    start: float = 0.0
-    """The value of an input that is not given. A delayed command also has it until the first change arrives."""
-
-
-@dataclass(frozen=True)
-class CoefficientKind:
-    """A kind of coefficient.
-
-    `unit` and `words` are templates. Their fields {...} are filled with the texts of an axis or a curve.
-    """
-
-    unit: str
-    words: str
-    minimum: float
-    maximum: float
-    needed: bool = True
-    tunable: bool = False
-
-    def declaration(self, **of: str) -> Declaration:
-        """Return the declaration of this coefficient for one axis or curve. `of` has the texts for the fields."""
-        words = self.words.format(**of)
-        return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
-
-
-BODY = {
-    "m_rov": CoefficientKind("kg", f"Mass m_rov, equations (3a) and (3b) of {_PAPER}", 1e-3, 1e6),
-    "I_p": CoefficientKind("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
-    "I_q": CoefficientKind("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
-    "I_r": CoefficientKind("kg.m2", f"Moment of inertia about the vertical axis I_r, {cited('(3c)')}", 1e-6, 1e6),
-}
-RESTORING = {
-    "W": CoefficientKind("N", "Weight W", 0.0, 1e8),
-    "B": CoefficientKind("N", "Buoyancy B", 0.0, 1e8),
-    "x_G": CoefficientKind("m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False),
-    "y_G": CoefficientKind("m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False),
-    "z_G": CoefficientKind("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False),
-    "x_B": CoefficientKind("m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False),
-    "y_B": CoefficientKind("m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False),
-    "z_B": CoefficientKind("m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False),
-}
-"""The weight and the buoyancy of a vehicle, with their centres."""
-CROSS = {
-    "m_a": CoefficientKind("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
-    "b_d": CoefficientKind("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),
-    "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic damping a_d in {axis} by {other}", -1e6, 1e6),
-    "lift": CoefficientKind("{load}.s2/{lengths}", "Lift in {axis} by {axes}", -1e6, 1e6),
-}
-"""The coefficients of two or three axes.
-
-Their names end in the velocities, as in m_a_uq. The name of a lift begins with the letter of the force, as in Y_ur."""
-COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
-"""The coefficients of all commands together."""
-_QUARTER = 1.5708
-"""A quarter of a turn, rad. It is rounded up, because a file may have 1.5708."""
-ARM = {
-    "R": CoefficientKind("m", f"Distance from the centre of mass to a rear thruster R, {cited('(4)')}", 0.0, 100.0),
-    "gamma": CoefficientKind(
-        "rad", f"Angle of the rear thrusters' force about the centre of mass γ, {cited('(4)')}", 0.0, _QUARTER
-    ),
-}
-FIN = {
-    "lift": CoefficientKind("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
-    "drag": CoefficientKind(
-        "N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, needed=False
-    ),
-    "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
-}
-"""The coefficients of a control surface."""
-CURVE = {
-    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
-    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
-    "n_V": CoefficientKind(
-        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False
-    ),
-    "a_t": CoefficientKind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
-    "b_t": CoefficientKind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
-    "a_t_reverse": CoefficientKind(
-        "N", "Quadratic thrust coefficient a_t of the {curve} in reverse", -1e6, 1e6, needed=False
-    ),
-    "b_t_reverse": CoefficientKind(
-        "N", "Linear thrust coefficient b_t of the {curve} in reverse", -1e6, 1e6, needed=False
-    ),
-    "c_0": CoefficientKind(
-        "1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False
-    ),
-    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
-    "d": CoefficientKind(
-        "N.s/m", "Loss of thrust d of the {curve} per speed of advance at full command", 0.0, 1e6, needed=False
-    ),
-    "d_reverse": CoefficientKind(
-        "N.s/m", "Loss of thrust d of the {curve} per speed of advance in reverse", 0.0, 1e6, needed=False
-    ),
-    "T": CoefficientKind(
-        "s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False
-    ),
-}
-REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
-"""The keys of CURVE that a curve with measured forces does not have."""
-AXIS = {
-    "m_a": CoefficientKind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
-    "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
-    "b_d": CoefficientKind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}, {drag}", 0.0, 1e6),
-    "a_d_reverse": CoefficientKind(
-        "{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6, needed=False
-    ),
-    "b_d_reverse": CoefficientKind(
-        "{load}.s/{length}", "Linear drag coefficient b_d of {axis} {negative}", 0.0, 1e6, needed=False
-    ),
-    "F_0": CoefficientKind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
-}
-_AT_ZERO = "; at 0 the velocity never changes"
-"""The end of the description of β for the axes whose β may be 0."""
-TUNING = {
-    "alpha": CoefficientKind(
-        "1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, needed=False, tunable=True
-    ),
-    "beta": CoefficientKind(
-        "1",
-        "Tuning β_{velocity}: scales acceleration in {axis}, {motion}" + _AT_ZERO,
-        0.0,
-        1e3,
-        needed=False,
-        tunable=True,
-    ),
-}
-"""The tuning factors of every axis; each is 1 unless the file gives it."""
-LEAST_BETA = 1e-3
-"""The least β of coupled axes."""
-
-
-# ---- Layout ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -367,8 +110,8 @@ class Curve:
     """The keys of CURVE that the vehicle has."""
     together: int = 1
     description: str = ""
-    equation: str = "(2)"
-    """The number of the paper's equation, or another source."""
+    equation: str = ""
+    """Where the curve is published: the number of an equation of the paper, or another source."""
     tables: tuple[ThrustTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
     others: tuple[tuple[str, str], ...] = ()
@@ -636,7 +379,7 @@ class Layout:
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
             for axis in (form.axis for form in self.axes if self.has_attitude or form.axis is not HEAVE):
                 beta = axis.coefficient("beta")
-                description = found[beta].description.removesuffix(_AT_ZERO)
+                description = found[beta].description.removesuffix(AT_ZERO)
                 found[beta] = replace(found[beta], description=description, minimum=LEAST_BETA)
         return found
 
@@ -650,17 +393,7 @@ class Layout:
             words = {name: f"Command u_{name} of {_listed(gains)}" for name, gains in self.mix.items()}
         else:
             words = {driven.name: _command(driven) for driven in self.driven}
-        return {f"u_{name}": self._commanding(text) for name, text in words.items()}
-
-    def _commanding(self, words: str) -> Declaration:
-        """Return the declaration of a command, which `words` describe."""
-        if self.pulse is None:
-            return Declaration("1", f"{words}; saturates at ±1", -1.0, 1.0)
-        low, neutral, high = self.pulse
-        text = (
-            f"{words}; pulse width, {neutral:g} is neutral, saturates at {low:g} and {high:g}; 0 is no signal: neutral"
-        )
-        return Declaration("us", text, low, high, neutral, start=neutral)
+        return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
 
     def command_of(self, fraction: float) -> float:
         """Return the value of a command that stands for a fraction: the fraction itself, or the pulse width."""
@@ -682,31 +415,19 @@ class Layout:
         """The commands that act after the dead time, if the vehicle has one."""
         if not self.has_dead_time:
             return {}
-        return {
-            delayed_name(name): Declaration(
-                declaration.unit, f"Command {name} that acts after the dead time", start=declaration.start
-            )
-            for name, declaration in self.commands.items()
-        }
+        return {delayed_name(name): delayed_declaration(name, command) for name, command in self.commands.items()}
 
     @cached_property
     def inputs(self) -> dict[str, Declaration]:
         """The inputs: commands, loads from outside, current, voltage."""
         found = dict(self.commands)
-        for form in self.axes:
-            axis = form.axis
-            example = "ballast" if axis is HEAVE else "contact"
-            words = f"Load from outside in {axis.name} (tether, {example}), positive {axis.positive}"
-            found[axis.external] = Declaration(axis.load, words, nominal=1.0 if axis.is_rotation else 10.0)
+        found |= {form.axis.external: load_declaration(form.axis) for form in self.axes}
         if self.has(SURGE, SWAY) or (self.has_attitude and self.has(HEAVE)):
-            for name, direction in (("V_N", "northward"), ("V_E", "eastward")):
-                found[name] = Declaration("m/s", f"Velocity of a steady horizontal current, {direction}")
-            if self.has_attitude:
-                found["V_D"] = Declaration("m/s", "Velocity of a steady current, downward")
+            found |= CURRENT | (CURRENT_DOWN if self.has_attitude else {})
         if self.voltage is not None:
             lows, highs = zip(*(self.voltage_ranges or [(0.0, inf)]), strict=True)
             low, high = min(lows), max(highs)
-            found["voltage"] = Declaration("V", "Voltage of the battery", low, high, 10.0, start=self.voltage)
+            found["voltage"] = voltage_declaration(low, high, self.voltage)
         return found
 
     @cached_property
@@ -729,12 +450,7 @@ class Layout:
     @cached_property
     def velocities(self) -> dict[str, Declaration]:
         """The velocities through the water, which are the first states."""
-        found = {}
-        for axis in (form.axis for form in self.axes):
-            through = "" if axis.is_rotation else " through the water"
-            words = f"{axis.name.capitalize()} velocity {axis.velocity}{through}, positive {axis.positive}"
-            found[axis.velocity] = Declaration(axis.unit, words)
-        return found
+        return {form.axis.velocity: velocity_declaration(form.axis) for form in self.axes}
 
     @cached_property
     def pose(self) -> dict[str, Declaration]:
@@ -742,22 +458,11 @@ class Layout:
 
         These states come after the velocities.
         """
-        found = {}
         if self.has_attitude:
-            if self.has(SURGE, SWAY, HEAVE):
-                found["x"] = Declaration("m", "Position north x", nominal=10.0)
-                found["y"] = Declaration("m", "Position east y", nominal=10.0)
-                found["z"] = Declaration("m", "Depth z, positive down", nominal=10.0)
-            found |= {name: Declaration("1", f"Attitude quaternion {name}") for name in QUATERNION}
-            return found
-        if self.has(SURGE, SWAY):
-            found["x"] = Declaration("m", "Position north x", nominal=10.0)
-            found["y"] = Declaration("m", "Position east y", nominal=10.0)
-        if self.has(HEAVE):
-            found["z"] = Declaration("m", "Depth z, positive down", nominal=10.0)
-        if self.has(YAW):
-            found["psi"] = Declaration("rad", "Heading ψ, positive north to east, not wrapped")
-        return found
+            return (POSITION if self.has(SURGE, SWAY, HEAVE) else {}) | ATTITUDE
+        changed = {"x": (SURGE, SWAY), "y": (SURGE, SWAY), "z": (HEAVE,)}
+        position = {name: declaration for name, declaration in POSITION.items() if self.has(*changed[name])}
+        return position | (HEADING if self.has(YAW) else {})
 
     @cached_property
     def lagging(self) -> dict[str, Declaration]:
@@ -785,21 +490,14 @@ class Layout:
         }
         for curve in self.turning_curves:
             of = f"of the {curve.description}" if curve.description else curve.name
-            by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
             words = f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard"
-            found[f"tau_{curve.name}"] = Declaration("N.m", f"{words}, {cited('(4)')}" if by_arm else words)
+            found[f"tau_{curve.name}"] = Declaration("N.m", words)
         return found | self.angles
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:
         """The Euler angles, which are calculated from the quaternion."""
-        if not self.has_attitude:
-            return {}
-        return {
-            "phi": Declaration("rad", "Roll angle φ, positive starboard side down", -pi, pi),
-            "theta": Declaration("rad", "Pitch angle θ, positive bow up", -pi / 2, pi / 2),
-            "psi": Declaration("rad", "Heading ψ, positive north to east, not wrapped"),
-        }
+        return ANGLES if self.has_attitude else {}
 
     @cached_property
     def at_rest(self) -> dict[str, float]:
@@ -809,9 +507,7 @@ class Layout:
     @cached_property
     def initial(self) -> dict[str, Declaration]:
         """The parameters that give the attitude at the start."""
-        if not self.has_attitude:
-            return {}
-        return {name: Declaration("rad", f"{words} at the start") for name, words in INITIAL.items()}
+        return ANGLES_AT_START if self.has_attitude else {}
 
     @cached_property
     def places(self) -> dict[str, int]:
@@ -828,25 +524,6 @@ class Layout:
         """The curves whose thrusters turn the vehicle."""
         driving = {t.curve for t in self.drivers(YAW)} if self.has(YAW) else set()
         return tuple(curve for curve in self.curves if curve.name in driving)
-
-
-def declarations_of(axis: Axis) -> dict[str, Declaration]:
-    """Return the declarations of all coefficients that an axis can have, by their keys."""
-    drag, motion = map(cited, axis.equations)
-    words = {
-        "axis": axis.name,
-        "velocity": axis.velocity,
-        "push": axis.push,
-        "drag": drag,
-        "motion": motion,
-        "load": axis.load,
-        "length": axis.position_unit,
-        "inertia": BODY[axis.inertia].unit,
-        "what": "moment of inertia" if axis.is_rotation else "mass",
-        "positive": axis.positive,
-        "negative": axis.negative,
-    }
-    return {key: kind.declaration(**words) for key, kind in (AXIS | TUNING).items()}
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -874,7 +551,7 @@ def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
     words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
     rest = ", in water at rest" if "d" in curve.keys else ""
-    return Declaration("N", f"{words}{share}{rest}, positive {_pushes(thruster.direction)}, {cited(curve.equation)}")
+    return Declaration("N", f"{words}{share}{rest}, positive {_pushes(thruster.direction)}{cited(curve.equation)}")
 
 
 def arm(R: float, gamma: float) -> float:

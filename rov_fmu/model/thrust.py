@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+from .catalogue import REVERSE, delayed_name
 from .expression import (
     Expression,
     Name,
@@ -18,7 +19,7 @@ from .expression import (
     total,
     where,
 )
-from .layout import REVERSE, Curve, Layout, delayed_name
+from .layout import Curve, Layout
 
 Formulas = dict[str, Expression]
 _VOLTAGE = Name("voltage")

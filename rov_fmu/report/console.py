@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich import box
-from rich.cells import cell_len
 from rich.console import Console
-from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -80,33 +78,15 @@ def print_end(written: Sequence[Path], following: str = "") -> None:
 
 
 def print_table(found: Table, out: Console | None = None) -> None:
-    """Print a table between its title and its caption, which are paragraphs.
-
-    Numbers are never truncated. If the terminal is too narrow for a row, each row is printed as a paragraph.
-    """
+    """Print a table with its title and its caption. A pipe or a file gets whole lines, and a narrow terminal wraps
+    cells."""
     out = out or console()
-    if found.title:
-        paragraph(out, str(found.title))
-    caption, found.title, found.caption = found.caption, None, None
-    for column in found.columns:
-        if column.no_wrap:
-            lines = str(column.header).splitlines() + [one_line(str(cell)) for cell in column.cells]
-            column.min_width = max(map(cell_len, lines), default=0)
-    least = Measurement.get(out, out.options.update(max_width=10_000), found).minimum
-    if not out.is_terminal:
-        out.width = max(out.width, least)
-    if least <= out.width and out.is_terminal:
+    if out.is_terminal:
         out.print(found)
-    elif least <= out.width:
-        for line in out.render_lines(found, pad=False):
-            out.print("".join(segment.text for segment in line).rstrip(), soft_wrap=True)
-    else:
-        headers = [" ".join(str(column.header).split()) for column in found.columns[1:]]
-        for first, *cells in zip(*(map(str, column.cells) for column in found.columns), strict=True):
-            values = ", ".join(f"{header} {cell}".strip() for header, cell in zip(headers, cells, strict=True) if cell)
-            paragraph(out, f"{first}: {values}".removesuffix(": "))
-    if caption:
-        paragraph(out, str(caption))
+        return
+    out.width = max(out.width, out.measure(found, options=out.options.update(max_width=10_000)).maximum)
+    for line in out.render_lines(found, pad=False):
+        out.print("".join(segment.text for segment in line).rstrip(), soft_wrap=True)
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
@@ -155,7 +135,7 @@ def _deviation(f: "Finding") -> tuple[str, str]:
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
     """Return a published table with the printed, computed and measured values side by side."""
-    values = ", ".join(f"{name} = {vehicle.rov[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
+    values = ", ".join(f"{name} = {vehicle[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
     compared = [f"{model}\nprinted|\nmodel|\ndev." for model in ("non-linear", "scaled")]
     headers = "|".join([*compared, "\ntest|\ndev."]).split("|")
     title = f"Table {t.number}. {t.axis.name.capitalize()}, {values}; V_ss in {t.axis.unit}, Tau in s"
@@ -184,15 +164,12 @@ def _model(cell: Cell) -> Iterator[str]:
 
 def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:
     """Return an empty table with a first column, then columns of numbers, then columns of texts."""
-    result = Table(
-        title=title,
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
-    result.add_column(Text(first), no_wrap=True)
+    result = Table(title=title or None, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
+    result.title_style = result.caption_style = ""
+    result.title_justify = result.caption_justify = "left"
+    result.add_column(Text(first), overflow="fold")
     for header in numbers:
-        result.add_column(Text(header), justify="right", no_wrap=True)
+        result.add_column(Text(header), justify="right", overflow="fold")
     for header in texts:
         result.add_column(header)
     return result

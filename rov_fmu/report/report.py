@@ -1,7 +1,7 @@
 """The identification report: one HTML file with the verdicts, the answers, the predictions, and all that is known."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date, datetime, timezone
 from functools import partial
 from itertools import count
@@ -9,22 +9,27 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from rov_fmu.identify.findings import answer_at, by_heading, relative_error
-from rov_fmu.identify.result import Identification
+from rov_fmu.fmu.card import card
+from rov_fmu.identify import findings
+from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output, sealed
-from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_prediction
-from rov_fmu.report.plots.svg import inline_svg, with_even_text
-from rov_fmu.report.templates import page
+from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
+from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
+from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.columns import in_degrees
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _SIZE = 3.7, 2.7
-"""The size of every plot, inches. All plots of a page are as wide, so that their text has the same size."""
+"""The size of a plot, inches. All plots but the first are as wide, so that their text has the same size."""
 _PLOTS: Mapping[str, Callable[..., None]] = {
+    "overview": plot_overview,
     "prediction": plot_prediction,
     "answers": plot_answers,
     "forces": plot_forces,
 }
+_BROAD = 7.2
+"""The width of the large picture on a wide page, inches."""
 
 
 def report_output(results: Identification, path: Path, on_progress: Progress = silent) -> Output:
@@ -41,25 +46,71 @@ def _today() -> date:
 
 def report_page(results: Identification, on_progress: Progress = silent, *, made: date | None = None) -> str:
     """Return the report as HTML. The same identification and date (today by default) always give the same text."""
-    mains = [result.main for result in results.axes if result.main]
     curves = {p.subject: [q for q in results.forces if q.subject == p.subject] for p in results.forces}
+    shown = _shown(results.axes)
     drawn = count()
-    total = len(curves) + sum(2 + len(result.predictions) for result in results.axes) + bool(mains)
+    total = len(curves) + sum(2 * bool(r.answers) + len(r.predictions) for r in results.axes) + 2 * bool(shown)
 
-    def plot(label: str, kind: str, **content: object) -> Markup:
+    def plot(label: str, kind: str, size: tuple[float, float] = _SIZE, salt: str = "", **content: object) -> Markup:
         on_progress(f"drawing: {label}", next(drawn) / total)
-        return inline_svg(label, with_even_text(partial(_PLOTS[kind], **content)), _SIZE)
+        return inline_svg(label, with_even_text(partial(_PLOTS[kind], **content)), size, salt=salt, marked=True)
 
     return page(
         "report.html.j2",
         vehicle=results.vehicle,
         results=results,
         made=made or _today(),
-        findings=by_heading(results.findings),
-        shown=max(mains, key=lambda p: p.error / max(p.unchanged, 1e-12), default=None),
+        findings=findings.by_heading(results.findings),
+        next_tests=findings.next_tests(results.axes),
+        shown=shown,
         forces=curves,
         plot=plot,
-        answer_at=answer_at,
-        relative_error=relative_error,
+        picture=_picture(results, shown, partial(plot, "Main prediction", "overview")) if shown else None,
+        script=inline_script("plots.js"),
+        card=card(results.vehicle),
+        SHARES=findings.SHARES,
+        STOPPING=findings.STOPPING,
+        KNOTS=KNOTS,
+        answer_at=findings.answer_at,
+        by=_by,
+        by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
+        relative_error=findings.relative_error,
+        size_in_words=findings.size_in_words,
+        with_stop=findings.with_stop,
         in_degrees=in_degrees,
     )
+
+
+def _shown(axes: Sequence[AxisResult]) -> list[Prediction]:
+    """Return the predictions of one log, one of each axis: of the log whose main prediction is the least accurate."""
+    mains = [result.main for result in axes if result.main]
+    if not mains:
+        return []
+    file = max(mains, key=lambda p: p.error / max(p.unchanged, 1e-12)).file
+    found = []
+    for result in axes:
+        own = [p for p in result.predictions if p.file == file and p.is_judged]
+        found += sorted(own, key=lambda p: not p.is_position)[:1]
+    return found or [p for p in mains if p.file == file]
+
+
+def _picture(results: Identification, shown: Sequence[Prediction], plot: Callable[..., Markup]) -> Markup:
+    """Return the large picture twice, broad and for phones, of which the page shows one."""
+    log = next((log for log in results.folder.logs if log.file == shown[0].file), None)
+    height = 1.4 + 1.3 * len(shown)
+    sizes = {"broad": (_BROAD, height), "narrow": (_SIZE[0], height)}
+    drawn = [
+        Markup('<div class="{}">{}</div>').format(key, plot(size, key, shown=shown, log=log))
+        for key, size in sizes.items()
+    ]
+    return Markup("").join(drawn)
+
+
+def _by(p: Point, other: Vehicle) -> float | None:
+    """Return the value of a point by another vehicle; None if it lacks the curve or the axis."""
+    layout = other.layout
+    if p.quantity == "force":
+        curve = layout.curves_by_name.get(p.subject)
+        return other.curve_force(curve, p.command) if curve else None
+    form = layout.kinds.get(p.subject)
+    return other.response(form.axis, p.command)[p.quantity == "Tau"] if form else None

@@ -1,8 +1,13 @@
 """Render pages from templates, with filters that format numbers and units for readers."""
 
+import base64
+import hashlib
 import re
+from dataclasses import dataclass
 from math import isfinite, isnan
 from pathlib import Path
+
+from markupsafe import Markup
 
 from rov_fmu.io.templates import render
 from rov_fmu.report.plots.svg import PALETTE
@@ -10,16 +15,33 @@ from rov_fmu.vehicle import uncertainty
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """The translation of digits to superscripts."""
+_TEMPLATES = Path(__file__).parent / "templates"
+_FOR_READERS = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ |^ +|^\n")
+"""Comments, types and indents are for readers of a script. They are a third of it, and are left out of pages."""
+
+
+@dataclass(frozen=True)
+class Script:
+    """A script in a page, and the directive of the page's content security policy that allows it."""
+
+    text: Markup
+    policy: str
+
+
+def inline_script(*names: str, folder: Path = _TEMPLATES) -> Script:
+    """Return scripts, one after the other, without what only readers of their source need."""
+    text = _FOR_READERS.sub("", "".join((folder / name).read_text(encoding="utf-8") for name in names))
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+    return Script(Markup(text), f"; script-src 'sha256-{digest}'")
 
 
 def page(template: str, **content: object) -> str:
     """Return a page made from a template; the functions of this module are its filters."""
     return render(
         template,
-        Path(__file__).parent / "templates",
+        _TEMPLATES,
         number=number,
         text=text,
-        two_digits=two_digits,
         unit=pretty_unit,
         with_interval=with_interval,
         sentence=sentence,
@@ -37,6 +59,7 @@ def number(value: float | None, digits: int | None = None) -> str:
     """
     if value is None or not isfinite(value):
         return "–"
+    value += 0.0  # makes 0 of -0
     is_short = digits is None and len(repr(value)) <= 9 and abs(value) < 1e5
     return _with_signs(repr(value).removesuffix(".0") if is_short else f"{value:.{digits or 6}g}")
 
@@ -56,11 +79,6 @@ def _with_signs(text: str) -> str:
     return text.replace("-", "−")
 
 
-def two_digits(value: float) -> str:
-    """Return a number for readers with two significant digits: 420 and 0.010."""
-    return _with_signs(uncertainty.significant(value, 2)) if isfinite(value) else number(None)
-
-
 def text(value: float | None, form: str) -> str:
     """Return a number in a format, or a dash for None and NaN."""
     if value is None or isnan(value):
@@ -71,16 +89,22 @@ def text(value: float | None, form: str) -> str:
 def sentence(text: str) -> str:
     """Return a text with a capital first letter, except where it begins with the name of a file."""
     text = readable(text)
-    return text if "." in text.partition(":")[0] else text[:1].upper() + text[1:]
+    return text if re.search(r"\.[A-Za-z]", text.partition(":")[0]) else text[:1].upper() + text[1:]
 
 
 def readable(text: str) -> str:
-    """Return a sentence with minus signs, with spaces before percent signs, and with µs for us."""
+    """Return a sentence with minus signs, spaces before percent signs, µs for us, and ° for deg."""
     text = re.sub(r"(?<=[\s(])-(?=\d)", "−", text)
     text = re.sub(r"(?<=\d)%(?=[\s,.;)]|$)", " %", text)
-    return re.sub(r"(?<=\d )us\b", "µs", text)
+    return re.sub(r"(?<=\d )us\b", "µs", re.sub(r"(?<=\d )deg\b", "°", text))
 
 
 def pretty_unit(unit: str) -> str:
     """Return a unit for readers: N.m.s2/rad2 becomes N·m·s²/rad²."""
     return {"1": "1", "us": "µs", "deg": "°", "deg/s": "°/s"}.get(unit) or unit.translate(RAISED).replace(".", "·")
+
+
+def in_words(quantity: str, unit: str) -> str:
+    """Return the title of a panel: the quantity in words, and its unit if there is one."""
+    shown = pretty_unit(unit) if unit != "1" else ""
+    return f"{quantity[:1].upper()}{quantity[1:]}{f' ({shown})' if shown else ''}"

@@ -27,24 +27,14 @@ from rov_fmu.io.toml_file import (
     read_toml,
     validate,
 )
-from rov_fmu.model.layout import (
-    AXES,
-    AXIS,
-    CURVE,
-    PITCH,
-    REVERSE,
-    ROLL,
-    Declaration,
-    Layout,
-    VehicleAxis,
-    coefficient_name,
-)
+from rov_fmu.model.catalogue import AXES, AXIS, CURVE, PITCH, REVERSE, ROLL, Declaration, coefficient_name
+from rov_fmu.model.layout import Layout, VehicleAxis
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Finite, Quantity
-from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, keys_in_file
+from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, keys_in_file, with_missing_keys
 from rov_fmu.vehicle.shipped import PAPER, PAPER_SOURCES, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -180,7 +170,7 @@ class TankLimits(Strict):
     """The longest recording, s."""
 
 
-class RovTables(OpenHardware):
+class RovTables(Tables):
     """The tables of rov.toml that could be read."""
 
     base: _VehicleFile | None = None
@@ -205,12 +195,6 @@ class RovTables(OpenHardware):
     """What the logs do not tell."""
     limits: TankLimits = TankLimits()
     """The most that a proposed test may take."""
-
-
-class _RovFile(RovTables):
-    """The schema of rov.toml with every key optional, for a file with mistakes."""
-
-    vehicle: Head
 
 
 # ---- The description -------------------------------------------------------------------------------------------------
@@ -284,7 +268,8 @@ NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
 def read_description(path: Path) -> RovFile:
     """Read rov.toml. Raises VehicleFileError where there is no such file, or where it is not TOML."""
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
-    _, problems = validate(data, _RovFile, **context)
+    _, problems = validate(data, RovTables, **context)
+    problems = with_missing_keys(problems, data, RovTables, ("vehicle",), ("fin",))
     file, lost = readable_parts(data, problems, context, RovTables)
     base, base_mistakes = _load_base(file)
     mistakes = [*_hardware_mistakes(file, lost, data)]
@@ -296,14 +281,14 @@ def read_description(path: Path) -> RovFile:
         unknown = {("known", name) for name in description.named if name not in possible}
         problems = [problem for problem in problems if problem["loc"][:2] not in unknown]
         mistakes = [*_mistakes(file, lost, description)]
-    lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes))
+    lines = lines_on(path, (*problem_lines(problems, data, RovTables), *mistakes))
     explains_files = not (lost & {*_FILE_TABLES} or _misspelt(lost, _FILE_TABLES))
     return RovFile(description, lines + base_mistakes, file, explains_files)
 
 
 def _misspelt(lost: Iterable[str], tables: Collection[str]) -> bool:
     """Return True if the name of an unknown table is similar to one of these, such as [boddy] to [body]."""
-    return any(similar(name, tables) for name in lost if name not in _RovFile.model_fields)
+    return any(similar(name, tables) for name in lost if name not in RovTables.model_fields)
 
 
 def _load_base(file: RovTables) -> tuple[Vehicle | None, list[str]]:
@@ -377,7 +362,7 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
     declarations = vehicle.layout.coefficients
     return {
         name: Quantity(
-            value=vehicle.rov[name], unit=declarations[name].unit, source=source, interval=vehicle.intervals.get(name)
+            value=vehicle[name], unit=declarations[name].unit, source=source, interval=vehicle.intervals.get(name)
         )
         for name, source in vehicle.sources.items()
         if source != NOT_GIVEN

@@ -8,7 +8,7 @@ from pydantic_core import ErrorDetails
 
 from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
-from rov_fmu.model.layout import (
+from rov_fmu.model.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -26,18 +26,17 @@ from rov_fmu.model.layout import (
     YAW,
     Axis,
     CoefficientKind,
-    Curve,
     Declaration,
-    Layout,
     cross_declaration,
     cross_name,
     cross_of,
 )
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
-from rov_fmu.vehicle.schema import Body, Estimated, Hardware, Parts, given_quantities
+from rov_fmu.vehicle.schema import Body, Estimated, File, Tables, given_quantities
 
-_Model = TypeVar("_Model", bound=Hardware)
+_Model = TypeVar("_Model", bound=Tables)
 _TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
 """If an entry of one of these tables has a mistake, the other entries can still be checked."""
 
@@ -62,7 +61,7 @@ def readable_parts(
     return readable, {*wrong}
 
 
-def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
+def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
     """Yield a line for each mistake.
 
     `lost` are the tables that could not be read. Checks that need one of them are left out.
@@ -95,7 +94,7 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
             yield from _check_estimates(parts.estimates, parts.quantities(layout))
 
 
-def check_names_and_keys(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
+def check_names_and_keys(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
     """Yield a line for each wrong name, and for each key that needs another key which is missing.
 
     These checks do not need all the coefficients of the vehicle.
@@ -109,7 +108,7 @@ def check_names_and_keys(parts: Hardware, lost: set[str], data: Toml) -> Iterato
 # ---- Names and keys --------------------------------------------------------------------------------------------------
 
 
-def _check_names(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
+def _check_names(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
     """Check the names of thrusters, curves and inputs."""
     entries = data["thruster"] if isinstance(data.get("thruster"), list) else []
     thrusters = [(n, entry) for n, entry in enumerate(entries) if isinstance(entry, dict)]
@@ -161,7 +160,7 @@ def _check_gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]
             yield key_line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
 
 
-def _check_keys(parts: Hardware) -> Iterator[str]:
+def _check_keys(parts: Tables) -> Iterator[str]:
     """Check that each key of a curve or an axis has the other keys that it needs."""
     for name, curve in parts.curves.items():
         quantities = given_quantities(curve, CURVE)
@@ -178,7 +177,7 @@ def _check_keys(parts: Hardware) -> Iterator[str]:
         yield from _check_reverse_pairs(f"axes.{axis.name}", given_quantities(table, AXIS))
 
 
-def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
+def _check_tables_of_thrust(parts: File) -> Iterator[str]:
     """Check that each curve has either coefficients or tables, and that its voltages are complete."""
     needs_voltage = False
     for name, curve in parts.curves.items():
@@ -216,7 +215,7 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
         )
 
 
-def _check_electric_currents(parts: Parts) -> Iterator[str]:
+def _check_electric_currents(parts: File) -> Iterator[str]:
     """Check that all curves have the electric current at one voltage, or none has it."""
     given = parts.electric_currents
     if not given:
@@ -232,7 +231,7 @@ def _check_electric_currents(parts: Parts) -> Iterator[str]:
             yield key_line(f"{place}.voltage", reason, given[name].voltage)
 
 
-def _check_fins(parts: Parts, layout: Layout) -> Iterator[str]:
+def _check_fins(parts: File, layout: Layout) -> Iterator[str]:
     """Check that each fin acts on an axis, and that the vehicle has surge, on whose velocity its force depends."""
     for fin in layout.fins:
         if not layout.has(SURGE):
@@ -247,7 +246,7 @@ def _check_fins(parts: Parts, layout: Layout) -> Iterator[str]:
             yield key_line(f"fin.{name}", "a thruster or a fin before it has this name")
 
 
-def _check_needed_tables(parts: Parts, lost: set[str]) -> Iterator[str]:
+def _check_needed_tables(parts: File, lost: set[str]) -> Iterator[str]:
     """Check that [body], [arm] and [axes] hold what the vehicle needs, and nothing else."""
     if "axes" in lost:
         return
@@ -311,7 +310,7 @@ def _users(key: str) -> str:
     return f"{listed([first, *others])} need it" if others else f"{first} needs it, and there is no [axes.{first}]"
 
 
-def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
+def _check_restoring(parts: File, body: Body) -> Iterator[str]:
     """Check that weight, buoyancy and their centres act on the vehicle, and that W and B are given together."""
     given = given_quantities(body, RESTORING)
     for key in given:
@@ -323,7 +322,7 @@ def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
             yield key_line(f"body.{key}", f"this key is missing, and {next(iter(given))} is there")
 
 
-def _check_cross(parts: Hardware) -> Iterator[str]:
+def _check_cross(parts: Tables) -> Iterator[str]:
     """Check that the coefficients in [cross] are of axes that the vehicle has, and are named in one way only."""
     has = {axis.velocity for axis in parts.axis_tables}
     for name, quantity in parts.cross.items():
@@ -347,7 +346,7 @@ def _check_cross(parts: Hardware) -> Iterator[str]:
 # ---- Arm, coupling, coefficients -------------------------------------------------------------------------------------
 
 
-def _check_arm(parts: Parts, layout: Layout) -> Iterator[str]:
+def _check_arm(parts: File, layout: Layout) -> Iterator[str]:
     """Check that the arm R sin γ is not zero."""
     if layout.has_arm and parts.arm and parts.arm.R and parts.arm.gamma:
         for name, factor in (("R", parts.arm.R.value), ("gamma", sin(parts.arm.gamma.value))):
@@ -357,7 +356,7 @@ def _check_arm(parts: Parts, layout: Layout) -> Iterator[str]:
                 )
 
 
-def _check_coupling(parts: Parts, layout: Layout) -> Iterator[str]:
+def _check_coupling(parts: File, layout: Layout) -> Iterator[str]:
     """Check that a coupled vehicle has the axes for it, and that β leaves each of them a finite inertia."""
     has_entries = "m_a" in {key for key, *_ in layout.cross} or not {"x_G", "y_G", "z_G"}.isdisjoint(layout.restoring)
     if not (layout.coupled or has_entries):

@@ -8,12 +8,12 @@ from math import inf
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped
 from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
-from rov_fmu.vehicle.quantity import Name, Text
+from rov_fmu.vehicle.quantity import Name, Text, not_blank, printable
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
 """Names of devices in Windows. No file can have such a name there, whatever its extension."""
@@ -53,10 +53,15 @@ PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
 """The files in the folder of pictures."""
 
 
-def _folder(files: Iterable[str]) -> AfterValidator:
-    """Return a validator of a folder beside the file. The given files in it must not be links that lead elsewhere."""
+def _folder(files: Iterable[str]) -> BeforeValidator:
+    """Return a validator that gives the path of a folder beside the file.
 
-    def check(name: str, info: ValidationInfo) -> str:
+    The given files in it must not be links that lead elsewhere.
+    """
+
+    def check(name: object, info: ValidationInfo) -> Path:
+        if not isinstance(name, str):
+            raise ValueError("must be text in quotes")
         folder = inside_or_shipped(folder_of(info), name)
         if not os.path.isdir(folder):  # noqa: PTH112 (Path.is_dir raises an exception if the name is too long)
             raise ValueError("there is no such folder beside the file")
@@ -65,26 +70,25 @@ def _folder(files: Iterable[str]) -> AfterValidator:
                 inside(folder_of(info), f"{name}/{file}")
             except ValueError as error:
                 raise ValueError(f"its file {file} {error}") from error
-        return name
+        return folder
 
-    return AfterValidator(check)
+    return BeforeValidator(check)
+
+
+_STRING = WithJsonSchema({"type": "string"})
+_NAME_OF_REPORT = WithJsonSchema({"type": "string", "minLength": 1, "maxLength": 10_000})
 
 
 class FileHead(Head):
     """The names of a vehicle, where it comes from, and the folders beside its file."""
 
-    data: Annotated[str, _folder([*chain(*TABLES.values())])] | None = None
+    data: Annotated[Path, _folder([*chain(*TABLES.values())]), _STRING] | None = None
     """A folder beside the file with the published tables, which `rov-fmu tables` prints, or one that ships
     (`videoray/tables`). Its files have the names and headers of those in `models/videoray/tables`."""
-    pictures: Annotated[str, _folder(PICTURES)] | None = None
+    pictures: Annotated[Path, _folder(PICTURES), _STRING] | None = None
     """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, or one that
     ships (`videoray/pictures`). Drawings are shown on a light background. The icon and the thrusters are always drawn
     from their geometry."""
-
-    def folders_from(self, folder: Path) -> dict[str, Path | None]:
-        """Return the paths of `data` and `pictures`, for a vehicle file in the given folder."""
-        names = {"data": self.data, "pictures": self.pictures}
-        return {key: inside_or_shipped(folder, name) if name else None for key, name in names.items()}
 
 
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -113,15 +117,19 @@ class Validity(Strict):
         return self.command_min, self.command_max
 
 
-def _report(name: str, info: ValidationInfo) -> str:
-    """Return the name of the report if the file exists or is about to be written. Raises ValueError."""
-    path, coming = inside(folder_of(info), name), (info.context or {})["coming"]
+def _report(name: object, info: ValidationInfo) -> Path:
+    """Return the path of the report if the file exists or is about to be written. Raises ValueError."""
+    if not isinstance(name, str):
+        raise ValueError("must be text in quotes")
+    if not name:
+        raise ValueError("must have at least 1 character")
+    path, coming = inside(folder_of(info), not_blank(printable(name))), (info.context or {})["coming"]
     if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
         raise ValueError("there is no such file beside this one")
-    return name
+    return folder_of(info) / name
 
 
-class Made(Strict):
+class Provenance(Strict):
     """What made the file. `rov-fmu identify` writes this table; a file written by hand needs none."""
 
     tool: Text
@@ -134,9 +142,11 @@ class Made(Strict):
     """What the data do not determine, and what speaks against the model, in sentences."""
     facts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
     """What was found, and what was done with the data, in sentences."""
-    report: Annotated[Text, AfterValidator(_report)] | None = None
+    verdicts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """Whether the model of each axis may be trusted, with the reasons."""
+    errors: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """The errors of predictions of unseen data."""
+    tested: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`."""
+    report: Annotated[Path, BeforeValidator(_report), _NAME_OF_REPORT] | None = None
     """The name of the report, a file beside this one. A build puts it into the FMU."""
-
-    def report_in(self, folder: Path) -> Path | None:
-        """Return the path of the report, for a vehicle file in the given folder."""
-        return folder / self.report if self.report else None

@@ -10,8 +10,10 @@ from typing import Any
 
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.layout import PITCH, ROLL, SWAY, YAW, Axis, Layout, cross_name
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
+from rov_fmu.model.equation import equation_of
+from rov_fmu.model.expression import compiled
+from rov_fmu.model.layout import Layout
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
@@ -141,30 +143,34 @@ _LEAST = 1e-9
 """The smallest eigenvalue of a positive definite matrix, whose diagonal is 1."""
 
 
-def check_mass(rov: Rov) -> Iterator[str]:
+def check_mass(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the mass matrix is not positive definite: the vehicle would accelerate against its load."""
-    entries = [(a, b) for key, a, b, *_ in rov.layout.cross if key == "m_a"]
-    if not entries and not any(rov.coefficients.get(f"{axis}_G") for axis in "xyz"):
+    entries = [(a, b) for key, a, b, *_ in layout.cross if key == "m_a"]
+    if not entries and not any(coefficients.get(f"{axis}_G") for axis in "xyz"):
         return
     try:
-        mass = {name.removeprefix("mass_"): value for name, value in rov.parameters.items() if name.startswith("mass_")}
+        mass = {
+            name.removeprefix("mass_"): value
+            for name, value in compiled(equation_of(layout).parameters)(coefficients).items()
+            if name.startswith("mass_")
+        }
     except ZeroDivisionError:  # a pivot of a singular matrix, or a β
         yield key_line(
             "cross", "the mass matrix must be positive definite, not singular: reduce m_a_.., or x_G, y_G, z_G"
         )
         return
     axes = [name[0] for name in mass if name[0] == name[1]]
-    names = [rov.layout.by_velocity[velocity].axis.name for velocity in axes]
+    names = [layout.by_velocity[velocity].axis.name for velocity in axes]
     for a, b in combinations(axes, 2):
         most = sqrt(mass[a + a] * mass[b + b])
         if abs(mass.get(a + b, 0.0)) >= most:
-            scale = sqrt(rov[f"beta_{a}"] * rov[f"beta_{b}"])
+            scale = sqrt(coefficients[f"beta_{a}"] * coefficients[f"beta_{b}"])
             pair = listed([names[axes.index(a)], names[axes.index(b)]])
             key = cross_name("m_a", a, b)
             place = f"cross.{key}" if (a, b) in entries else f"body.{(key := _centre(a, b))}"
             allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
             reason = f"the entry of the mass matrix for {pair}, with that of the centre of mass, must be {allowed}"
-            yield key_line(f"{place}.value", reason, rov[key])
+            yield key_line(f"{place}.value", reason, coefficients[key])
             return
     matrix = [[_entry(mass, a, b) / sqrt(mass[a + a] * mass[b + b]) for b in axes] for a in axes]
     if axes and _least_eigenvalue(matrix) < _LEAST:
@@ -173,33 +179,35 @@ def check_mass(rov: Rov) -> Iterator[str]:
         yield key_line("cross" if entries else "body", reason)
 
 
-def doubts(rov: Rov) -> Iterator[str]:
+def doubts(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line about each combination of numbers that is possible but probably wrong."""
-    yield from _doubts_of_damping(rov)
-    yield from _doubts_of_weight(rov)
-    yield from _doubts_of_voltage(rov)
+    yield from _doubts_of_damping(layout, coefficients)
+    yield from _doubts_of_weight(coefficients)
+    yield from _doubts_of_voltage(layout, coefficients)
 
 
-def _doubts_of_damping(rov: Rov) -> Iterator[str]:
+def _doubts_of_damping(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the linear damping adds energy to some motions.
 
     Its symmetric part then has a negative eigenvalue.
     """
-    cross = {(a, b): rov[cross_name("b_d", a, b)] for key, a, b, *_ in rov.layout.cross if key == "b_d"}
+    cross = {(a, b): coefficients[cross_name("b_d", a, b)] for key, a, b, *_ in layout.cross if key == "b_d"}
     if not cross:
         return
     damping = {}
-    for form in rov.layout.axes:
-        ends = {rov[form.coefficient(key)] for key in ("b_d", "b_d_reverse")}
+    for form in layout.axes:
+        ends = {coefficients[form.coefficient(key)] for key in ("b_d", "b_d_reverse")}
         damping[form.axis.velocity] = min(ends)
     entries = {pair: (cross.get(pair, 0.0) + cross.get(pair[::-1], 0.0)) / 2.0 for pair in combinations(damping, 2)}
     adds = "the linear damping adds energy to some slow motions of"
-    names = {form.axis.velocity: form.axis.name for form in rov.layout.axes}
+    names = {form.axis.velocity: form.axis.name for form in layout.axes}
     for (a, b), entry in entries.items():
         if abs(entry) > (most := sqrt(damping[a] * damping[b])) * (1.0 + _LEAST):
             given = [cross_name("b_d", *pair) for pair in ((a, b), (b, a)) if pair in cross]
             total = f"{' + '.join(given)} should be within ±{2.0 * most:.4g}"
-            yield key_line(f"cross.{given[0]}.value", f"{adds} {names[a]} and {names[b]}: {total}", rov[given[0]])
+            yield key_line(
+                f"cross.{given[0]}.value", f"{adds} {names[a]} and {names[b]}: {total}", coefficients[given[0]]
+            )
             return
     scale = {velocity: sqrt(value) or 1.0 for velocity, value in damping.items()}
     full = {(a, a): value for a, value in damping.items()} | entries
@@ -211,24 +219,23 @@ def _doubts_of_damping(rov: Rov) -> Iterator[str]:
         )
 
 
-def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
+def _doubts_of_voltage(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if thrust does not rise with the voltage, or if the voltage is far above that of the measurement."""
-    voltage = rov.layout.voltage or 0.0
-    for curve in rov.layout.curves:
+    voltage = layout.voltage or 0.0
+    for curve in layout.curves:
         for low, high in pairwise(curve.tables):
             if high.forces[-1] <= low.forces[-1] or high.forces[0] >= low.forces[0]:
                 same = f"at {high.voltage:g} V, full thrust is not stronger than at {low.voltage:g} V"
                 yield key_line(f"curves.{curve.name}.tables", f"{same}: is one table a copy of the other?")
-    for curve in rov.layout.curves:
-        if "V_0" in curve.keys and voltage > _FAR_ABOVE * (V_0 := rov[curve.coefficient("V_0")]):
+    for curve in layout.curves:
+        if "V_0" in curve.keys and voltage > _FAR_ABOVE * (V_0 := coefficients[curve.coefficient("V_0")]):
             times = f"is {voltage / V_0:.3g} times V_0 = {V_0:g} V of curves.{curve.name}"
             yield key_line("battery.voltage.value", f"{times}: one of the two is probably wrong", voltage)
             return
 
 
-def _doubts_of_weight(rov: Rov) -> Iterator[str]:
+def _doubts_of_weight(k: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the weight does not fit the mass, and one if the buoyancy turns the vehicle upside down."""
-    k = rov.coefficients
     if "W" not in k:
         return
     mass = k.get("m_rov", 0.0)

@@ -10,8 +10,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from rov_fmu.io.csv_table import Column, DataFileError, read_columns
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.description import TABLES
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -81,9 +80,9 @@ class StepTest:
     steady_columns: tuple[str, ...]
     """The directions of motion in that table; the responses belong to the last one."""
 
-    def response(self, rov: Rov, command: Decimal) -> tuple[float, float]:
+    def response(self, vehicle: Vehicle, command: Decimal) -> tuple[float, float]:
         """Return V_ss and Tau (s) in closed form for a command in %."""
-        return rov.response(self.axis, float(command) / 100.0)
+        return vehicle.response(self.axis, float(command) / 100.0)
 
 
 @dataclass(frozen=True)
@@ -102,9 +101,11 @@ STEP_TESTS = (
 )
 
 
-def untuned(rov: Rov) -> Rov:
+def untuned(vehicle: Vehicle) -> Vehicle:
     """Return the vehicle with every α and β equal to 1, which is the paper's non-linear model."""
-    return rov.replaced({name: 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable})
+    return vehicle.replaced(
+        {name: 1.0 for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable}
+    )
 
 
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
@@ -116,7 +117,7 @@ def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
         raise DataFileError(f"{vehicle.name}: no published tables, the vehicle file has no key vehicle.data")
     if missing := [test.axis.name for test in STEP_TESTS if not vehicle.layout.has(test.axis)]:
         raise DataFileError(f"{vehicle.name}: Tables 6-8 are of surge, heave and yaw, it has no {', '.join(missing)}")
-    return tuple(_load_table(vehicle.data, vehicle.rov, test) for test in STEP_TESTS)
+    return tuple(_load_table(vehicle.data, vehicle, test) for test in STEP_TESTS)
 
 
 def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
@@ -136,7 +137,7 @@ def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
     return rows
 
 
-def _load_table(folder: Path, rov: Rov, test: StepTest) -> ResponseTable:
+def _load_table(folder: Path, vehicle: Vehicle, test: StepTest) -> ResponseTable:
     """Return one of Tables 6–8."""
     responses_file, velocities_file = (folder / name for name in TABLES[test.axis.name])
     units: dict[str, str] = {}
@@ -149,8 +150,8 @@ def _load_table(folder: Path, rov: Rov, test: StepTest) -> ResponseTable:
     rows = []
     for command, (*printed, V_measured, Tau_measured) in responses.items():
         measured = steady.get(command) if V_measured is None else V_measured, Tau_measured
-        non_linear = Response(*map(Cell, printed[:2], test.response(untuned(rov), command), measured))
-        scaled = Response(*map(Cell, printed[2:], test.response(rov, command), measured))
+        non_linear = Response(*map(Cell, printed[:2], test.response(untuned(vehicle), command), measured))
+        scaled = Response(*map(Cell, printed[2:], test.response(vehicle, command), measured))
         rows.append(ResponseRow(command, non_linear, scaled))
     return ResponseTable(**vars(test), rows=tuple(rows), steady=steady)
 

@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from rov_fmu.io.toml_file import Strict, as_tuple, table_of
-from rov_fmu.model.layout import AXES, Axis, Declaration, cross_name
+from rov_fmu.model.catalogue import AXES, Axis, Declaration, cross_name
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """Return the text if it has no control characters. Raises ValueError."""
     if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
         raise ValueError(f"must be without the control character {found[0]!a}")
@@ -27,11 +27,11 @@ def not_blank(text: str) -> str:
     return text
 
 
-Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable), AfterValidator(not_blank)]
+Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(printable), AfterValidator(not_blank)]
 Name = Annotated[
     str,
     Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"),
-    AfterValidator(_printable),
+    AfterValidator(printable),
     AfterValidator(not_blank),
 ]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -1,7 +1,7 @@
-"""The pydantic models of the vehicle file, with every table and key; `model.layout` declares the coefficients."""
+"""The pydantic models of the vehicle file, with every table and key; `model.catalogue` declares the coefficients."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from math import hypot
@@ -10,12 +10,13 @@ from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
+from pydantic_core import ErrorDetails
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.paths import inside_or_shipped
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, as_tuple, folder_of, table_of
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, as_tuple, folder_of, table_of
 from rov_fmu.model import layout
-from rov_fmu.model.layout import (
+from rov_fmu.model.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -23,16 +24,18 @@ from rov_fmu.model.layout import (
     COMMANDS,
     CURVE,
     FIN,
+    REPLACED_BY_TABLE,
     RESTORING,
     TUNING,
     Axis,
     CoefficientKind,
     Declaration,
-    Layout,
-    ThrustTable,
-    VehicleAxis,
+    cross_name,
+    cross_of,
+    declarations_of,
 )
-from rov_fmu.vehicle.description import FileHead, Made, Validity
+from rov_fmu.model.layout import Layout, ThrustTable, VehicleAxis
+from rov_fmu.vehicle.description import FileHead, Provenance, Validity
 from rov_fmu.vehicle.quantity import (
     CrossSymbol,
     Finite,
@@ -54,6 +57,7 @@ NOT_GIVEN = "not given"
 """The source of α and β where the file does not give them."""
 MOST = 32
 """The largest number of thrusters, curves or inputs."""
+_NONE: Mapping[str, Any] = MappingProxyType({})
 _MOST_COEFFICIENTS = 1000
 """The largest number of coefficients in a table. The largest possible vehicle has fewer."""
 
@@ -61,22 +65,21 @@ _MOST_COEFFICIENTS = 1000
 def _coefficients(
     name: str,
     declarations: Mapping[str, Declaration],
-    kinds: Mapping[str, CoefficientKind] | None = None,
+    kinds: Mapping[str, CoefficientKind] = _NONE,
     words: str = "",
-    negative: Mapping[str, str] = MappingProxyType({}),
+    negative: Mapping[str, str] = _NONE,
 ) -> Any:
-    """Return a table with a key for each coefficient. A key is required if its kind says so; without kinds, none is.
+    """Return a table with a key for each coefficient, of which any may be missing.
 
-    `negative` says, by the key, what to give instead of a negative value.
+    Editors are told which a vehicle file must have: the needed ones of `kinds`. `negative` says, by the key, what to
+    give instead of a negative value.
     """
     fields: dict[str, Any] = {}
     for key, declaration in declarations.items():
         one = quantity(f"{name}_{key}", declaration, negative.get(key, ""))
-        if kinds and key in kinds and kinds[key].needed:
-            fields[key] = (one, Field(description=declaration.description))
-        else:
-            fields[key] = (one | None, Field(None, description=declaration.description))
-    return table_of(f"_{name}", Strict, fields, words)
+        fields[key] = (one | None, Field(None, description=declaration.description))
+    needed = [key for key, kind in kinds.items() if kind.needed]
+    return table_of(f"_{name}", Strict, fields, words, needed)
 
 
 def given_quantities(table: Strict, kinds: Mapping[str, CoefficientKind]) -> dict[str, Quantity]:
@@ -88,16 +91,6 @@ def _coefficient_keys(table: Strict, kinds: Mapping[str, CoefficientKind]) -> tu
     """Return the keys of the coefficients that the vehicle has: those that are required, and those that are given."""
     quantities = given_quantities(table, kinds)
     return tuple(key for key, kind in kinds.items() if key in quantities or kind.needed)
-
-
-def _all_optional(table: Any, kinds: Mapping[str, CoefficientKind]) -> Any:
-    """Return a copy of a table in which no coefficient is required."""
-    fields: dict[str, Any] = {
-        key: (field.annotation | None, Field(None, description=field.description))
-        for key, field in table.model_fields.items()
-        if key in kinds and field.is_required()
-    }
-    return table_of(f"_Open{table.__name__}", table, fields, table.__doc__)
 
 
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
@@ -153,7 +146,7 @@ class Arm(_coefficients("Arm", {key: kind.declaration() for key, kind in ARM.ite
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.declaration(curve="curve", equation=layout.cited("(2)")) for key, kind in CURVE.items()}
+_CURVE = {key: kind.declaration(curve="curve", equation="") for key, kind in CURVE.items()}
 
 
 _Read = TypeVar("_Read", ThrustFile, CurrentTable)
@@ -216,7 +209,7 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
 
     description: Name | None = None
     """A short description of the thrusters with this curve, for example "rear pair"."""
-    equation: Name = "(2)"
+    equation: Name | None = None
     """The equation or table in which the curve is published. A bare number, (9), is of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
     """The number of thrusters that gave the force together when the curve was measured."""
@@ -251,16 +244,16 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
             rows = enumerate(self.tables, 1)
             measured = tuple(row.table.table(f"{n}_{name}", row.voltage) for n, row in rows)
         if measured:
-            keys = ("k_t", *(key for key in keys if key not in ("k_t", *layout.REPLACED_BY_TABLE)))
+            keys = ("k_t", *(key for key in keys if key not in ("k_t", *REPLACED_BY_TABLE)))
         words = self.description or ""
-        return layout.Curve(name, keys, self.together, words, self.equation, measured)
+        return layout.Curve(name, keys, self.together, words, self.equation or "", measured)
 
 
 _AXIS_DESCRIPTION = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
 _tables = {
     axis.name: _coefficients(
         axis.name.capitalize(),
-        layout.declarations_of(axis),
+        declarations_of(axis),
         AXIS,
         _AXIS_DESCRIPTION.format(axis),
         {key: f"; give -{derivative(key, axis)} as a positive {key}" for key in ("m_a", "a_d", "b_d")},
@@ -268,15 +261,10 @@ _tables = {
     for axis in AXES.values()
 }
 _axes: dict[str, Any] = {name: (table | None, None) for name, table in _tables.items()}
-_open_axes: dict[str, Any] = {name: (_all_optional(table, AXIS) | None, None) for name, table in _tables.items()}
 
 
 class Axes(table_of("_Axes", Strict, _axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
-
-
-OpenArm = _all_optional(Arm, ARM)
-OpenAxes = table_of("_OpenAxes", Strict, _open_axes, Axes.__doc__)
 
 
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
@@ -413,6 +401,11 @@ class Alternative(Strict, extra="allow"):
         """The coefficients, by their names in the FMU."""
         return self.__pydantic_extra__
 
+    @property
+    def values(self) -> dict[str, float]:
+        """The values of the coefficients."""
+        return {name: quantity.value for name, quantity in self.quantities.items()}
+
 
 class Estimated(Strict):
     """The standard error and the correlations of an identified coefficient, from which a study draws vehicles."""
@@ -427,17 +420,11 @@ class Estimated(Strict):
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 
-class _Opening(Strict):
-    """The first keys and tables of a vehicle file."""
+class Tables(Strict):
+    """The tables that describe the body, the thrusters, the axes and the inputs of a vehicle.
 
-    format: Literal[2] | None = None
-    """The version of this file format."""
-    vehicle: FileHead | None = None
-    validity: Validity | None = None
-
-
-class Hardware(Strict):
-    """The tables that describe the body, the thrusters, the axes and the inputs of a vehicle."""
+    Any of them may be missing, because it could not be read or is still to be identified.
+    """
 
     hint = staticmethod(derivative_hint)
 
@@ -446,6 +433,7 @@ class Hardware(Strict):
     curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
     """The thrust curves by name. The names of their coefficients in the FMU contain it: `a_t_<name>`."""
     thruster: list[Thruster] = Field(default=[], max_length=MOST)
+    """The thrusters, one table [[thruster]] each, in the order of their variables in the FMU."""
     fin: list[Fin] = Field(default=[], max_length=MOST)
     """The control surfaces, one table [[fin]] each."""
     battery: Battery | None = None
@@ -469,7 +457,7 @@ class Hardware(Strict):
         curves = tuple(curve.for_model(name) for name, curve in self.curves.items())
         coupled = bool(self.body and self.body.coupling)
         thrusters = tuple(t.for_model() for t in self.thruster)
-        cross = tuple(filter(None, map(layout.cross_of, self.cross)))
+        cross = tuple(filter(None, map(cross_of, self.cross)))
         restoring = tuple(key for key in RESTORING if self.body and getattr(self.body, key) is not None)
         fins = tuple(fin.for_model() for fin in self.fin)
         voltage = self.battery.voltage.value if self.battery else None
@@ -509,37 +497,97 @@ class Hardware(Strict):
         }
 
 
-class OpenHardware(Hardware):
-    """The tables of Hardware, in which the coefficients that are still to be identified may be missing."""
+class _Head(Strict):
+    """The first keys and tables of a vehicle file."""
 
-    arm: OpenArm | None = None  # type: ignore[valid-type]
-    axes: OpenAxes | None = None  # type: ignore[valid-type]
+    format: Literal[2] | None = None
+    """The version of this file format."""
+    vehicle: FileHead | None = None
+    validity: Validity | None = None
 
 
-class Parts(Hardware, _Opening):
-    """The tables of a vehicle file, of which any may be missing because it could not be read."""
+NEEDED = ("format", "vehicle", "validity", "body", "curves", "thruster", "axes")
+"""The keys and tables that a vehicle file must have."""
+
+
+def _needed_in_file(schema: dict[str, Any]) -> None:
+    """Tell editors what a vehicle file must have."""
+    schema["required"] = [*NEEDED]
+    schema["properties"]["curves"]["minProperties"] = 1
+    schema["properties"]["thruster"]["minItems"] = 1
+
+
+class File(Tables, _Head, json_schema_extra=_needed_in_file):
+    """A vehicle file (TOML): an ROV with any thrusters, axes and curves."""
+
+    # Any table may be missing, so that others are read where one has a mistake. with_missing_keys tells what lacks.
 
     alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
     """Other sets of published coefficients, by a name for each set."""
     estimates: dict[str, Estimated] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Standard errors and correlations of identified coefficients, by their names in the FMU. Each such coefficient has
     an `interval`."""
-    provenance: Made | None = None
+    provenance: Provenance | None = None
 
 
-class File(Parts):
-    """A vehicle file (TOML): an ROV with any thrusters, axes and curves."""
+def with_missing_keys(
+    problems: Iterable[ErrorDetails],
+    data: Toml,
+    model: type[Strict],
+    needed: Iterable[str] = NEEDED,
+    within: Container[str] = ("arm", "fin", "axes"),
+) -> list[ErrorDetails]:
+    """Return the problems with a file and those that keys are missing, in the order of the tables of its model.
 
-    format: Literal[2]
-    """The version of this file format."""
-    vehicle: FileHead
-    validity: Validity
-    body: Body
-    curves: dict[Symbol, Curve] = Field(min_length=1, max_length=MOST)
-    """The thrust curves by name. The names of their coefficients in the FMU contain it: `a_t_<name>`."""
-    thruster: list[Thruster] = Field(min_length=1, max_length=MOST)
-    """The thrusters, one table [[thruster]] each, in the order of their variables in the FMU."""
-    axes: Axes
+    `needed` are the tables that must be there, and `within` those whose coefficients must be complete. Unknown keys
+    come last in a table, because one of them may be a missing key, misspelt.
+    """
+    order = [*model.model_fields]
+
+    def table(problem: ErrorDetails) -> int:
+        name = problem["loc"][0]
+        return order.index(str(name)) if name in order else len(order)
+
+    def comes_later(other: ErrorDetails, missing: ErrorDetails) -> bool:
+        is_unknown = other["type"] == "extra_forbidden" and other["loc"][:-1] == missing["loc"][:-1]
+        return is_unknown or table(other) > table(missing)
+
+    found = [*problems]
+    for missing in _missing_keys(data, needed, within):
+        found.insert(next((n for n, other in enumerate(found) if comes_later(other, missing)), len(found)), missing)
+    return found
+
+
+def _missing_keys(data: Toml, needed: Iterable[str], within: Container[str]) -> Iterator[ErrorDetails]:
+    """Yield a problem, as pydantic reports it, for each key that is needed and missing."""
+    for name in needed:
+        if name not in data:
+            yield _missing(data, name)
+        elif data[name] in ({}, []) and name in ("curves", "thruster"):
+            reason = "must have at least 1 item, not 0"
+            yield {"type": "too_short", "loc": (name,), "msg": reason, "input": data[name]}
+    places: list[tuple[Mapping[str, CoefficientKind], tuple[int | str, ...]]] = [(ARM, ("arm",))]
+    places += [(FIN, ("fin", n)) for n in range(len(data.get("fin", ())))]
+    places += [(AXIS, ("axes", name)) for name in AXES]
+    for kinds, place in places:
+        table = _table_at(data, place)
+        if place[0] in within and isinstance(table, dict):
+            yield from (_missing(table, *place, key) for key, kind in kinds.items() if kind.needed and key not in table)
+
+
+def _table_at(data: Any, place: tuple[int | str, ...]) -> Any:
+    """Return what stands at a place in a file, or None if there is nothing."""
+    for step in place:
+        try:
+            data = data[step]
+        except (LookupError, TypeError):
+            return None
+    return data
+
+
+def _missing(table: Toml, *place: int | str) -> ErrorDetails:
+    """Return the problem that a key is missing in a table."""
+    return {"type": "missing", "loc": place, "msg": "Field required", "input": table}
 
 
 def keys_in_file(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -555,4 +603,4 @@ def keys_in_file(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
         for vehicle_axis in of.axes:
             present = keys if keys is TUNING else (key for key in keys if key in vehicle_axis.keys)
             yield from ((vehicle_axis.coefficient(key), ("axes", vehicle_axis.axis.name, key)) for key in present)
-    yield from ((name, ("cross", name)) for name in (layout.cross_name(*row) for row in of.cross))
+    yield from ((name, ("cross", name)) for name in (cross_name(*row) for row in of.cross))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import ndtri, stdtrit
 
-from rov_fmu.model.layout import TUNING, Declaration
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import TUNING, Declaration
+from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.schema import Estimated
 
 Array = NDArray[np.float64]
@@ -118,20 +118,23 @@ NOTHING = Uncertainty((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((
 
 
 def uncertainty(
-    rov: Rov, intervals: Mapping[str, tuple[float, float]], estimates: Mapping[str, Estimated]
+    layout: Layout,
+    coefficients: Mapping[str, float],
+    intervals: Mapping[str, tuple[float, float]],
+    estimates: Mapping[str, Estimated],
 ) -> Uncertainty:
     """Return the distribution of the coefficients by the intervals and estimates of a vehicle file."""
-    declarations = rov.layout.coefficients
+    declarations = layout.coefficients
     names = tuple(name for name in declarations if name in intervals)
     errors = []
     for name in names:
         if name in estimates:
             errors.append(estimates[name].error)
         else:
-            errors.append(_half_width(name, rov[name], intervals[name], declarations[name]) / NORMAL)
+            errors.append(_half_width(name, coefficients[name], intervals[name], declarations[name]) / NORMAL)
     return Uncertainty(
         names,
-        np.array([rov[name] for name in names]),
+        np.array([coefficients[name] for name in names]),
         np.array(errors),
         correlation(names, estimates),
         np.array([(declarations[name].minimum, declarations[name].maximum) for name in names]).reshape(-1, 2),

@@ -3,7 +3,8 @@
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from math import isfinite, sin
+from functools import cache, cached_property, lru_cache
+from math import inf, isfinite, sin
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,13 +14,19 @@ from typing_extensions import Self
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, one_line, shown
 from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
-from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.alone import AxisAlone, alone_formulas
+from rov_fmu.model.catalogue import ARM, YAW, Axis, delayed_name
+from rov_fmu.model.equation import equation_of
+from rov_fmu.model.expression import compiled
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis, arm
+from rov_fmu.model.printed import model_of
+from rov_fmu.model.step import DelayLine, heading, step
+from rov_fmu.model.thrust import curve_formulas, steady_name
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
-from rov_fmu.vehicle.description import PICTURES, TABLES
+from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, with_missing_keys
 from rov_fmu.vehicle.thrust_table import CurrentTable
 
 if TYPE_CHECKING:
@@ -33,54 +40,57 @@ class VehicleFileError(FileError):
     """A vehicle file that cannot be used. Each mistake is a line with file, key, value and what is allowed."""
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """The tool that made a vehicle file, its method, and its input files."""
-
-    tool: str
-    method: str
-    inputs: Mapping[str, str]
-    """The SHA-256 of every input file, by file name."""
-    warnings: tuple[str, ...] = ()
-    """What the data do not determine, and what speaks against the model, in sentences."""
-    facts: tuple[str, ...] = ()
-    """What was found, and what was done with the data, in sentences."""
-    report: Path | None = None
-    """The report on the identification."""
-    data: str = field(default="measurements", compare=False)
-    """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
+Values = Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Alternative:
-    """A set of published coefficients that the model does not use."""
+class _Formulas:
+    """The compiled equation of a layout."""
 
-    description: str
-    values: Mapping[str, float]
-    """The coefficients by name."""
-    sources: Mapping[str, str]
-    """The sources of the coefficients by name."""
+    def __init__(self, layout: Layout) -> None:
+        equation = equation_of(layout)
+        rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
+        self.names = equation.names
+        self.model = model_of(layout)
+        self.parameters = compiled(equation.parameters)
+        self.thrust = compiled(equation.thrust, equation.measured)
+        self.alone = {
+            form.axis.name: compiled(alone_formulas(layout, form.axis.velocity), equation.measured)
+            for form in layout.axes
+        }
+        self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
+
+
+_formulas_of = lru_cache(maxsize=100)(_Formulas)
+_thrust_of = cache(
+    lambda curve: compiled(curve_formulas(curve), {table.function: table.force for table in curve.tables})
+)
 
 
 @dataclass(frozen=True, repr=False)
 class Vehicle:
-    """A vehicle: its model, and where its numbers come from."""
+    """A vehicle: its layout, its coefficients, where these come from, and its motion.
 
-    name: str
-    identifier: str
+    `vehicle["a_d_u"]` is a coefficient, and `vehicle.layout` has the axes, curves, thrusters and variables. A vehicle
+    that is not from a file, `Vehicle(layout, coefficients)`, needs no texts and no sources.
+    """
+
+    layout: Layout
+    """The axes, curves, thrusters and variables."""
+    coefficients: Values
+    """The value of every coefficient of the layout, by name."""
+    name: str = ""
+    identifier: str = ""
     """A C identifier, which becomes modelIdentifier and modelName of the FMU."""
-    version: str
-    description: str
-    source: str
-    rov: Rov
-    """The model of the vehicle: its layout and its coefficients."""
-    sources: Mapping[str, str]
+    version: str = ""
+    description: str = ""
+    source: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict)
     """The sources of the coefficients by name."""
-    command_range: tuple[float, float]
+    command_range: tuple[float, float] = (0.0, 1.0)
     """The weakest and the strongest thruster command for which the model was identified."""
-    alternatives: Mapping[str, Alternative]
+    alternatives: Mapping[str, Alternative] = field(default_factory=dict)
     """Other sets of published coefficients, by a name for each set."""
-    data: Path | None
+    data: Path | None = None
     """The folder with the published tables."""
     pictures: Path | None = None
     """The folder with the vehicle's own PICTURES, any of which may be missing."""
@@ -91,6 +101,8 @@ class Vehicle:
     estimates: Mapping[str, Estimated] = field(default_factory=dict)
     """The standard errors and correlations of identified coefficients, by name."""
     provenance: Provenance | None = None
+    measured_from: str = field(default="measurements", compare=False)
+    """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
     voltage_source: str = ""
     """The source of the battery's voltage."""
     thrust_files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
@@ -99,6 +111,18 @@ class Vehicle:
     """The current of one thruster, by curve, for all curves or none."""
     thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """The sources of `direction` and `position`, by the name of the thruster."""
+
+    def __getitem__(self, name: str) -> float:
+        """Return a coefficient."""
+        return self.coefficients[name]
+
+    def replaced(self, values: Values) -> Self:
+        """Return the vehicle with other values of some coefficients, which are not checked. It is cheap."""
+        return replace(self, coefficients={**self.coefficients, **values})
+
+    def extended(self, values: Values) -> Self:
+        """Return the vehicle with other or additional coefficients."""
+        return replace(self, layout=self.layout.extended(values), coefficients={**self.coefficients, **values})
 
     def __repr__(self) -> str:
         """Return the name of the vehicle, its axes, its inputs, and the coefficients that were set by hand."""
@@ -116,8 +140,7 @@ class Vehicle:
         """
         values = {name: _number(name, value) for name, value in coefficients.items()}
         check_coefficients(self.layout, values)
-        rov = self.rov.replaced(values)
-        if mistake := next(_contradictions(rov), None):
+        if mistake := next(_contradictions(self.layout, {**self.coefficients, **values}), None):
             raise InputError(mistake)
         estimates = {}
         for name, estimated in self.estimates.items():
@@ -125,8 +148,7 @@ class Vehicle:
                 kept = {other: r for other, r in estimated.correlation.items() if other not in values}
                 estimates[name] = estimated.model_copy(update={"correlation": kept})
         return replace(
-            self,
-            rov=rov,
+            self.replaced(values),
             sources={**self.sources, **dict.fromkeys(values, BY_HAND)},
             intervals={name: interval for name, interval in self.intervals.items() if name not in values},
             estimates=estimates,
@@ -141,15 +163,10 @@ class Vehicle:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
         items = []
         for name, declaration in self.layout.coefficients.items():
-            if self.sources[name] == BY_HAND:
+            if self.sources.get(name) == BY_HAND:
                 unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-                items.append(f"{name} = {self.rov[name]:.12g}{unit}")
+                items.append(f"{name} = {self[name]:.12g}{unit}")
         return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
-
-    @property
-    def layout(self) -> Layout:
-        """The axes, curves, thrusters and inputs of the vehicle."""
-        return self.rov.layout
 
     @property
     def files(self) -> list[Path]:
@@ -166,12 +183,133 @@ class Vehicle:
         """The joint distribution of the coefficients that have a confidence interval."""
         from rov_fmu.vehicle.uncertainty import uncertainty  # NumPy and SciPy: few need it
 
-        return uncertainty(self.rov, self.intervals, self.estimates)
+        return uncertainty(self.layout, self.coefficients, self.intervals, self.estimates)
 
     def picture(self, name: str) -> Path | None:
         """Return the path of the vehicle's own picture with this name, or None."""
         own = self.pictures / name if self.pictures else None
         return own if own and own.is_file() else None
+
+    @cached_property
+    def _formulas(self) -> _Formulas:
+        return _formulas_of(self.layout)
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """The numbers that follow from the coefficients, by their names in rov_fmu/model/equation.py: gain_u ..."""
+        return self._formulas.parameters(self.coefficients)
+
+    # ---- Thrust ----
+
+    def curve_force(self, curve: Curve, command: float) -> float:
+        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage."""
+        values = {"u_one": command, "voltage": self.layout.voltage or 0.0}
+        *_, force = _thrust_of(curve)({**self.coefficients, **values}).values()
+        return float(force)
+
+    def commanded(self, inputs: Values) -> dict[str, float]:
+        """Return the steady thrust of every thruster (N), by its name, for the commands."""
+        found = self._steady(inputs)
+        names = self._formulas.names
+        return {name: found[steady_name(name, curve, names).identifier] for name, curve in self.layout.curve_of.items()}
+
+    def _steady(self, inputs: Values) -> dict[str, float]:
+        """Return the values of all formulas from the commands to the steady thrust."""
+        return self._formulas.thrust({**self.coefficients, **inputs, **self._acting(inputs)})
+
+    def _acting(self, inputs: Values) -> dict[str, float]:
+        """Return the commands that act after the dead time: those that are given, or else the present ones."""
+        if not self.layout.has_dead_time:
+            return {}
+        return {delayed_name(name): inputs.get(delayed_name(name), inputs[name]) for name in self.layout.commands}
+
+    def _values(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the coefficients, the inputs and the states by name. Other names in the mappings are left out."""
+        return {
+            **self.coefficients,
+            **{name: inputs[name] for name in self.layout.inputs},
+            **self._acting(inputs),
+            **{name: state[name] for name in self.layout.state},
+            **{name: state[name] for name in self.layout.continued if name in state},
+        }
+
+    def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
+        found = self._formulas.calculate(self._values(inputs, state))
+        for name in self.layout.continued:
+            found[name] = heading(found, state.get(name, found[name]))
+        return {name: found[name] for name in self.layout.calculated}
+
+    def effect(self, thruster: Thruster, axis: Axis) -> float:
+        """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
+        found = thruster.effect(axis)
+        by_arm = axis is YAW and thruster.position is None and thruster.arm
+        return found * arm(*(self[name] for name in ARM)) if by_arm else found
+
+    # ---- Motion ----
+
+    def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the time derivatives of the states by their names."""
+        found = self._formulas.calculate(self._values(inputs, state))
+        return {name: found[f"der_{name}"] for name in self.layout.state}
+
+    def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
+        """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
+
+        The result is exact up to rounding. It is not finite when the motion overflows or takes too many substeps
+        (rov_fmu/model/step.py).
+        """
+        after = step(self._formulas.model, self._values(inputs, state), h)
+        return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
+
+    def delay_line(self) -> DelayLine:
+        """Return the commands that act before the first one, and nothing that waits for the dead time."""
+        commands = self.layout.commands if self.layout.has_dead_time else {}
+        return DelayLine(
+            {name: declaration.start for name, declaration in commands.items()},
+            {name: delayed_name(name) for name in commands},
+        )
+
+    # ---- One axis alone ----
+
+    def effective_inertia(self, form: VehicleAxis) -> float:
+        """Return the effective inertia m/β (kg, kg.m2): the load per acceleration along an axis alone."""
+        gain = self.parameters[self._formulas.names("gain", form.axis.velocity).identifier]
+        return 1.0 / gain if gain > 0.0 else inf
+
+    def alone(self, axis: Axis, inputs: Values) -> AxisAlone:
+        """Return the motion of an axis alone, (18), under held inputs, once the thrust is steady."""
+        return AxisAlone.of(self._formulas.alone[axis.name]({**self._steady(inputs), **self.parameters}))
+
+    def motions(self, inputs: Values) -> tuple[AxisAlone, ...]:
+        """Return the motion of each axis alone under held inputs, once the thrust is steady."""
+        values = {**self._steady(inputs), **self.parameters}
+        return tuple(AxisAlone.of(self._formulas.alone[form.axis.name](values)) for form in self.layout.axes)
+
+    def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
+        """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
+        return self.layout.usual_inputs | self.layout.driving(axis, command)
+
+    def force(self, axis: Axis, command: float) -> float:
+        """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""
+        return self.along(axis, self.commanded(self.held_inputs(axis, command)))
+
+    def along(self, axis: Axis, F: Values) -> float:
+        """Return the thrust (N) or torque (N.m) along an axis of thrusters with some forces, N."""
+        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
+
+    def strongest(self, axis: Axis) -> float:
+        """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
+        return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
+
+    def held(self, axis: Axis, command: float) -> AxisAlone:
+        """Return the motion of an axis alone, (18), under a held command, once the thrust is steady."""
+        return self.alone(axis, self.held_inputs(axis, command))
+
+    def response(self, axis: Axis, command: float) -> tuple[float, float]:
+        """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""
+        motion = self.held(axis, command)
+        return motion.steady_velocity(), motion.time_constant()
 
 
 def check_coefficients(layout: Layout, values: Mapping[str, float]) -> None:
@@ -199,13 +337,13 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _contradictions(rov: Rov) -> Iterator[str]:
+def _contradictions(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
     """Yield a line for each set of coefficients that are possible alone but not together."""
-    for curve in (curve for curve in rov.layout.curves if not curve.tables):
-        yield from no_thrust(curve, rov.coefficients, f"curve {curve.name}")
-    if rov.layout.has_arm and rov["R"] * sin(rov["gamma"]) == 0.0:
+    for curve in (curve for curve in layout.curves if not curve.tables):
+        yield from no_thrust(curve, coefficients, f"curve {curve.name}")
+    if layout.has_arm and coefficients["R"] * sin(coefficients["gamma"]) == 0.0:
         yield "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"
-    yield from check_mass(rov)
+    yield from check_mass(layout, coefficients)
 
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
@@ -223,47 +361,31 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(f"{path}: {key_line('format', reason, data['format'])}")
     context = {"folder": path.parent, "coming": coming}
     file, problems = validate(data, File, **context)
-    mistakes = [
-        *problem_lines(problems, data, File),
-        *check_parts(*readable_parts(data, problems, context, Parts), data),
-    ]
+    problems = with_missing_keys(problems, data, File)
+    readable, lost = readable_parts(data, problems, context, File)
+    mistakes = [*problem_lines(problems, data, File), *check_parts(readable, lost, data)]
     if file is None or mistakes:
         raise VehicleFileError(*lines_on(path, mistakes))
-    head, made, layout = file.vehicle, file.provenance, file.layout
-    folders, found = head.folders_from(path.parent), file.quantities(layout)
-    rov = Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()})
-    if mistakes := [*check_mass(rov)]:
+    head, validity, layout = file.vehicle, file.validity, file.layout
+    assert head, "with_missing_keys tells that it is missing"
+    assert validity, "with_missing_keys tells that it is missing"
+    found = file.quantities(layout)
+    coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
+    if mistakes := [*check_mass(layout, coefficients)]:
         raise VehicleFileError(*lines_on(path, mistakes))
-    for doubt in doubts(rov):
+    for doubt in doubts(layout, coefficients):
         warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
-    provenance = None
-    if made:
-        provenance = Provenance(
-            made.tool, made.method, made.inputs, made.warnings, made.facts, made.report_in(path.parent)
-        )
     return Vehicle(
-        name=head.name,
-        identifier=head.identifier,
-        version=head.version,
-        description=head.description,
-        source=head.source,
-        rov=rov,
+        layout,
+        coefficients,
+        **dict(head),
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
-        command_range=file.validity.command_range,
-        alternatives={
-            name: Alternative(
-                alternative.description,
-                {coefficient: q.value for coefficient, q in alternative.quantities.items()},
-                {coefficient: q.source for coefficient, q in alternative.quantities.items()},
-            )
-            for name, alternative in file.alternatives.items()
-        },
-        data=folders["data"],
-        pictures=folders["pictures"],
-        limits=file.validity.limits,
+        command_range=validity.command_range,
+        alternatives=file.alternatives,
+        limits=validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=file.estimates,
-        provenance=provenance,
+        provenance=file.provenance,
         voltage_source=file.battery.voltage.source if file.battery else "",
         thrust_files={name: curve.thrust_files for name, curve in file.curves.items() if curve.thrust_files},
         electric_currents=file.electric_currents,

@@ -14,12 +14,15 @@ from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
+from rov_fmu.model.catalogue import Declaration
+from rov_fmu.model.layout import Curve, Fin, Thruster
 from rov_fmu.vehicle.description import Head
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, keys_in_file
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Alternative, Estimated, keys_in_file
 from rov_fmu.vehicle.thrust_table import CurrentTable
-from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
+_TOLD = ("verdicts", "errors", "tested", "warnings", "facts")
+"""The lists of sentences in [provenance]."""
 _DECIMALS = 6
 """The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
 _DIGITS = 6
@@ -33,7 +36,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     """
     document = tomlkit.document()
     if made := vehicle.provenance:
-        comment = f"Made from {made.data}: [provenance] tells how, and `interval` is 95 % confidence."
+        comment = f"Made from {vehicle.measured_from}: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(comment)).add(tomlkit.nl())
     low, high = map(_rounded, vehicle.command_range)
     paths = {"data": vehicle.data, "pictures": vehicle.pictures}
@@ -45,12 +48,12 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     for key, table in _hardware(vehicle, quantities, folder).items():
         document[key] = table
     if vehicle.alternatives:
-        document["alternatives"] = {name: _alternative(vehicle, one) for name, one in vehicle.alternatives.items()}
+        document["alternatives"] = {name: _alternative(one) for name, one in vehicle.alternatives.items()}
     if vehicle.estimates:
         document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
     if made:
         report = {"report": name_of(made.report, folder)} if made.report else {}
-        told = _texts("warnings", made.warnings) | _texts("facts", made.facts)
+        told = {key: value for name in _TOLD for key, value in _texts(name, getattr(made, name)).items()}
         head = {"tool": made.tool, "method": made.method} | report | told
         document["provenance"] = {**head, "inputs": dict(made.inputs)}
     text: str = tomlkit.dumps(document)
@@ -163,7 +166,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
     document, vehicle = _read_document(source), load_vehicle(source)
     places = dict(keys_in_file(vehicle.layout))
     for name, exact in values.items():
-        if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
+        if (value := _rounded(exact)) == _rounded(vehicle[name]):
             continue
         *above, key = places[name]
         table = _fin_of(document, above[1]) if above[0] == "fin" else _table_at(document, above)
@@ -273,18 +276,15 @@ def _thruster(thruster: Thruster, sources: Mapping[str, str]) -> dict[str, Any]:
     return entry
 
 
-def _alternative(vehicle: Vehicle, alternative: Alternative) -> dict[str, Any]:
+def _alternative(alternative: Alternative) -> dict[str, Any]:
     """Return the table of a set of published coefficients that the model does not use."""
-    declarations = vehicle.layout.coefficients
-    table: dict[str, Any] = {"description": alternative.description}
-    for name, value in alternative.values.items():
-        table[name] = _quantity_table(value, declarations[name], alternative.sources[name])
-    return table
+    rows = {name: _inline_table(q.model_dump(exclude_none=True)) for name, q in alternative.quantities.items()}
+    return {"description": alternative.description, **rows}
 
 
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
     """Return the table of a coefficient, with rounded numbers, and an interval that includes the rounded value."""
-    value, interval = _rounded(vehicle.rov[name]), vehicle.intervals.get(name)
+    value, interval = _rounded(vehicle[name]), vehicle.intervals.get(name)
     ends = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)] if interval else None
     return _quantity_table(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
 

@@ -13,11 +13,11 @@ import pytest
 import rov_fmu
 from rov_fmu.bridges import arrays
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.bridges.test_arrays import ALL, Array, by_engine, cases, check
 
 
-def by_jax(rov: Rov, inputs: dict[str, Array], states: dict[str, Array]) -> Any:
+def by_jax(rov: Vehicle, inputs: dict[str, Array], states: dict[str, Array]) -> Any:
     """Return the rates of random states, compiled by JAX."""
 
     def function(x: Any, u: Any) -> Any:

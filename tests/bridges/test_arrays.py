@@ -15,9 +15,8 @@ from rov_fmu.bridges import arrays
 from rov_fmu.bridges.rates import force_names
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
 from tests.vehicles import (
     EVERYTHING,
@@ -30,13 +29,13 @@ from tests.vehicles import (
 )
 
 FILES = {**SHIPPED, "everything": EVERYTHING, "thrust_effects": THRUST_EFFECTS, "six_axes": SIX_AXES}
-LOADED = {name: load_vehicle(path).rov for name, path in FILES.items()}
+LOADED = {name: load_vehicle(path) for name, path in FILES.items()}
 ALL = {**VEHICLES, "six_coupled": SIX, **LOADED}
 CASES = 20
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def cases(rov: Rov, seed: str, count: int = CASES) -> tuple[dict[str, Array], dict[str, Array]]:
+def cases(rov: Vehicle, seed: str, count: int = CASES) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return arrays of random inputs and states by name."""
     rng = random.Random(seed)
     inputs = [random_inputs(rng, rov) for _ in range(count)]
@@ -54,12 +53,12 @@ def _columns(rows: list[dict[str, float]]) -> dict[str, Array]:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def by_engine(rov: Rov, inputs: dict[str, Array], states: dict[str, Array]) -> tuple[Array, Array]:
+def by_engine(rov: Vehicle, inputs: dict[str, Array], states: dict[str, Array]) -> tuple[Array, Array]:
     """Return the rates of the compiled engine, and the size of each rate over all cases."""
     wanted = [f"der({name})" for name in rov.layout.state]
     columns = {name: values[:, np.newaxis] for name, values in {**inputs, **states}.items()}
     delayed = replace(rov.layout, has_dead_time=False)
-    alone = Rov(delayed, {name: rov[name] for name in delayed.coefficients})
+    alone = Vehicle(delayed, {name: rov[name] for name in delayed.coefficients})
     found = simulate(alone, [0.0], columns, wanted, vehicles=CASES).values[:, :, 0]
     return found, np.abs(found).max(axis=1, keepdims=True)
 
@@ -68,11 +67,11 @@ def check(found: Any, expected: Array, scale: Array) -> None:
     assert np.all(np.abs(np.asarray(found) - expected) <= 1e-14 * scale)
 
 
-def _from_numpy(rov: Rov, inputs: dict[str, Array], states: dict[str, Array]) -> Any:
+def _from_numpy(rov: Vehicle, inputs: dict[str, Array], states: dict[str, Array]) -> Any:
     return arrays.rates(rov, np.stack([*states.values()]), arrays.forces(rov, inputs, {}), {})
 
 
-def _from_casadi(rov: Rov, inputs: dict[str, Array], states: dict[str, Array], kind: Any) -> Any:
+def _from_casadi(rov: Vehicle, inputs: dict[str, Array], states: dict[str, Array], kind: Any) -> Any:
     x, u = kind.sym("x", len(states)), kind.sym("u", len(inputs))
     forces = arrays.forces(rov, {name: u[n] for n, name in enumerate(inputs)}, {})
     function = casadi.Function("rates", [x, u], [arrays.rates(rov, x, forces, {})])

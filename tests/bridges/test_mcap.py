@@ -23,7 +23,7 @@ from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.layout import SURGE
+from rov_fmu.model.catalogue import SURGE
 from tests.folders import small_folder
 from tests.report.results import example
 

@@ -24,8 +24,7 @@ from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
 from rov_fmu.io.messages import InputError
 from rov_fmu.model.alone import RISE
-from rov_fmu.model.layout import AXES
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
@@ -198,8 +197,8 @@ def test_the_file_is_valid(name: str, form: Mapping[str, Any]) -> None:
 
 @pytest.mark.parametrize("name", VEHICLES)
 def test_every_kind_of_vehicle_gives_a_valid_file_or_one_line(name: str) -> None:
-    vehicle = replace(LOADED["bare"], rov=VEHICLES[name])
-    if "m_rov" not in vehicle.rov.coefficients:
+    vehicle = replace(LOADED["bare"], layout=VEHICLES[name].layout, coefficients=VEHICLES[name].coefficients)
+    if "m_rov" not in vehicle.coefficients:
         with pytest.raises(InputError, match="no mass m_rov"):
             gazebo_model(vehicle)
         return
@@ -303,7 +302,7 @@ SIGNS = {"u": 1.0, "v": -1.0, "w": -1.0, "p": 1.0, "q": -1.0, "r": -1.0}
 """The signs of components in Gazebo's frame by those in the vehicle's: left for starboard, up for down."""
 
 
-def newtons_of(gazebo: Gazebo, rov: Rov, thrust: Mapping[str, float]) -> dict[str, float]:
+def newtons_of(gazebo: Gazebo, rov: Vehicle, thrust: Mapping[str, float]) -> dict[str, float]:
     """The newtons to send for the thrust of the FMU's curves; alpha is seen in the largest thrust."""
     full = {name: rov.curve_force(curve, 1.0) for name, curve in rov.layout.curve_of.items()}
     return {name: force * gazebo.largest[name] / full[name] for name, force in thrust.items()}
@@ -313,7 +312,7 @@ def newtons_of(gazebo: Gazebo, rov: Rov, thrust: Mapping[str, float]) -> dict[st
 @pytest.mark.parametrize("name", SHIPPED)
 def test_an_axis_alone_has_the_steady_velocity_and_the_time_constant_of_the_fmu(name: str, command: float) -> None:
     vehicle = LOADED[name]
-    rov = vehicle.rov
+    rov = vehicle
     gazebo = Gazebo(gazebo_model(vehicle, in_world=True).text)
     for form in rov.layout.axes:
         if not rov.layout.drivers(form.axis):
@@ -341,7 +340,7 @@ HALF_TURN = np.diag([1.0, -1.0, -1.0])
 """From forward-starboard-down to forward-left-up."""
 
 
-def in_gazebo(rov: Rov, state: dict[str, float]) -> Array:
+def in_gazebo(rov: Vehicle, state: dict[str, float]) -> Array:
     """Position, rotation matrix and velocities of a state of the FMU, in Gazebo's frames."""
     angles = state | rov.calculated(rov.layout.usual_inputs, state)
     turned = Rotation.from_euler("ZYX", [angles["psi"], angles.get("theta", 0.0), angles.get("phi", 0.0)]).as_matrix()
@@ -351,7 +350,7 @@ def in_gazebo(rov: Rov, state: dict[str, float]) -> Array:
 
 def fly(vehicle: Vehicle, state: dict[str, float], pieces: int, seed: int) -> tuple[Array, Array]:
     """The last states of the FMU and of Gazebo under random commands, held for 0.4 s each; Gazebo gets the lag, too."""
-    rov, random = vehicle.rov, Random(seed)
+    rov, random = vehicle, Random(seed)
     gazebo = Gazebo(gazebo_model(vehicle, in_world=True).text)
     mine = in_gazebo(rov, state)
     for _ in range(pieces):
@@ -374,7 +373,7 @@ def fly(vehicle: Vehicle, state: dict[str, float], pieces: int, seed: int) -> tu
 
 def tuned(name: str, **coefficients: float) -> Vehicle:
     vehicle = LOADED[name]
-    return replace(vehicle, rov=vehicle.rov.extended(coefficients))
+    return vehicle.extended(coefficients)
 
 
 MOVING: dict[str, tuple[Vehicle, dict[str, float]]] = {
@@ -447,10 +446,10 @@ def test_with_the_added_mass_in_the_link_nothing_diverges(name: str) -> None:
 def test_the_link_has_the_mass_and_the_moments_of_the_file(name: str) -> None:
     vehicle = LOADED[name]
     found = Gazebo(gazebo_model(vehicle, in_world=True).text)
-    wanted = [vehicle.rov[key] for key in ("m_rov", "m_rov", "m_rov", "I_p", "I_q", "I_r")]
+    wanted = [vehicle[key] for key in ("m_rov", "m_rov", "m_rov", "I_p", "I_q", "I_r")]
     assert np.diag(found.rigid) == pytest.approx(wanted, rel=1e-3), "about the origin"
     weight, buoyancy = sum(mass for mass, _ in found.weights), found.density * found.volume
-    assert -found.gravity[2] * np.array([weight, buoyancy]) == pytest.approx([vehicle.rov["W"], vehicle.rov["B"]])
+    assert -found.gravity[2] * np.array([weight, buoyancy]) == pytest.approx([vehicle["W"], vehicle["B"]])
 
 
 def test_the_page_has_the_ratios_of_the_vehicles_that_ship() -> None:
@@ -564,7 +563,7 @@ def test_a_thruster_with_the_name_of_a_joint_is_refused() -> None:
     first, second, *others = vehicle.layout.thrusters
     renamed = (first, replace(second, name=f"{first.name}_joint"), *others)
     layout = replace(vehicle.layout, thrusters=renamed, mix={})
-    changed = replace(vehicle, rov=Rov(layout, vehicle.rov.coefficients))
+    changed = replace(vehicle, layout=layout)
     with pytest.raises(InputError, match=rf"thruster\.{first.name}_joint: choose another name for Gazebo"):
         gazebo_model(changed)
     assert f"thruster_{first.name}_joint" in gazebo_model(vehicle).text

@@ -25,16 +25,15 @@ from rov_fmu.cli import main
 from rov_fmu.engine.simulation import Array
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import THRUST_EFFECTS, pulsed
 
-HEAVY: Rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
 NEUTRAL = [1500] * 16
 ROV_TOML = """
@@ -48,7 +47,7 @@ source = "A simulated flight"
 """
 
 
-def setup_of(rov: Rov = HEAVY, **start: float) -> Setup:
+def setup_of(rov: Vehicle = HEAVY, **start: float) -> Setup:
     return Setup(rov, servos_of(rov.layout, None, {}), start, bottom=20.0)
 
 
@@ -90,7 +89,7 @@ def test_servo_packets_byte_by_byte() -> None:
 
 
 def test_a_reply_byte_by_byte() -> None:
-    rest = Connection(setup_of(load_vehicle(SHIPPED["videoray"]).rov, z=3.0))
+    rest = Connection(setup_of(load_vehicle(SHIPPED["videoray"]), z=3.0))
     answer = rest.answer(packet(400, 0, NEUTRAL), HERE)
     assert answer == (
         b'\n{"timestamp":0.0025,"imu":{"gyro":[0.0,0.0,0.0],"accel_body":[0.0,0.0,-9.80665]},"position":[0.0,0.0,3.0],'
@@ -113,7 +112,7 @@ def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
     assert sums == pytest.approx([0.0, 0.0, 23.9 + 4.58 + 4.4], abs=0.1)
     without = Connection(setup_of())
     assert "battery" not in json.loads(without.answer(packet(400, 0, NEUTRAL), HERE))
-    effects = load_vehicle(THRUST_EFFECTS).rov
+    effects = load_vehicle(THRUST_EFFECTS)
     table = {n: name.removeprefix("u_") for n, name in enumerate(effects.layout.commands, 1)}
     powered = Connection(Setup(effects, servos_of(effects.layout, None, table), {"voltage": 13.0}))
     assert json.loads(powered.answer(packet(400, 0, NEUTRAL), HERE))["battery"] == {"voltage": 13.0}
@@ -263,7 +262,7 @@ def rotation(phi: float, theta: float, psi: float) -> Array:
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "videoray"])
 def test_the_sensors_agree_with_each_other(name: str) -> None:
     """Specific force, gyro and velocity are the derivatives of what the other sensors tell."""
-    rov = load_vehicle(SHIPPED[name]).rov
+    rov = load_vehicle(SHIPPED[name])
     connection = Connection(setup_of(rov, V_N=0.4, V_E=-0.2, z=2.0))
     pulses = [1600, 1450, 1480, 1530, 1700, 1450, 1500, 1520] + [0] * 8
     rate, at = 5000, []
@@ -387,7 +386,7 @@ def test_frames_and_tables() -> None:
 
 def test_pulses_of_a_vehicle_with_pulses() -> None:
     """Its file says which pulse is full thrust; a pulse of 0 is none."""
-    plain = load_vehicle(SHIPPED["videoray"]).rov
+    plain = load_vehicle(SHIPPED["videoray"])
     rov = pulsed(plain, (1000.0, 1400.0, 2000.0))
     given, expected = Connection(setup_of(rov)), Connection(setup_of(plain))
     for count in range(20):

@@ -17,7 +17,7 @@ import numpy as np
 import psutil
 import pytest
 
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress
@@ -235,7 +235,7 @@ def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videor
 def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_path: Path) -> None:
     """The moment is a word beside the bar; the last one is the drawing of the report."""
     folder, output = Path(shutil.copytree(TESTS, tmp_path / "tests")), tmp_path / "out" / "rov.toml"
-    rov, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(0)
+    rov, random = load_vehicle(VIDEORAY), np.random.default_rng(0)
     for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
         write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
     output.parent.mkdir()

@@ -172,14 +172,15 @@ def test_a_plot_has_a_title_and_hides_no_curve(monkeypatch: pytest.MonkeyPatch) 
     constant, changing = figures
     assert constant.get_suptitle() == "VideoRay Pro 4: u_l=0.3, u_r = 0.3, u_t=0.9"
     assert changing.get_suptitle() == "VideoRay Pro 4: commands of commands.csv"
-    (forces,) = (ax for ax in constant.axes if ax.get_ylabel() == "N")
+    (forces,) = (ax for ax in constant.axes if ax.get_title(loc="left") == "Thrust (N)")
     assert [line.get_linestyle() for line in forces.lines] == ["-", "--", "-"], "F_r is that of F_l"
     assert {line.get_linestyle() for ax in changing.axes for line in ax.lines} == {"-"}
+    assert [ax.get_title(loc="left") for ax in constant.axes][-1] == "Commands (%)"
 
 
 def test_a_constant_has_an_axis_from_zero() -> None:
     result = rov_fmu.load("videoray").simulate([0.0, 1.0], {"u_t": 0.2}, record=["F_t"])
-    (panel,) = result.plot(figure=Figure()).axes
+    panel, _commands = result.plot(figure=Figure()).axes
     assert panel.get_ylim() == pytest.approx((0.0, 1.1 * result["F_t"][0]))
 
 

@@ -80,7 +80,7 @@ def test_top_speeds_balance_thrust_and_drag(computed: dict[str, Table], column: 
 
 
 def test_what_is_left_out_is_left_out() -> None:
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
     bare = without(rov, coupling=True, lag=True, shape=True)
     assert sum(seconds for seconds, _ in MANOEUVRE) == 30.0
     assert (not rov.layout.coupled, bool(rov.layout.lagging), rov["c_0_t200"]) == (False, True, 0.0872)
@@ -100,7 +100,7 @@ def test_the_published_equations_give_the_same_motions(computed: dict[str, Table
 
 def test_the_numbers_of_the_publications_are_those_of_the_files() -> None:
     for name, published in (("bluerov2", WU), ("bluerov2_heavy", VON_BENZON)):
-        rov = load_vehicle(SHIPPED[name]).rov
+        rov = load_vehicle(SHIPPED[name])
         for form in rov.layout.axes:
             axis, i = form.axis, "uvwpqr".index(form.axis.velocity)
             found = (rov[axis.inertia], *(rov[axis.coefficient(key)] for key in ("m_a", "b_d", "a_d")))
@@ -118,7 +118,7 @@ def test_vehicles_tilt_as_the_page_says(computed: dict[str, Table]) -> None:
 
 def test_the_heavy_turns_over_where_its_righting_moment_ends() -> None:
     """A quarter of full command: the thrust times 8.5 cm is the buoyancy times 1 cm."""
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
     curve = rov.layout.curves[0]
     thrust = sqrt(2.0) * (rov.curve_force(curve, 0.254) - rov.curve_force(curve, -0.254))
     assert thrust * 0.085 == pytest.approx(rov["B"] * 0.01, rel=0.01)

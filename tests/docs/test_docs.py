@@ -22,8 +22,7 @@ import tomlkit
 from docs import compared, reference
 from rov_fmu import __version__
 from rov_fmu.cli import _commands, main
-from rov_fmu.model.layout import ARM, AXIS, BODY, CURVE, TUNING
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import ARM, AXIS, BODY, CURVE, TUNING
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
@@ -231,12 +230,12 @@ def test_the_program_for_omsimulator_is_python_and_ends_where_it_says(vehicle: V
     compile(program, "importers.md", "exec")
     assert 'CRef("default", "rov", "u_t"), 0.3)' in program
     assert "setStopTime(10)" in program
-    (*_, down) = course(vehicle.rov, lambda _: {"u_t": 0.3}, 10.0, 0.1, 0.0)
+    (*_, down) = course(vehicle, lambda _: {"u_t": 0.3}, 10.0, 0.1, 0.0)
     assert f"# {down['z']:.4f} m\n" in program
 
 
 def course(
-    rov: Rov, command: Callable[[float], Mapping[str, float]], seconds: float, h: float, at: float
+    rov: Vehicle, command: Callable[[float], Mapping[str, float]], seconds: float, h: float, at: float
 ) -> list[State]:
     """The states from rest after each 0.1 s, the command of a step taken at a fraction of it."""
     state, rows = dict.fromkeys(rov.layout.state, 0.0), []
@@ -249,9 +248,9 @@ def course(
 
 def test_the_first_simulations_end_where_the_pages_say(vehicle: Vehicle) -> None:
     readme, importers = (page.read_text(encoding="utf-8") for page in (README, ROOT / "docs" / "importers.md"))
-    (*_, ahead) = course(vehicle.rov, lambda _: {"u_l": 0.3, "u_r": 0.3}, 10.0, 0.1, 0.0)
+    (*_, ahead) = course(vehicle, lambda _: {"u_l": 0.3, "u_r": 0.3}, 10.0, 0.1, 0.0)
     assert f"ends at u = {ahead['u']:.4f} m/s" in readme
-    untuned = vehicle.rov.replaced({"alpha_w": 1.0, "beta_w": 1.0})
+    untuned = vehicle.replaced({"alpha_w": 1.0, "beta_w": 1.0})
     (*_, down) = course(untuned, lambda _: {"u_t": 0.3}, 20.0, 0.1, 0.0)
     assert f"positive down: {down['w']:.4f} m/s" in importers
 
@@ -263,10 +262,10 @@ def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
         turn = 0.4 * sin(2.0 * pi * t / 20.0)
         return {"u_l": 0.5 + turn, "u_r": 0.5 - turn}
 
-    true = course(vehicle.rov, winding, 20.0, 0.01, 0.5)
+    true = course(vehicle, winding, 20.0, 0.01, 0.5)
     told = (ROOT / "docs" / "importers.md").read_text(encoding="utf-8")
     for what, at, digits in (("start", 0.0, 3), ("middle", 0.5, 4)):
-        rows = course(vehicle.rov, winding, 20.0, 0.1, at)
+        rows = course(vehicle, winding, 20.0, 0.1, at)
         pairs = list(zip(rows, true, strict=True))
         off = max(hypot(a["x"] - b["x"], a["y"] - b["y"]) for a, b in pairs)
         in_r = max(abs(a["r"] - b["r"]) for a, b in pairs)

@@ -28,7 +28,7 @@ from examples.station_keeping.system import (
 )
 from examples.systems import PARAMETER_SET
 from rov_fmu.model.layout import Curve, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import Made
 from verification.references.fmpy_slave import keep_loaded
 
@@ -114,7 +114,7 @@ COMMANDS = ("u_l", "u_r", "u_t")
 @pytest.mark.parametrize("curve", [(42.9, 2.711), (6.494, 0.0513), (5.0, 0.0), (0.0, 5.0)])
 def test_the_thrust_curve_is_that_of_the_model_and_inverted(curve: tuple[float, float]) -> None:
     thruster, of_model = Thruster(*curve), Curve("rear")
-    rov = Rov(Layout((), (of_model,), ()), dict(zip(("a_t_rear", "b_t_rear"), curve, strict=True)))
+    rov = Vehicle(Layout((), (of_model,), ()), dict(zip(("a_t_rear", "b_t_rear"), curve, strict=True)))
     for command in np.linspace(-1.0, 1.0, 21):
         force = thruster.force(command)
         assert force == pytest.approx(rov.curve_force(of_model, command), abs=1e-14)

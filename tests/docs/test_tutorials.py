@@ -18,12 +18,11 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Effect, Identification
-from rov_fmu.model.layout import SURGE
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import SURGE
 from rov_fmu.report.plots.steps import tables_by_axis
 from rov_fmu.study import Results, study
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT, ROOT
 from tests.vehicles import at_rest, still
 
@@ -53,13 +52,13 @@ def text(page: Path) -> str:
     return " ".join(page.read_text(encoding="utf-8").split())
 
 
-def misses(found: Identification, truth: Rov) -> list[str]:
+def misses(found: Identification, truth: Vehicle) -> list[str]:
     """Return the coefficients whose interval does not contain the truth."""
     intervals = {name: of for name, of in found.vehicle.intervals.items() if name in truth.coefficients}
     return [name for name, (low, high) in intervals.items() if not low <= truth[name] <= high]
 
 
-def rear_forces(rov: Rov) -> np.ndarray[Any, Any]:
+def rear_forces(rov: Vehicle) -> np.ndarray[Any, Any]:
     """Return commands, and the forces (N) of the rear thrusters at these, n x 2."""
     return np.array([(c, rov.force(SURGE, c)) for c in (-0.7, -0.5, -0.3, 0.2, 0.3, 0.5, 0.7)])
 
@@ -83,7 +82,7 @@ def test_otter(otter: Identification) -> None:
     names = re.findall(r'"((?:a_d|b_d|beta|F_0)_[uwr])"', text(TANK))
     assert len(names) == 10
     assert len([name for name in misses(otter, OTTER) if name in names]) <= 1
-    assert all(otter.vehicle.rov[name] == pytest.approx(OTTER[name], rel=0.03) for name in names)
+    assert all(otter.vehicle[name] == pytest.approx(OTTER[name], rel=0.03) for name in names)
     found = {effect.kind: effect for effect in kept(otter).values()}
     assert {"dead time", "load"} <= found.keys()
     assert found["dead time"].value == pytest.approx(DELAY, abs=0.003)
@@ -95,8 +94,8 @@ def test_otter(otter: Identification) -> None:
 def test_what_the_tank_tutorial_says_of_the_thrust_is_so(otter: Identification) -> None:
     assert not by_heading(otter.findings)["Warnings"]
     ((command, scatter),) = re.findall(r"the forces at (\d+) % scatter by ([\d.]+) N", text(TANK))
-    assert 1.0 < otter.vehicle.rov.force(SURGE, float(command) / 100.0) < 5.0
-    forces = rear_forces(otter.vehicle.rov)
+    assert 1.0 < otter.vehicle.force(SURGE, float(command) / 100.0) < 5.0
+    forces = rear_forces(otter.vehicle)
     pulls = np.loadtxt(otter.folder.path / "thrust_rear.csv", delimiter=",", skiprows=1)
     off = [force - bollard_pull("rear", command / 100.0) for command, force in pulls.tolist()]
     assert np.std(off) == pytest.approx(float(scatter), rel=0.3)
@@ -120,7 +119,7 @@ def test_what_the_tank_tutorial_says_of_the_next_test_and_of_what_is_left_out_is
 @pytest.mark.long
 def test_half_thrust_ahead_ends_where_the_tutorial_says(otter: Identification) -> None:
     ends = []
-    for rov in (otter.vehicle.rov, OTTER):
+    for rov in (otter.vehicle, OTTER):
         inputs = still(rov) | {"u_l": 0.5, "u_r": 0.5}
         ends.append(rov.step(inputs, at_rest(rov), 10.0)["u"])
     assert ends[0] == pytest.approx(ends[1], abs=2e-3)
@@ -184,7 +183,7 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
     expected.append(f"the same study would give {low:.3g} m to {high:.3g} m")
     expected.append(f"which causes {index.S1['beta_u']:.0%} of the variance".replace("%", " %"))
     vehicle = load_vehicle(REFIT)
-    rov = vehicle.rov
+    rov = vehicle
     a, b, inertia = rov["a_d_u"], rov["b_d_u"], rov["m_rov"] / rov["beta_u"]
     errors = [vehicle.estimates[name].error for name in ("a_d_u", "b_d_u")]
     expected.append(f"{a:.1f} ± {errors[0]:.1f} N·s²/m² and linear drag {b:.1f} ± {errors[1]:.1f} N·s/m")

@@ -13,10 +13,9 @@ from scipy.linalg import expm
 from rov_fmu.engine.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.identify.given import with_axis_alone
-from rov_fmu.model.layout import HEAVE, SURGE, YAW
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VIDEORAY
 from verification.references.kalman import Belief, Sample, run
 
@@ -27,11 +26,11 @@ START = {"w": 0.05, "z": 1.0, "F_t": 0.1}
 ERRORS = {"w": 0.1, "z": 0.02, "F_t": 0.05}
 
 
-def heave(**more: float) -> Rov:
+def heave(**more: float) -> Vehicle:
     """Return the heave of the VideoRay alone, with other or more coefficients."""
     k = VIDEORAY.extended(more)
     layout = with_axis_alone(k.layout, HEAVE)
-    return Rov(layout, {name: k[name] for name in layout.coefficients})
+    return Vehicle(layout, {name: k[name] for name in layout.coefficients})
 
 
 LAGGING = heave(T_top=0.2, F_0_w=0.1)
@@ -60,7 +59,7 @@ def record(
     return Record(tuple(sensors), time, value, sensor.astype(np.intc), told - between, told, numbers, start, errors)
 
 
-def parameters(k: Rov, sensors: int, **changes: Any) -> Parameters:
+def parameters(k: Vehicle, sensors: int, **changes: Any) -> Parameters:
     """Return the parameters of a filter without any slow process, and with white noise of 0.01, with some changes."""
     known = Parameters(
         coefficients=dict(k.coefficients),
@@ -81,7 +80,7 @@ PROCESSES = (Slow(0.3, 2.0), Slow(0.2, 5.0), Slow(0.02, 3.0), Slow(0.006, 0.7), 
 SIZES, TIME_CONSTANTS = (np.array([getattr(one, key) for one in PROCESSES]) for key in ("size", "time_constant"))
 
 
-def with_all(k: Rov) -> Parameters:
+def with_all(k: Vehicle) -> Parameters:
     """Return the parameters of a filter for a depth and a velocity with all slow processes and noises."""
     force, gain, drift, *noise = PROCESSES
     drifts = NONE, NONE, drift
@@ -92,7 +91,7 @@ def with_all(k: Rov) -> Parameters:
 class Diver:
     """The heave of one axis with everything that is slow, by hand: w, z, F, force, gain, drift, and two noises."""
 
-    k: Rov
+    k: Vehicle
     switches: Array
     commands: Array
 
@@ -106,7 +105,7 @@ class Diver:
         return np.concatenate([moved, -x[3:] / TIME_CONSTANTS])
 
 
-def textbook(k: Rov, log: Record) -> tuple[Array, Array]:
+def textbook(k: Vehicle, log: Record) -> tuple[Array, Array]:
     """Return the innovations and variances of a log of depth and velocity by the textbook filter."""
     measure: list[Callable[[Array], float]] = [lambda x: float(x[1] + x[6]), lambda x: float(x[0] + x[5] + x[7])]
     mean = np.array([*log.start.values(), *np.zeros(5)])
@@ -127,7 +126,7 @@ def sampled(seed: int = 0, seconds: float = 6.0) -> list[tuple[float, int]]:
     return [(0.2 * n, 0) for n in range(round(5 * seconds))] + [(t, 1) for t in irregular.tolist() if t < seconds]
 
 
-def measured(k: Rov, log: Record, seed: int = 1) -> Record:
+def measured(k: Vehicle, log: Record, seed: int = 1) -> Record:
     """Return the log with values near those of the model."""
     off = Filter(k).run(log, parameters(k, 2), begin=0.0).innovations
     random = np.random.default_rng(seed)
@@ -232,9 +231,9 @@ def test_linear_motion_has_the_exact_innovations() -> None:
 @pytest.mark.parametrize("name", ["videoray", "bluerov2", "bluerov2_heavy"])
 def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
     """Samples that tell nothing leave the mean to itself."""
-    k, random = load_vehicle(SHIPPED[name]).rov, np.random.default_rng(3)
+    k, random = load_vehicle(SHIPPED[name]), np.random.default_rng(3)
     layout = replace(k.layout, mix={}, pulse=None, has_dead_time=False)
-    k = Rov(layout, {name: k[name] for name in layout.coefficients})
+    k = Vehicle(layout, {name: k[name] for name in layout.coefficients})
     inputs, time = [*layout.inputs], 0.1 * np.arange(200.0)
     told = time[::17]
     commands = {name: random.uniform(-0.5, 0.5, len(told)) for name in layout.commands}
@@ -267,7 +266,7 @@ def test_diverging_motion_is_an_error() -> None:
 # ---- Samples ---------------------------------------------------------------------------------------------------------
 
 
-def turning(values: Array, k: Rov = VIDEORAY) -> Run:
+def turning(values: Array, k: Vehicle = VIDEORAY) -> Run:
     """Return the run of a vehicle that turns for 20 s, by its heading."""
     time = 0.25 * np.arange(len(values))
     log = record(

@@ -11,14 +11,14 @@ from scipy.integrate import solve_ivp
 from rov_fmu.bridges import arrays
 from rov_fmu.engine.jacobian import step_jacobian
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import SIX, VEHICLES, random_inputs, random_state
 
 ALL = {**VEHICLES, "six_coupled": SIX}
 H = 0.5
 
 
-def _variational(rov: Rov, inputs: dict[str, float], state: dict[str, float]) -> Any:
+def _variational(rov: Vehicle, inputs: dict[str, float], state: dict[str, float]) -> Any:
     """Return the states after H and their derivatives, by CasADi's derivatives of the rates and DOP853."""
     names = [*inputs, *rov.coefficients]
     n, m = len(rov.layout.state), len(names)

@@ -18,7 +18,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT
 from tests.vehicles import VEHICLES
 
-ROV = load_vehicle(BARE).rov
+ROV = load_vehicle(BARE)
 _MADE: dict[str, bytes] = {}
 """The libraries that these tests have compiled, by their sources."""
 

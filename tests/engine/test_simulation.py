@@ -19,16 +19,15 @@ from numpy.typing import NDArray
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.layout import Curve, Thruster
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.schema import MOST
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, numbered, random_inputs, random_state
 
 Array = NDArray[np.float64]
 
 
-def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], start: dict[str, float]) -> Array:
+def fmu_states(folder: Path, rov: Vehicle, times: Array, inputs: dict[str, Array], start: dict[str, float]) -> Array:
     """Return the states and the thrust of an FMU that FMPy steps, as an array of variables x times."""
     description = fmpy.read_model_description(str(folder))
     references = {v.name: v.valueReference for v in description.modelVariables}
@@ -59,7 +58,7 @@ def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], s
     "name", ["everything", *(pytest.param(name, marks=pytest.mark.long) for name in ("videoray", "heavy", "six"))]
 )
 def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureRequest) -> None:
-    rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING).rov, "six": SIX}[name]
+    rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING), "six": SIX}[name]
     folder = request.getfixturevalue(f"{name}_dir")
     rng = random.Random(7)
     lengths = [rng.choice([2.0**-10, 2.0**-6, 2.0**-3, 1.0, 16.0]) for _ in range(200)]
@@ -116,7 +115,7 @@ def test_the_number_of_threads_and_vehicles_changes_no_bit() -> None:
 
 def test_calculated_variables_agree_with_python() -> None:
     rng = random.Random(3)
-    for rov in (VIDEORAY, load_vehicle(EVERYTHING).rov, SIX):
+    for rov in (VIDEORAY, load_vehicle(EVERYTHING), SIX):
         layout, vehicles = rov.layout, 50
         inputs, states = ([draw(rng, rov) for _ in range(vehicles)] for draw in (random_inputs, random_state))
         values = {name: np.array([[each[name]] for each in inputs]) for name in layout.inputs}

@@ -5,17 +5,16 @@ import pytest
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.engine.stepper import Stepper
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
 
 FILES = [SHIPPED["videoray"], SHIPPED["bluerov2_heavy"], ROOT / "tests" / "vehicle" / "thrust_effects.toml"]
 H, STEPS = 0.004, 150
 
 
-def vehicle(n: int) -> Rov:
-    return load_vehicle(FILES[n]).rov
+def vehicle(n: int) -> Vehicle:
+    return load_vehicle(FILES[n])
 
 
 @pytest.mark.parametrize("n", range(len(FILES)))

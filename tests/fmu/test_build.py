@@ -78,7 +78,7 @@ def test_the_archive_has_only_files_of_its_version(either_dir: Path, fmi: int) -
 
 def test_the_description_says_what_the_interface_declares(videoray_dir: Path, vehicle: Vehicle) -> None:
     description = fmpy.read_model_description(str(videoray_dir))
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     assert [v.name for v in description.modelVariables] == [v.name for v in declared]
     for read, v in zip(description.modelVariables, declared, strict=True):
         assert read.valueReference == v.value_reference
@@ -158,7 +158,7 @@ def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Veh
         path.write_text(ALONE.replace("6.57", mass), encoding="utf-8")
         guids.append(native_content(load_vehicle(path)).guid)
     assert guids[0] == guids[1] != guids[2]
-    assert vehicle.rov["m_rov"] == 6.57
+    assert vehicle["m_rov"] == 6.57
 
 
 def test_build_raises_an_error_about_an_unknown_platform(vehicle: Vehicle, tmp_path: Path) -> None:

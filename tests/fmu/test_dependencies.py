@@ -8,8 +8,7 @@ from lxml import etree
 
 from rov_fmu.fmu.model_description import NATIVE, model_description
 from rov_fmu.fmu.variables import Variable, variables
-from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, VEHICLES, a_vehicle, numbered, with_axes
 from verification.references.rigid_vehicle import QUATERNION, calculated
 
@@ -17,7 +16,7 @@ Point = dict[str, float]
 Slopes = dict[tuple[str, str], float]
 
 
-def slopes(rov: Rov, point: Point, knowns: Sequence[str]) -> Slopes:
+def slopes(rov: Vehicle, point: Point, knowns: Sequence[str]) -> Slopes:
     """Return central differences at a point of inputs, states and coefficients."""
     found = {}
     for known in knowns:
@@ -40,7 +39,7 @@ def motions(names: Sequence[str], rng: random.Random, pairs: int) -> list[Point]
     return found
 
 
-def parameters(rov: Rov, rng: random.Random, tunable: Sequence[bool]) -> Point:
+def parameters(rov: Vehicle, rng: random.Random, tunable: Sequence[bool]) -> Point:
     of = rov.layout.coefficients
     return {n: x * (rng.uniform(0.6, 1.4) if of[n].tunable in tunable else 1.0) for n, x in rov.coefficients.items()}
 
@@ -49,7 +48,7 @@ def vary(values: Sequence[float]) -> bool:
     return max(values) - min(values) > 1e-4 * max(map(abs, values))
 
 
-def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
+def declared(rov: Vehicle, of: str) -> dict[tuple[str, str], str]:
     """Return a list of <ModelStructure>."""
     of_rov = variables(rov)
     root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE[2]))
@@ -61,7 +60,7 @@ def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
     return found
 
 
-_ROVS = {"everything": load_vehicle(EVERYTHING).rov, "six axes": SIX} | VEHICLES
+_ROVS = {"everything": load_vehicle(EVERYTHING), "six axes": SIX} | VEHICLES
 _ROVS |= {f"{axes} alone": with_axes(axes) for axes in ("q", "wp", "upr")}
 # The default tests have the vehicle with most effects.
 _SOME = ("everything",)

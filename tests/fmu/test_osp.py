@@ -10,7 +10,6 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.variables import unit_of, variables
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.vehicles import SIX, VEHICLES
@@ -49,7 +48,7 @@ def references(group: etree._Element) -> list[str]:
 
 
 @pytest.mark.parametrize("rov", [*VEHICLES.values(), SIX], ids=[*VEHICLES, "six axes"])
-def test_every_input_and_output_is_in_one_group(rov: Rov) -> None:
+def test_every_input_and_output_is_in_one_group(rov: Vehicle) -> None:
     """The variables of a group have the same causality and unit, and different axes."""
     groups = groups_of(rov.layout)
     declared = {v.name: v for v in variables(rov)}

@@ -58,7 +58,7 @@ def _instance(folder: Path) -> FMU2Slave:
 def test_it_is_valid_and_says_what_it_can_do(python_fmu: Path, vehicle: Vehicle) -> None:
     assert validate_fmu(str(python_fmu)) == []
     description = fmpy.read_model_description(str(python_fmu))
-    assert [v.name for v in description.modelVariables] == [v.name for v in variables(vehicle.rov)]
+    assert [v.name for v in description.modelVariables] == [v.name for v in variables(vehicle)]
     assert description.modelExchange is None
     can = description.coSimulation
     assert (can.canGetAndSetFMUstate, can.canSerializeFMUstate, can.needsExecutionTool) == (True, True, True)
@@ -79,7 +79,7 @@ def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
 
 
 def test_its_modules_import_nothing_of_the_package(vehicle: Vehicle) -> None:
-    for name, text in python_sources(vehicle, variables(vehicle.rov)).items():
+    for name, text in python_sources(vehicle, variables(vehicle)).items():
         lines = [line.split() for line in text.splitlines()]
         imported = [words[1] for words in lines if words[:1] in (["from"], ["import"]) and len(words) > 1]
         assert not [module for module in imported if module.startswith("rov_fmu")], name
@@ -92,7 +92,7 @@ def _by_kind(declared: tuple[Variable, ...], **wanted: str) -> list[Variable]:
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 6))])
 def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, vehicle: Vehicle, seed: int) -> None:
     random_ = random.Random(seed)
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     both = [_instance(python_dir), _instance(videoray_dir)]
     outputs = [v.value_reference for v in declared if v.causality != "parameter"]
     parameters = _by_kind(declared, causality="parameter")
@@ -265,7 +265,7 @@ def test_both_flavours_warn_once_about_saturation_and_about_a_jump_in_time(
 
 
 def test_values_that_the_native_one_refuses_are_refused(python_dir: Path, vehicle: Vehicle) -> None:
-    by_name = {v.name: v for v in variables(vehicle.rov)}
+    by_name = {v.name: v for v in variables(vehicle)}
     slave = _instance(python_dir)
     slave.enterInitializationMode()
     for name, value in (("u_l", float("nan")), ("Z_ext", float("inf")), ("m_rov", -1.0), ("beta_r", float("nan"))):
@@ -277,7 +277,7 @@ def test_values_that_the_native_one_refuses_are_refused(python_dir: Path, vehicl
 
 def test_a_refused_value_leaves_the_process_intact(python_dir: Path, vehicle: Vehicle) -> None:
     """PythonFMU 0.7 releases its objects twice after an exception, so that a later instance crashes the process."""
-    calculated = _by_kind(variables(vehicle.rov), initial="calculated")
+    calculated = _by_kind(variables(vehicle), initial="calculated")
     for v in calculated:
         log: list[Message] = []
         slave = fmpy_slave(python_dir, recording_callbacks(log))

@@ -102,7 +102,7 @@ def test_terminals_are_placed_around_the_icon_without_overlap(kind: str) -> None
 )
 def test_the_fmu_has_them_with_their_pictures(name: str, content_of: Callable[..., Content]) -> None:
     vehicle = load_vehicle(SHIPPED[name])
-    files = content_of(vehicle, pictures(vehicle.rov)).files
+    files = content_of(vehicle, pictures(vehicle)).files
     document = files["terminalsAndIcons/terminalsAndIcons.xml"]
     described = etree.fromstring(files["modelDescription.xml"]).iter("ScalarVariable")
     connected = sorted(v.get("name") for v in described if v.get("causality") in {"input", "output"})

@@ -17,7 +17,6 @@ from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE
 from tests.fmi import CO_SIMULATION, INTERFACES, MODEL_EXCHANGE
@@ -43,7 +42,7 @@ _LISTS = {
 }
 
 
-def described(rov: Rov, fmi: int) -> etree._Element:
+def described(rov: Vehicle, fmi: int) -> etree._Element:
     description = model_description(a_vehicle(rov), variables(rov), guid="{1}", interfaces=NATIVE[fmi], fmi=fmi)
     return etree.fromstring(description)
 

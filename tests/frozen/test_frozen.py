@@ -25,7 +25,7 @@ def _vehicle(path: Path) -> Any:
     vehicle = rov_fmu.load(path)
     layout, uncertainty = vehicle.layout, vehicle.uncertainty
     return {
-        "coefficients": dict(vehicle.rov.coefficients),
+        "coefficients": dict(vehicle.coefficients),
         "inputs": [*layout.inputs],
         "states": [*layout.state],
         "errors": dict(zip(uncertainty.names, map(float, uncertainty.errors), strict=True)) if uncertainty else {},

@@ -13,7 +13,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.interface.tune_command import read_points
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import AXES, HEAVE
+from rov_fmu.model.catalogue import AXES, HEAVE
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
@@ -43,7 +43,7 @@ def tests(tmp_path: Path) -> Path:
     (folder / "thrust_top.csv").write_text(
         "command [%],force [N]\n20,0.27\n50,1.65\n70,3.2\n-50,-1.6\n", encoding="utf-8"
     )
-    recording = clean(load_vehicle(VIDEORAY).rov, HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
+    recording = clean(load_vehicle(VIDEORAY), HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
     write_log(folder, "a", recording.noisy(np.random.default_rng(1)))
     return folder
 
@@ -118,7 +118,7 @@ def test_any_folder_is_identified_or_one_clear_line(
         said = without_progress(err)
         if code == 0:
             vehicle = load_vehicle(out / "rov.toml")
-            assert all(isfinite(value) for value in vehicle.rov.coefficients.values())
+            assert all(isfinite(value) for value in vehicle.coefficients.values())
             assert said == ""
             assert not re.search(r"\bnan\b", printed)
             (out / "rov.toml").unlink()
@@ -302,4 +302,4 @@ def test_bounds_of_points_are_those_of_tests(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("command [%],velocity [m/s]\n20,10000\n", encoding="utf-8")
     with pytest.raises(DataFileError, match="must be at most 1000"):
-        read_points(path, load_vehicle(VIDEORAY).rov, HEAVE)
+        read_points(path, load_vehicle(VIDEORAY), HEAVE)

@@ -16,7 +16,7 @@ from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
@@ -87,7 +87,7 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
     check_answers(heave, 1e-3)
     for name in ("a_d_w", "b_d_w", "beta_w", "a_t_top", "b_t_top"):
         low, high = of_tables.vehicle.intervals[name]
-        assert of_tables.vehicle.rov[name] == pytest.approx(TRUTH[name], rel=2e-3)
+        assert of_tables.vehicle[name] == pytest.approx(TRUTH[name], rel=2e-3)
         assert low <= TRUTH[name] <= high
     assert heave.verdict.word == "good"
     assert kinds(of_tables) == {
@@ -145,14 +145,23 @@ def check_file(found: Identification, path: Path) -> Vehicle:
     """Check that the vehicle is the same after it is written and read; the vehicle as read."""
     write_vehicle(found.vehicle, path)
     read_again, made = load_vehicle(path), found.vehicle
-    for name, value in made.rov.coefficients.items():
-        assert read_again.rov[name] == pytest.approx(value, rel=1e-5)
+    for name, value in made.coefficients.items():
+        assert read_again[name] == pytest.approx(value, rel=1e-5)
     assert read_again.intervals.keys() == made.intervals.keys()
     for name, interval in made.intervals.items():
         assert read_again.intervals[name] == pytest.approx(interval, rel=1e-5)
     assert read_again.uncertainty.errors == pytest.approx(made.uncertainty.errors, rel=1e-5)
     assert read_again.uncertainty.correlation == pytest.approx(made.uncertainty.correlation, abs=2e-6)
-    assert replace(read_again, rov=made.rov, intervals=made.intervals, estimates=made.estimates) == made
+    assert (
+        replace(
+            read_again,
+            layout=made.layout,
+            coefficients=made.coefficients,
+            intervals=made.intervals,
+            estimates=made.estimates,
+        )
+        == made
+    )
     return read_again
 
 
@@ -164,7 +173,7 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
         "time_constant_heave.csv"
     }
     assert of_tables.vehicle.provenance
-    assert of_tables.vehicle.provenance.data == "tank tests"
+    assert of_tables.vehicle.measured_from == "tank tests"
     assert (made.warnings, made.facts) == (warnings(of_tables.findings), facts(of_tables.findings))
     assert vehicle.command_range == (0.2, 0.8)
 
@@ -195,7 +204,7 @@ def test_axes_that_share_a_curve_are_correlated_in_the_file(tmp_path: Path) -> N
 
 def spread(vehicle: Vehicle, told: Uncertainty, uniform: np.ndarray) -> float:
     """Return the relative standard deviation of V_ss in yaw at half command over n sets of coefficients (n x p)."""
-    drawn = [vehicle.rov.replaced(dict(zip(told.names, row, strict=True))) for row in told.drawn(uniform).tolist()]
+    drawn = [vehicle.replaced(dict(zip(told.names, row, strict=True))) for row in told.drawn(uniform).tolist()]
     V_ss = [k.response(YAW, 0.5)[0] for k in drawn]
     return float(np.std(V_ss) / np.mean(V_ss))
 
@@ -205,8 +214,8 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand" }\n'
     tables = responses(TRUTH, YAW)
     found = identify(read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', tables)).vehicle
-    assert found.rov["a_d_u"] == base.rov["a_d_u"]
-    assert found.rov["beta_w"] == 0.6
+    assert found["a_d_u"] == base["a_d_u"]
+    assert found["beta_w"] == 0.6
     assert found.sources["beta_w"] == "by hand"
     assert found.intervals.get("b_d_u") == base.intervals.get("b_d_u")
     assert "beta_w" not in found.intervals
@@ -275,7 +284,7 @@ def test_logs_of_a_vehicle_give_the_vehicle(of_logs: Identification, tmp_path: P
 def test_the_vehicle_of_the_file_moves_as_the_answers_say(of_logs: Identification) -> None:
     """The file has the quadratic curve that is nearest to the fitted one."""
     for answer in of_axis(of_logs, HEAVE).answers:
-        V_ss, Tau = of_logs.vehicle.rov.response(HEAVE, answer.command)
+        V_ss, Tau = of_logs.vehicle.response(HEAVE, answer.command)
         assert V_ss == pytest.approx(answer.steady[0], rel=0.02)
         assert Tau == pytest.approx(answer.rise[0], rel=0.02)
 
@@ -296,9 +305,12 @@ def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
     assert of_axis(of_logs, HEAVE).coverage > 0.9
 
 
-def test_nothing_is_told_of_clean_logs_but_their_coverage(of_logs: Identification) -> None:
+def test_nothing_is_told_of_clean_logs(of_logs: Identification) -> None:
     about_heave = {kind for kind, of in kinds(of_logs) if of not in ("surge", "yaw", "rear")}
-    assert about_heave == {"coverage"}
+    assert about_heave == set()
+    made = of_logs.vehicle.provenance
+    assert made
+    assert made.verdicts[0].startswith("heave: good. The 95% bands contain ")
     assert not any(effect.kept for effect in of_logs.effects)
     for logging in of_logs.logging:
         low, high = logging.offset_interval
@@ -408,7 +420,7 @@ def test_exact_thrust_stays_as_it_is(tmp_path: Path) -> None:
     rov = f'base = "videoray"\n{HEAD}[priors]\nthrust = 0.0\n'
     found = identify(load_tests(with_logs(tmp_path, HEAVE, 1, rov, {})))
     for name in ("a_t_top", "b_t_top"):
-        assert found.vehicle.rov[name] == TRUTH[name]
+        assert found.vehicle[name] == TRUTH[name]
     assert not {effect.kind for effect in found.effects} & {"reverse thrust", "dead band"}
     drag = found.vehicle.intervals["a_d_w"]
     assert drag[1] - drag[0] < 0.1 * TRUTH["a_d_w"]
@@ -423,12 +435,12 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
     sagging = [f"{row},{16.0 - 0.03 * n:.2f}" for n, row in enumerate(rows)]
     path.write_text("\n".join([f"{header},voltage [V]", *sagging]) + "\n", encoding="utf-8")
     found = identify(load_tests(folder))
-    assert all(np.isfinite(value) for value in found.vehicle.rov.coefficients.values())
+    assert all(np.isfinite(value) for value in found.vehicle.coefficients.values())
     assert all(np.isfinite(effect.evidence) for effect in found.effects)
     absent = {"lag": "lag", "dead_time": "dead time", "load": "load", "dead_band": "dead band", "voltage": "voltage"}
     assert absent.get(key) not in {effect.kind for effect in found.effects}
     if key == "voltage":
-        assert found.vehicle.rov["n_V_top"] == USUAL_EXPONENT
+        assert found.vehicle["n_V_top"] == USUAL_EXPONENT
     if key.startswith("slow_"):
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
 
@@ -444,7 +456,7 @@ def test_known_coefficients_are_kept(tmp_path: Path) -> None:
     known = KNOWN + 'beta_w = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
     tables = {**FORCES, "steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]}
     vehicle = identify(read(tmp_path, known, tables)).vehicle
-    assert (vehicle.rov["beta_w"], vehicle.sources["beta_w"]) == (0.8, "a guess")
+    assert (vehicle["beta_w"], vehicle.sources["beta_w"]) == (0.8, "a guess")
     assert vehicle.intervals["beta_w"] == (0.7, 0.9)
 
 
@@ -454,7 +466,7 @@ def test_known_thrust_is_kept(tmp_path: Path) -> None:
         f'{n}_top = {{ value = {TRUTH[f"{n}_top"]}, unit = "N", source = "pulled" }}\n' for n in ("a_t", "b_t")
     )
     vehicle = identify(load_tests(with_logs(tmp_path, HEAVE, 1, KNOWN + given, {}))).vehicle
-    assert [vehicle.rov[name] for name in ("a_t_top", "b_t_top")] == [TRUTH["a_t_top"], TRUTH["b_t_top"]]
+    assert [vehicle[name] for name in ("a_t_top", "b_t_top")] == [TRUTH["a_t_top"], TRUTH["b_t_top"]]
     assert vehicle.sources["a_t_top"] == "pulled"
 
 
@@ -463,7 +475,7 @@ def test_a_vehicle_to_compare_with_is_loaded(tmp_path: Path, capsys: pytest.Capt
     folder = folder_of(tmp_path / "tests", f'against = "videoray"\n{KNOWN}', tables)
     found = identify(load_tests(folder))
     assert found.against
-    assert found.against.rov == VIDEORAY
+    assert found.against == VIDEORAY
     with pytest.raises(VehicleFileError, match=r"rov\.toml: against = 'videoray2': must be a vehicle file"):
         load_tests(folder_of(folder, f'against = "videoray2"\n{KNOWN}', tables))
     assert not capsys.readouterr().out

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.model.layout import HEAVE
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.pool import run, with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
 from verification.references import pool, rigid_pool
@@ -38,7 +37,7 @@ def test_a_swim_is_that_of_the_exact_step(name: str) -> None:
             assert motion[symbol][n + 1] == pytest.approx(state[symbol], rel=1e-7, abs=1e-8), (symbol, n)
 
 
-def late(k: Rov, delay: float) -> Array:
+def late(k: Vehicle, delay: float) -> Array:
     return run(k, HEAVE, PLAN, 20.0, delay=delay).velocity
 
 
@@ -50,20 +49,20 @@ def test_a_delay_moves_the_motion_in_time() -> None:
 
 # ---- Commands that switch at any time, and conditions ----------------------------------------------------------------
 
-HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
 SWITCHES = np.array([0.0, 0.613, 0.977, 1.0142, 1.3])
 TIME: Array = np.array([0.0, 0.3, 0.7, 0.9, 1.0, 1.35, 1.4])
 Simulate = Callable[..., dict[str, Array]]
 
 
-def flown(k: Rov, *, most: float = 0.5) -> Commands:
+def flown(k: Vehicle, *, most: float = 0.5) -> Commands:
     """Return commands of every thruster."""
     rng = np.random.default_rng(0)
     return Commands(SWITCHES, {t.name: rng.uniform(-most, most, len(SWITCHES)) for t in k.layout.thrusters})
 
 
 @pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
-def test_commands_may_switch_between_samples(simulate: Simulate, k: Rov) -> None:
+def test_commands_may_switch_between_samples(simulate: Simulate, k: Vehicle) -> None:
     """The exact step goes from each time to the next, be it that of a switch or of a sample."""
     commands = flown(k)
     motion = simulate(k, commands, TIME, Conditions(current=(0.1, -0.2)))
@@ -78,10 +77,10 @@ def test_commands_may_switch_between_samples(simulate: Simulate, k: Rov) -> None
 
 
 @pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
-def test_conditions_of_thrust(simulate: Simulate, k: Rov) -> None:
+def test_conditions_of_thrust(simulate: Simulate, k: Vehicle) -> None:
     """Thrust at 70 % is that of a weaker curve; saturated commands are smaller ones; a delay moves the switches."""
 
-    def same(conditions: Conditions, other: Rov, commands: Commands) -> None:
+    def same(conditions: Conditions, other: Vehicle, commands: Commands) -> None:
         motion, expected = simulate(k, flown(k), TIME, conditions), simulate(other, commands, TIME)
         for name in (*k.layout.velocities, "x", "y", "z", "psi"):
             assert motion[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-8), name

@@ -45,7 +45,7 @@ def points(refit: Identification, axis: str, quantity: str) -> list[Point]:
 def by_paper(vehicle: Vehicle, some: list[Point]) -> float:
     """Return the RMS relative error of the paper's scaled model for some rows."""
     axis = next(form.axis for form in vehicle.layout.axes if form.axis.name == some[0].subject)
-    responses = [vehicle.rov.response(axis, p.command)[p.quantity == "Tau"] for p in some]
+    responses = [vehicle.response(axis, p.command)[p.quantity == "Tau"] for p in some]
     errors = [value / p.measured - 1.0 for value, p in zip(responses, some, strict=True)]
     return sqrt(sum(error**2 for error in errors) / len(errors))
 
@@ -61,7 +61,7 @@ def test_shipped_file_is_what_the_command_writes(tmp_path: Path, capsys: pytest.
     assert made == shipped
     one, other = load_vehicle(path), load_vehicle(REFIT)
     for name in PAPER.coefficients:
-        assert one.rov[name] == pytest.approx(other.rov[name], rel=1e-3)
+        assert one[name] == pytest.approx(other[name], rel=1e-3)
         assert one.intervals.get(name, nan) == pytest.approx(other.intervals.get(name, nan), rel=1e-2, nan_ok=True)
     assert one.provenance
     assert other.provenance
@@ -89,7 +89,7 @@ def test_refit_is_better_than_the_scaled_model_where_that_was_asked(refit: Ident
 def test_every_measured_number_is_compared(refit: Identification, vehicle: Vehicle) -> None:
     """Those of heave upward are compared as well, although they do not count."""
     assert refit.against
-    assert refit.against.rov == vehicle.rov
+    assert refit.against == vehicle
     for table in load_tables(vehicle):
         name = table.axis.name
         V_ss = {p.command: p.measured for p in points(refit, name, "V_ss")}
@@ -101,7 +101,7 @@ def test_every_measured_number_is_compared(refit: Identification, vehicle: Vehic
 
 
 def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identification) -> None:
-    k = refit.vehicle.rov
+    k = refit.vehicle
     assert all(k[name] >= 0.0 for name in PAPER.coefficients if name.startswith(("a_d", "b_d")))
     assert k["alpha_u"] == k["alpha_w"] == k["alpha_r"] == 1.0
     assert "beta_u" not in refit.vehicle.intervals
@@ -114,11 +114,11 @@ def test_the_curves_of_the_paper_are_fitted_too(refit: Identification, vehicle: 
     most = 2.0 * hypot(0.1, PRIORS["thrust_shape"].deviation)
     for curve in refit.vehicle.layout.curves:
         for command in (0.3, 0.5, 0.7):
-            ratio = refit.vehicle.rov.curve_force(curve, command) / vehicle.rov.curve_force(curve, command)
+            ratio = refit.vehicle.curve_force(curve, command) / vehicle.curve_force(curve, command)
             assert abs(ratio - 1.0) < most, (curve.name, command)
         for key in ("a_t", "b_t"):
             name = curve.coefficient(key)
-            assert refit.vehicle.rov[name] != vehicle.rov[name]
+            assert refit.vehicle[name] != vehicle[name]
             assert refit.vehicle.sources[name] != vehicle.sources[name]
 
 

@@ -13,8 +13,8 @@ from scipy.stats import t
 from rov_fmu.cli import main
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.interface.tune_command import source
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -25,16 +25,17 @@ HEAVE_AT_30 = ["--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "--tau"
 
 
 @pytest.fixture
-def k(vehicle: Vehicle) -> Rov:
-    return vehicle.rov
+def k(vehicle: Vehicle) -> Vehicle:
+    return vehicle
 
 
-def tuned_to(k: Rov, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Tuning:
+def tuned_to(k: Vehicle, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Vehicle:
     """Tune to one command."""
-    return tune(k, axis, [Target("V_ss", command, V_ss)] + ([] if Tau is None else [Target("Tau", command, Tau)]))
+    points = [Target("V_ss", command, V_ss)] + ([] if Tau is None else [Target("Tau", command, Tau)])
+    return tune(k, axis, points).vehicle
 
 
-def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_printout_names_the_inputs_that_are_held(k: Vehicle, capsys: pytest.CaptureFixture[str]) -> None:
     """For a turn to starboard, the left thruster pushes ahead and the right one astern, by the paper's (4)."""
     points = [Target("V_ss", command, sign * 0.5) for command, sign in ((0.3, 1), (-0.4, -1))]
     print_tuning(tune(k, YAW, points))
@@ -48,17 +49,17 @@ def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.Capt
 
 
 def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
-    k: Rov, capsys: pytest.CaptureFixture[str]
+    k: Vehicle, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    tuned = tuned_to(k, HEAVE, 0.3, 0.175)
+    tuned = tune(k, HEAVE, [Target("V_ss", 0.3, 0.175)])
     print_tuning(replace(tuned, points=(Target("V_ss", 0.3, 0.175 * (1.0 + 1e-5)),)))
     said = capsys.readouterr().out
     assert "+0.0%" in said
     assert "-0.0%" not in said
     assert "lag" not in said
     curves = tuple(replace(curve, keys=(*curve.keys, "T")) for curve in k.layout.curves)
-    late = Rov(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
-    print_tuning(tuned_to(late, HEAVE, 0.3, 0.175, 2.209))
+    late = Vehicle(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
+    print_tuning(tune(late, HEAVE, [Target("V_ss", 0.3, 0.175), Target("Tau", 0.3, 2.209)]))
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "lag" in line)
     assert "curve top, T = 0.2 s" in line
 
@@ -66,18 +67,18 @@ def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
 @pytest.mark.parametrize("command", [0.2, 0.7, -0.4])
 @pytest.mark.parametrize(("V_ss", "Tau"), [(0.1, 0.2), (0.5, 3.0), (2.0, 20.0)])
-def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: float, Tau: float, k: Rov) -> None:
+def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: float, Tau: float, k: Vehicle) -> None:
     V_ss = V_ss if command > 0.0 else -V_ss
-    tuned = tuned_to(k, axis, command, V_ss, Tau).rov
+    tuned = tuned_to(k, axis, command, V_ss, Tau)
     assert tuned.response(axis, command) == pytest.approx((V_ss, Tau), rel=1e-12)
 
 
-def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
+def test_scattered_points_have_intervals_and_the_least_error(k: Vehicle) -> None:
     measured = {"V_ss": {0.2: 1.34, 0.3: 1.51, 0.5: 2.61, 0.7: 4.06}, "Tau": {0.2: 3.05, 0.3: 1.95, 0.5: 1.41}}
     points = [Target(q, c, value) for q, values in measured.items() for c, value in values.items()]
     tuning = tune(k, YAW, points)
     low, high = tuning.intervals["alpha_r"] or (nan, nan)
-    alpha, beta = tuning.rov["alpha_r"], tuning.rov["beta_r"]
+    alpha, beta = tuning.vehicle["alpha_r"], tuning.vehicle["beta_r"]
     assert 0.8 < low < alpha < high < 1.6
 
     def error(a: float, b: float) -> float:
@@ -90,14 +91,14 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
         assert least < error(a * alpha, b * beta)
 
 
-def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
-    assert tuned_to(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
+def test_steady_velocities_alone_leave_beta(k: Vehicle) -> None:
+    assert tuned_to(k, YAW, 0.3, 1.5)["beta_r"] == k["beta_r"]
     tuning = tune(k, SURGE, [Target("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
-    assert tuning.rov["beta_u"] == k["beta_u"]
+    assert tuning.vehicle["beta_u"] == k["beta_u"]
     assert [*tuning.intervals] == ["alpha_u"]
 
 
-def test_intervals_are_those_of_linear_regression(k: Rov) -> None:
+def test_intervals_are_those_of_linear_regression(k: Vehicle) -> None:
     """With linear drag, V_ss is proportional to α, so that its relative errors are linear in α."""
     plain = k.replaced({"alpha_u": 1.0, "a_d_u": 0.0})
     wanted = [Target("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 1.06), (0.7, 1.47), (-0.4, -0.6))]
@@ -107,13 +108,14 @@ def test_intervals_are_those_of_linear_regression(k: Rov) -> None:
     relative = np.sqrt(errors @ errors / 3.0 / (ratios @ ratios)) / alpha
     factor = np.exp(t.ppf(0.975, 3) * relative)
     tuning = tune(plain, SURGE, wanted)
-    assert tuning.rov["alpha_u"] == pytest.approx(alpha, rel=1e-9)
+    assert tuning.vehicle["alpha_u"] == pytest.approx(alpha, rel=1e-9)
     assert tuning.intervals["alpha_u"] == pytest.approx((alpha / factor, alpha * factor), rel=1e-6)
 
 
-def test_as_many_points_as_coefficients_have_no_intervals(k: Rov) -> None:
-    assert tuned_to(k, HEAVE, 0.3, 0.2, 2.0).intervals == {"alpha_w": None, "beta_w": None}
-    assert tuned_to(k, HEAVE, 0.3, 0.2).intervals == {"alpha_w": None}
+def test_as_many_points_as_coefficients_have_no_intervals(k: Vehicle) -> None:
+    V_ss, Tau = Target("V_ss", 0.3, 0.2), Target("Tau", 0.3, 2.0)
+    assert tune(k, HEAVE, [V_ss, Tau]).intervals == {"alpha_w": None, "beta_w": None}
+    assert tune(k, HEAVE, [V_ss]).intervals == {"alpha_w": None}
 
 
 @pytest.mark.parametrize(
@@ -135,7 +137,7 @@ def test_as_many_points_as_coefficients_have_no_intervals(k: Rov) -> None:
     ],
 )
 def test_what_no_tuning_gives(
-    command: float, V_ss: float, Tau: float, named: str, k: Rov, capsys: pytest.CaptureFixture[str]
+    command: float, V_ss: float, Tau: float, named: str, k: Vehicle, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(TuningError, match=re.escape(named)):
         tuned_to(k, HEAVE, command, V_ss, Tau)
@@ -154,7 +156,7 @@ def test_what_no_tuning_gives(
         (1.0, 1.21, ["implausible tuned beta"]),
     ],
 )
-def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: list[str], k: Rov) -> None:
+def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: list[str], k: Vehicle) -> None:
     points = (Target("V_ss", 0.3, 0.2), Target("Tau", 0.3, 2.0))
     rov = k.replaced({"alpha_w": alpha, "beta_w": beta})
     found = [*implausible(Tuning(HEAVE, rov, points, {"alpha_w": None, "beta_w": None}))]
@@ -174,20 +176,20 @@ def test_the_source_names_the_first_two_points(count: int, more: str) -> None:
 
 
 @pytest.mark.parametrize("command", [1.0, -1.0])
-def test_full_command_is_allowed_and_more_is_not(command: float, k: Rov) -> None:
-    assert tuned_to(k, HEAVE, command, command * 0.5).rov.response(HEAVE, command)[0] == pytest.approx(command * 0.5)
+def test_full_command_is_allowed_and_more_is_not(command: float, k: Vehicle) -> None:
+    assert tuned_to(k, HEAVE, command, command * 0.5).response(HEAVE, command)[0] == pytest.approx(command * 0.5)
     with pytest.raises(TuningError, match="a fraction of the full command"):
         tuned_to(k, HEAVE, 1.01 * command, command * 0.5)
 
 
-def test_thrust_that_falls_with_the_speed_cannot_be_tuned(k: Rov) -> None:
+def test_thrust_that_falls_with_the_speed_cannot_be_tuned(k: Vehicle) -> None:
     with pytest.raises(TuningError, match="heave: its thrust decreases with the speed of advance"):
         tuned_to(k.extended({"d_top": 1.0}), HEAVE, 0.3, 0.2)
 
 
 # ---- Of another vehicle, by direction --------------------------------------------------------------------------------
 
-BUOYANT = Rov(
+BUOYANT = Vehicle(
     Layout(
         (VehicleAxis(SWAY), VehicleAxis(HEAVE, ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0"))),
         (Curve("prop", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")),),
@@ -223,7 +225,7 @@ def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
     ("command", "V_ss", "Tau"), [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)]
 )
 def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float) -> None:
-    tuned = tuned_to(BUOYANT, HEAVE, command, V_ss, Tau).rov
+    tuned = tuned_to(BUOYANT, HEAVE, command, V_ss, Tau)
     alpha, beta = tuned["alpha_w"], tuned["beta_w"]
     assert heave_after(100.0 * Tau, command, alpha, beta) == pytest.approx(V_ss, rel=1e-9)
     risen = (1.0 - 1.0 / e) * V_ss
@@ -236,11 +238,11 @@ def test_both_directions_are_tuned_together() -> None:
     wanted = [Target(q, c, known.response(HEAVE, c)[q == "Tau"]) for q in ("V_ss", "Tau") for c in commands]
     assert wanted[0].value * wanted[3].value < 0.0
     tuning = tune(BUOYANT, HEAVE, wanted)
-    assert [tuning.rov["alpha_w"], tuning.rov["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)
+    assert [tuning.vehicle["alpha_w"], tuning.vehicle["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)
 
 
 def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
-    tuned = tuned_to(BUOYANT, SWAY, 0.6, 0.4).rov
+    tuned = tuned_to(BUOYANT, SWAY, 0.6, 0.4)
     thrust = 22.0 * 0.5**2 + 25.0 * 0.5
     assert tuned["alpha_v"] == pytest.approx((60.0 * 0.4**2 + 2.0 * 0.4) / thrust, rel=1e-12)
     assert tuned["beta_v"] == 0.8
@@ -289,7 +291,7 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path) -> None:
     output = tmp_path / "tuned.toml"
     assert main(["tune", str(VIDEORAY), *HEAVE_AT_30[:4], "--v-ss", "0.2", "--tau", "3", "-o", str(output)]) == 0
     tuned, vehicle = load_vehicle(output), load_vehicle(VIDEORAY)
-    assert tuned.rov.response(HEAVE, 0.3) == pytest.approx((0.2, 3.0), rel=1e-5)
+    assert tuned.response(HEAVE, 0.3) == pytest.approx((0.2, 3.0), rel=1e-5)
     assert tuned.sources["alpha_w"] == "Tuned to V_ss = 0.2 at 30%, Tau = 3 at 30%"
     assert tuned.data
     assert vehicle.data
@@ -299,7 +301,7 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path) -> None:
     assert changed == {"data", "pictures", "alpha", "beta"}
 
 
-def test_points_of_a_file(tmp_path: Path, k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_of_a_file(tmp_path: Path, k: Vehicle, capsys: pytest.CaptureFixture[str]) -> None:
     points = tmp_path / "points.csv"
     points.write_text(
         "command [%],velocity [cm/s],time constant [s]\n20,11.24490,3.210526\n30,17.49804,\n70,,0.980904\n",
@@ -307,7 +309,7 @@ def test_points_of_a_file(tmp_path: Path, k: Rov, capsys: pytest.CaptureFixture[
     )
     output = tmp_path / "tuned.toml"
     assert main(["tune", str(VIDEORAY), "--axis", "heave", "--points", str(points), "-o", str(output)]) == 0
-    assert load_vehicle(output).rov == k, "Table 9 is what the points were made with"
+    assert load_vehicle(output) == k, "Table 9 is what the points were made with"
     assert "95 %" in capsys.readouterr().out
 
 

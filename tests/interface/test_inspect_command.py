@@ -181,7 +181,7 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace("[axes.yaw]", "")  # its column may stay
     thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
     draft.write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
-    assert [*load_tests(tmp_path).given.rov.layout.kinds] == ["heave"]
+    assert [*load_tests(tmp_path).given.vehicle.layout.kinds] == ["heave"]
 
 
 def test_a_dive_with_the_headers_of_its_owner(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import FileError, InputError
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
@@ -58,23 +57,23 @@ def test_a_vehicle_is_loaded_by_its_name_or_path(videoray: VehicleModel) -> None
 
 def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleModel) -> None:
     changed = videoray.with_(a_d_u=10, beta_w=np.float64(0.5))
-    assert (changed.rov["a_d_u"], changed.rov["beta_w"]) == (10.0, 0.5)
+    assert (changed["a_d_u"], changed["beta_w"]) == (10.0, 0.5)
     assert {name for name, source in changed.sources.items() if source == BY_HAND} == {"a_d_u", "beta_w"}
     expected = "set by hand: a_d_u = 10 N.s2/m2, beta_w = 0.5"
     assert repr(changed).endswith(f"; {expected}>")
     described = native_content(changed).files["modelDescription.xml"].decode()
     assert f'description="{videoray.description} ({expected})"' in described
     page = documentation_page(changed)
-    assert page.count(expected) == 2
+    assert page.count(expected) == 3, "the card has it, too"
     assert page.count("<td>set by hand</td>") == 2
-    assert videoray.rov["a_d_u"] != 10.0
+    assert videoray["a_d_u"] != 10.0
     assert "set by hand" not in videoray.summary
 
 
 def test_a_coefficient_that_is_set_by_hand_is_no_estimate() -> None:
     refit = rov_fmu.load(REFIT)
     name, other = next((n, o) for n, e in refit.estimates.items() for o in e.correlation)
-    changed = refit.with_(**{other: refit.rov[other] * 1.01})
+    changed = refit.with_(**{other: refit[other] * 1.01})
     assert other in refit.uncertainty.names
     assert other not in {*changed.intervals, *changed.estimates, *changed.uncertainty.names}
     assert other not in changed.estimates[name].correlation
@@ -95,7 +94,7 @@ def test_a_result_is_a_mapping_of_arrays(videoray: VehicleModel) -> None:
     assert result.names == ("u", "w", "r", "x", "y", "z", "psi", "F_l", "F_r", "F_t", "tau_rear")
     assert result["u"].shape == (3,)
     at_rest, inputs = (dict.fromkeys(names, 0.0) for names in (videoray.layout.state, videoray.layout.inputs))
-    assert result["u"][-1] == pytest.approx(videoray.rov.step({**inputs, **AHEAD}, at_rest, 2.0)["u"], rel=1e-12)
+    assert result["u"][-1] == pytest.approx(videoray.step({**inputs, **AHEAD}, at_rest, 2.0)["u"], rel=1e-12)
     assert result.units["r"] == "rad/s"
     assert repr(result) == f"<Result: 3 times from 0 to 2 s; {', '.join(result.names)}>"
     with pytest.raises(KeyError) as error:
@@ -126,8 +125,24 @@ def test_a_plot_has_a_panel_for_each_unit(
     result = videoray.simulate_many(TIMES, AHEAD, coefficients={"a_d_u": [8.0, 10.0]})
     drawn = result.plot(["u", "w", "x", "u"], figure)
     assert figure is None or drawn is figure
-    assert [(axes.get_ylabel(), len(axes.lines)) for axes in drawn.axes] == [("m/s", 4), ("m", 2)]
+    titles = [(axes.get_title(loc="left"), len(axes.lines)) for axes in drawn.axes]
+    assert titles == [("Velocity (m/s)", 4), ("Position (m)", 2)]
     np.testing.assert_array_equal(np.asarray(drawn.axes[0].lines[1].get_ydata()), result["u"][1])
+
+
+def test_a_plot_has_words_degrees_and_the_commands_and_nothing_that_stays_0(six: VehicleModel) -> None:
+    result = six.simulate(np.linspace(0.0, 2.0, 5), {"N_ext": 1.0, next(iter(six.layout.commands)): 0.2})
+    drawn = result.plot(figure=Figure())
+    titles = [axes.get_title(loc="left") for axes in drawn.axes]
+    assert titles[-1] == "Commands (%)"
+    assert {"Rate of turn (°/s)", "Angle (°)", "Thrust (N)"} <= {*titles}
+    labels = {line.get_label(): line for axes in drawn.axes for line in axes.lines}
+    assert np.asarray(labels["heading (psi)"].get_ydata())[-1] == pytest.approx(np.degrees(result["psi"][-1]))
+    assert np.max(labels[next(iter(six.layout.commands))].get_ydata()) == 20.0
+    assert not {*QUATERNION} & {*labels}
+    still = six.simulate([0.0, 1.0]).plot(figure=Figure())
+    shown = [line for axes in still.axes for line in axes.lines]
+    assert len(shown) == 1 or all(np.any(line.get_ydata()) for line in shown)
 
 
 def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:
@@ -207,7 +222,7 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
 
 
 def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = replace(videoray, rov=pulsed(videoray.rov, (1100.0, 1500.0, 1900.0)))
+    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
     expected = r"^u_l reaches 0\.3: commands are pulse widths, and saturate at 1100 and 1900 us$"
     with pytest.warns(UserWarning, match=expected):
         found = pulses.simulate(TIMES, {"u_l": [0.3, 1500.0, 1950.0]})
@@ -215,7 +230,7 @@ def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleMode
 
 
 def test_a_pulse_of_zero_is_no_signal_and_acts_as_neutral_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = replace(videoray, rov=pulsed(videoray.rov, (1100.0, 1500.0, 1900.0)))
+    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
     assert pulses.layout.fraction_of(0.0) == 0.0
     expected = "^u_l reaches 0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as"
     with pytest.warns(UserWarning, match=expected) as caught:
@@ -334,8 +349,7 @@ def test_a_mistake_is_one_line(case: str, videoray: VehicleModel) -> None:
 def test_a_vehicle_that_cannot_be_is_neither_built_nor_simulated(videoray: VehicleModel, tmp_path: Path) -> None:
     """However it came about."""
     for name, value in (("a_du", 1.0), ("a_d_u", float("nan"))):
-        rov = videoray.rov.replaced({name: value})
-        wrong = VehicleModel(**{**vars(videoray), "rov": rov})
+        wrong = videoray.replaced({name: value})
         with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):
             build(wrong, tmp_path / "x.fmu")
         with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):

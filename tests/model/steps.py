@@ -3,25 +3,25 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.fmi import OK
 from tests.fmi2 import Fmu
 from tests.vehicles import State, Values
 from verification.references import reference
 
-Step = Callable[[Rov, Values, Values, float], State]
+Step = Callable[[Vehicle, Values, Values, float], State]
 POSE = ("x", "y", "z", "psi")
 ROUNDING = 2.0**-52
 
 
-def in_python(rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
+def in_python(rov: Vehicle, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
     """Return the states after h seconds in equal steps."""
     for _ in range(steps):
         state = rov.step(inputs, state, h / steps)
     return dict(state)
 
 
-def in_fmu(fmu: Fmu, rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
+def in_fmu(fmu: Fmu, rov: Vehicle, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
     """Return the states of a new instance of an FMU after h seconds in equal steps."""
     with fmu.instance() as instance:
         instance.start({**rov.coefficients, **inputs, **state})
@@ -46,7 +46,7 @@ def errors(found: Values, exact: Mapping[str, Any], scale: Mapping[str, Any], be
     return largest[0], largest[1]
 
 
-def worst(step: Step, rov: Rov, inputs: Values, state: Values, h: float) -> tuple[float, float]:
+def worst(step: Step, rov: Vehicle, inputs: Values, state: Values, h: float) -> tuple[float, float]:
     """Return the errors of a step, relative to the largest velocity and to the length of the path."""
     exact = reference.step(rov, inputs, state, h)
     return errors(step(rov, inputs, state, h), exact.state, exact.scale, state)

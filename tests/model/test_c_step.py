@@ -5,14 +5,14 @@ from functools import partial
 
 import pytest
 
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.fmi2 import Fmu
 from tests.model.steps import Step, in_fmu, in_python
 from tests.vehicles import HEAVY, VIDEORAY, at_rest, random_case, still
 
 
 @pytest.fixture(scope="module", params=["videoray", "heavy"])
-def vehicle(request: pytest.FixtureRequest) -> tuple[Rov, Step]:
+def vehicle(request: pytest.FixtureRequest) -> tuple[Vehicle, Step]:
     """A vehicle, and the step of its FMU."""
     rov = {"videoray": VIDEORAY, "heavy": HEAVY}[request.param]
     return rov, partial(in_fmu, Fmu(request.getfixturevalue(f"{request.param}_dir")))
@@ -21,7 +21,7 @@ def vehicle(request: pytest.FixtureRequest) -> tuple[Rov, Step]:
 @pytest.mark.parametrize(
     "cases", [25, pytest.param(250, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
 )
-def test_a_step_in_c_agrees_with_the_step_in_python(vehicle: tuple[Rov, Step], cases: int) -> None:
+def test_a_step_in_c_agrees_with_the_step_in_python(vehicle: tuple[Vehicle, Step], cases: int) -> None:
     rov, step = vehicle
     rng = random.Random(cases)
     for _ in range(cases):
@@ -32,7 +32,7 @@ def test_a_step_in_c_agrees_with_the_step_in_python(vehicle: tuple[Rov, Step], c
             assert abs(found[name] - value) <= room, (name, inputs, state, h)
 
 
-def test_the_smallest_velocity_is_turned_back(vehicle: tuple[Rov, Step]) -> None:
+def test_the_smallest_velocity_is_turned_back(vehicle: tuple[Vehicle, Step]) -> None:
     """The product of such a velocity and the force against it underflows to 0, but the velocity reverses at once."""
     rov, in_c = vehicle
     inputs = still(rov) | {"X_ext": -5.0}
@@ -41,7 +41,7 @@ def test_the_smallest_velocity_is_turned_back(vehicle: tuple[Rov, Step]) -> None
         assert found == pytest.approx(step(rov, inputs, at_rest(rov), 0.1), rel=1e-13)
 
 
-def test_a_tiny_force_carries_a_vehicle_no_further_than_its_steady_velocity(vehicle: tuple[Rov, Step]) -> None:
+def test_a_tiny_force_carries_a_vehicle_no_further_than_its_steady_velocity(vehicle: tuple[Vehicle, Step]) -> None:
     """The coefficients of such a series differ by more than the range of a double."""
     rov, step = vehicle
     steady = 1e-250 / 3.0
@@ -50,7 +50,7 @@ def test_a_tiny_force_carries_a_vehicle_no_further_than_its_steady_velocity(vehi
         assert (found["u"], found["x"]) == pytest.approx((steady, steady * h), rel=1e-13, abs=0.0)
 
 
-def test_a_step_of_too_many_pieces_is_refused(vehicle: tuple[Rov, Step]) -> None:
+def test_a_step_of_too_many_pieces_is_refused(vehicle: tuple[Vehicle, Step]) -> None:
     rov, step = vehicle
     frictionless = rov.replaced({"a_d_r": 0.0, "b_d_r": 0.0})
     with pytest.raises(AssertionError):

@@ -13,8 +13,7 @@ import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
 
-from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi import ERROR
 from tests.fmi2 import Fmu
 from tests.model.steps import Step, errors, in_fmu, in_python
@@ -82,9 +81,9 @@ def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> Non
 @pytest.mark.parametrize(
     ("number", "longest"), [(5, 0.3), pytest.param(8, 2.0, marks=LONG), pytest.param(30, 2.0, marks=WEEKLY)]
 )
-@pytest.mark.parametrize(("name", "rov"), [("heavy", HEAVY), ("everything", load_vehicle(EVERYTHING).rov)])
+@pytest.mark.parametrize(("name", "rov"), [("heavy", HEAVY), ("everything", load_vehicle(EVERYTHING))])
 def test_a_step_with_coupling_and_lag_is_exact_in_c(
-    request: pytest.FixtureRequest, name: str, rov: Rov, number: int, longest: float
+    request: pytest.FixtureRequest, name: str, rov: Vehicle, number: int, longest: float
 ) -> None:
     rng, step = random.Random(2), partial(in_fmu, Fmu(request.getfixturevalue(f"{name}_dir")))
     hold([step], [random_case(rng, rov, longest=longest) for _ in range(number)])
@@ -129,7 +128,7 @@ REVERSALS = [
 def of_axes(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> Case:
     """Return a step of a vehicle of the paper that has these axes and is driven by loads alone."""
     ones = dict.fromkeys(VIDEORAY.coefficients, 1.0)
-    rov = Rov(VIDEORAY.layout, {**ones, "a_d_u": surge.A, "b_d_u": surge.B, "a_d_r": yaw.A, "b_d_r": yaw.B})
+    rov = Vehicle(VIDEORAY.layout, {**ones, "a_d_u": surge.A, "b_d_u": surge.B, "a_d_r": yaw.A, "b_d_r": yaw.B})
     return rov, {**still(rov), "X_ext": surge.C, "N_ext": yaw.C}, {**at_rest(rov), "u": u, "r": r}, h
 
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import SIX, State, at_rest, frictionless, still, with_axes
 from verification.references import rigid_vehicle
 from verification.references.rigid_body import rotation
@@ -20,7 +20,7 @@ LENGTHS = pytest.mark.parametrize("h", [1e-3, 0.1, 10.0])
 SECONDS = 100.0
 
 
-def tumbled(rov: Rov, h: float) -> tuple[Array, Array, Array]:
+def tumbled(rov: Vehicle, h: float) -> tuple[Array, Array, Array]:
     """Return the velocities, the positions and the rotation matrices of a tumbling vehicle; time is the last axis."""
     names = [*rov.layout.velocities, *"xyz", *rigid_vehicle.QUATERNION]
     times = np.arange(round(SECONDS / h) + 1) * h

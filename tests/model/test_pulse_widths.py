@@ -6,27 +6,26 @@ import numpy as np
 import pytest
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import AXES
-from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, at_rest, pulsed, random_inputs, random_state
 
 PULSE = (1100.0, 1480.0, 1900.0)
 ROVS = {
-    "thrust": load_vehicle(THRUST_EFFECTS).rov,  # with tables, a dead band, a fin and a dead time
+    "thrust": load_vehicle(THRUST_EFFECTS),  # with tables, a dead band, a fin and a dead time
     "mixed": next(rov for rov in VEHICLES.values() if rov.layout.mix),
     "six axes": SIX,
 }
 
 
 @pytest.fixture(params=ROVS)
-def rov(request: pytest.FixtureRequest) -> Rov:
+def rov(request: pytest.FixtureRequest) -> Vehicle:
     """Return a vehicle whose commands are fractions."""
     return ROVS[request.param]
 
 
-def pulses_of(rng: random.Random, rov: Rov) -> tuple[dict[str, float], dict[str, float]]:
+def pulses_of(rng: random.Random, rov: Vehicle) -> tuple[dict[str, float], dict[str, float]]:
     """Return random inputs with pulse widths, some of them far beyond full thrust, and the same ones with fractions."""
     low, neutral, high = PULSE
     inputs = random_inputs(rng, rov)
@@ -40,7 +39,7 @@ def pulses_of(rng: random.Random, rov: Rov) -> tuple[dict[str, float], dict[str,
     return inputs | pulses, inputs | {name: fraction(pulse) for name, pulse in pulses.items()}
 
 
-def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Rov) -> None:
+def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
     rng, of_pulses = random.Random(1), pulsed(rov, PULSE)
     lines = of_pulses.delay_line(), rov.delay_line()
     state = random_state(rng, rov)
@@ -53,7 +52,7 @@ def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Rov) -> None:
         state = {name: found[name] for name in state}
 
 
-def test_the_engine_steps_as_with_fractions_bit_for_bit(rov: Rov) -> None:
+def test_the_engine_steps_as_with_fractions_bit_for_bit(rov: Vehicle) -> None:
     rng, times = random.Random(2), np.cumsum([0.0, *[0.04, 0.1, 0.27] * 8])
     rows = [pulses_of(rng, rov) for _ in times]
     pulses, fractions = ({name: np.array([row[k][name] for row in rows]) for name in rov.layout.inputs} for k in (0, 1))
@@ -63,7 +62,7 @@ def test_the_engine_steps_as_with_fractions_bit_for_bit(rov: Rov) -> None:
     assert found.tolist() == simulate(rov, times, fractions, workers=1).values.tolist()
 
 
-def test_neutral_gives_no_thrust_and_is_the_start_value(rov: Rov) -> None:
+def test_neutral_gives_no_thrust_and_is_the_start_value(rov: Vehicle) -> None:
     of_pulses = pulsed(rov, PULSE)
     usual = of_pulses.layout.usual_inputs
     for name, command in of_pulses.layout.commands.items():
@@ -89,7 +88,7 @@ def test_a_pulse_beyond_the_range_saturates() -> None:
     assert thrust(1.0)["l"] < 0.0 < thrust(1e4)["l"]
 
 
-def test_v_ss_and_the_commands_of_an_axis_are_those_of_the_fractions(rov: Rov) -> None:
+def test_v_ss_and_the_commands_of_an_axis_are_those_of_the_fractions(rov: Vehicle) -> None:
     of_pulses = pulsed(rov, PULSE)
     for form in rov.layout.axes:
         for command in (-1.0, -0.4, 0.3, 1.0):
@@ -100,7 +99,7 @@ def test_v_ss_and_the_commands_of_an_axis_are_those_of_the_fractions(rov: Rov) -
     assert {held[name] for name in SIX.layout.signs(heave)} <= {PULSE[0], PULSE[2]}
 
 
-def test_what_depends_on_a_command_still_does(rov: Rov) -> None:
+def test_what_depends_on_a_command_still_does(rov: Vehicle) -> None:
     found, expected = dependencies_of(pulsed(rov, PULSE).layout), dependencies_of(rov.layout)
     assert {name: [*known] for name, known in found.items()} == {name: [*known] for name, known in expected.items()}
 

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.attitude import QUATERNION, start_formulas
 from rov_fmu.model.expression import compiled
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import (
     SIX,
     Values,
@@ -31,7 +30,7 @@ from verification.references import rigid_vehicle
 from verification.references.rigid_vehicle import compared, places
 
 Array = NDArray[np.float64]
-HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
 LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n) if {"p", "q"} & {*axes}]
 """The sets of axes with roll or pitch."""
@@ -79,7 +78,7 @@ def test_a_step_is_exact(axes: str) -> None:
 # ---- The same in C ----
 
 
-def in_c(rov: Rov, inputs: Values, state: Values, times: ArrayLike) -> Array:
+def in_c(rov: Vehicle, inputs: Values, state: Values, times: ArrayLike) -> Array:
     """Return the states and the heading at the times; the second axis is time."""
     return simulate(rov, times, {**inputs, **state}, [*rov.layout.state, "psi"], workers=1).values[:, 0]
 
@@ -172,7 +171,7 @@ def _starts() -> list[Values]:
     return found
 
 
-def _turned(rov: Rov, steps: int) -> Array:
+def _turned(rov: Vehicle, steps: int) -> Array:
     """Return the quaternion and psi after 3 s of every start, and psi at the start."""
     starts = _starts()
     values = {n: np.array([[start.get(n, 0.0)] for start in starts]) for n in ("phi_0", "theta_0", "psi_0", *"pqr")}

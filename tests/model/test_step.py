@@ -12,10 +12,9 @@ import pytest
 from scipy.integrate import DOP853
 
 from rov_fmu.model import step as module
-from rov_fmu.model.layout import RESTORING
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import RESTORING
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.model.steps import in_python, worst
 from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
 
@@ -26,7 +25,7 @@ BACK = {"F_1": -10.0, "F_2": -10.0, "F_3": 10.0, "F_4": 10.0}
 """Forces against the commands ahead."""
 M, I_R = FREE["m_rov"], FREE["I_r"]
 
-CASES: dict[str, tuple[Rov, Values, Values, tuple[float, ...]]] = {
+CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
     "from rest, with a lag": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
     "from rest, by one lagging thruster, which turns and sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
     "from rest, coupled": (COUPLED, {"Y_ext": 3.0, "N_ext": 0.1}, {}, (1e-5, 1e-2, 1.0)),
@@ -62,11 +61,11 @@ CASES: dict[str, tuple[Rov, Values, Values, tuple[float, ...]]] = {
 }
 
 
-def case(rov: Rov, inputs: Values, state: Values) -> tuple[Rov, State, State]:
+def case(rov: Vehicle, inputs: Values, state: Values) -> tuple[Vehicle, State, State]:
     return rov, {**still(rov), **inputs}, {**at_rest(rov), **state}
 
 
-def reversed_drag(rov: Rov, share: float) -> Rov:
+def reversed_drag(rov: Vehicle, share: float) -> Vehicle:
     """Return a vehicle whose drag in reverse is a share of that ahead."""
     names = [f"{key}_{form.axis.velocity}" for form in rov.layout.axes for key in ("a_d", "b_d")]
     return rov.extended({f"{name}_reverse": share * rov[name] for name in names})
@@ -92,7 +91,7 @@ def test_a_step_in_a_special_case_is_exact(name: str) -> None:
 def test_a_step_is_exact_whatever_the_drag_in_reverse(names: list[str], shares: tuple[float, ...], cases: int) -> None:
     """One step begins at rest, another one in motion."""
     for name, share in product(names, shares):
-        rov = reversed_drag(HEAVY if name == "bluerov2_heavy" else load_vehicle(SHIPPED[name]).rov, share)
+        rov = reversed_drag(HEAVY if name == "bluerov2_heavy" else load_vehicle(SHIPPED[name]), share)
         rng = random.Random(f"{name} {share} {cases}")
         for _ in range(cases):
             _, inputs, state, h = random_case(rng, rov, -2.0, 0.7)
@@ -151,7 +150,7 @@ def test_a_pendulum_with_a_stop_that_pushes_back_harder_reverses_at_the_exact_ti
     [HEAVY, *(pytest.param(rov, marks=pytest.mark.long) for rov in (LAGGING, COUPLED))],
     ids=["Heavy", "lag", "coupled"],
 )
-def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Rov) -> None:
+def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Vehicle) -> None:
     """The time at which surge reverses is found by bisection."""
     rov, inputs, state = case(rov, {"X_ext": -20.0}, {"u": 0.4, "r": 0.5})
     low, high = 0.0, 2.0
@@ -194,7 +193,7 @@ def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
     ids=["velocities", "turn", "distance", "all"],
 )
 def test_a_step_that_overflows_is_not_finite_and_takes_no_time(
-    rov: Rov, inputs: Values, state: Values, h: float
+    rov: Vehicle, inputs: Values, state: Values, h: float
 ) -> None:
     start = process_time()
     assert not all(map(isfinite, in_python(*case(rov, inputs, state), h).values()))

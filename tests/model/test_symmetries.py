@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
 from tests.model.steps import Step, in_fmu, in_python
 from tests.vehicles import (
@@ -109,7 +108,7 @@ def test_without_force_no_velocity_gains_one_bit_or_changes_its_sign(step: Step,
             assert after[name] == s[name]
 
 
-def energy(rov: Rov, state: Values) -> float:
+def energy(rov: Vehicle, state: Values) -> float:
     """Return the kinetic energy with the effective inertias."""
     return 0.5 * sum(rov.effective_inertia(form) * state[form.axis.velocity] ** 2 for form in rov.layout.axes)
 
@@ -177,8 +176,8 @@ def test_without_quadratic_drag_a_slow_vehicle_draws_the_path_of_a_fast_one(step
 @pytest.mark.parametrize(
     "cases", [5, pytest.param(30, marks=pytest.mark.long), pytest.param(200, marks=pytest.mark.weekly)]
 )
-@pytest.mark.parametrize(("name", "rov"), [("videoray", VIDEORAY), ("everything", load_vehicle(EVERYTHING).rov)])
-def test_parts_of_a_step_are_the_step(request: pytest.FixtureRequest, name: str, rov: Rov, cases: int) -> None:
+@pytest.mark.parametrize(("name", "rov"), [("videoray", VIDEORAY), ("everything", load_vehicle(EVERYTHING))])
+def test_parts_of_a_step_are_the_step(request: pytest.FixtureRequest, name: str, rov: Vehicle, cases: int) -> None:
     """The parts have any length. The rounding error between them fades or adds up over the time."""
     fmu, rng = Fmu(request.getfixturevalue(f"{name}_dir")), random.Random(13)
     for _ in range(cases):

@@ -13,17 +13,17 @@ from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Curve, Fin, ThrustTable
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.layout import Curve, Fin, ThrustTable
 from rov_fmu.model.step import MOST_WAITING, Change
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, Values, at_rest, numbered, random_inputs, random_state
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces
 from verification.references.rigid_vehicle import compared, places
 
-ROV = load_vehicle(THRUST_EFFECTS).rov
+ROV = load_vehicle(THRUST_EFFECTS)
 _AFT = (-0.5, 0.05, 0.1)
 FINNED = numbered(
     replace(SIX.layout, fins=(Fin("rudder", (0.0, 0.6, 0.8), _AFT, True), Fin("plane", (0.0, 0.0, 1.0), _AFT))),
@@ -36,10 +36,10 @@ FINNED = numbered(
 """A vehicle with six axes and every effect of the velocities."""
 
 
-def immediate(rov: Rov) -> Rov:
+def immediate(rov: Vehicle) -> Vehicle:
     """Return a vehicle whose commands act at once."""
     layout = replace(rov.layout, has_dead_time=False)
-    return Rov(layout, {name: rov[name] for name in layout.coefficients})
+    return Vehicle(layout, {name: rov[name] for name in layout.coefficients})
 
 
 NOW = immediate(ROV)
@@ -50,7 +50,7 @@ def gap(a: list[float], b: list[float]) -> float:
     return max(abs(float(x - y)) for x, y in zip(a, b, strict=True))
 
 
-def inputs_of(rng: random.Random, rov: Rov) -> dict[str, float]:
+def inputs_of(rng: random.Random, rov: Vehicle) -> dict[str, float]:
     """Return random inputs. The voltage may lie beyond the tables."""
     found = random_inputs(rng, rov)
     return found | ({"voltage": rng.uniform(10.0, 18.0)} if "voltage" in found else {})
@@ -127,7 +127,7 @@ def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_bal
     lost = mass * (NOW.held(SURGE, 0.6).B - NOW.held(SURGE, 0.0).B)
     assert lost == pytest.approx(2.0 * 6.0 * 0.6 * NOW["alpha_u"], rel=1e-14)
     assert NOW.step(NOW.held_inputs(SURGE, 0.6), at_rest(NOW), 100.0)["u"] == pytest.approx(V_ss, rel=1e-12)
-    heavy = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
     V_ss, _ = heavy.response(HEAVE, -0.3)
     weight = heavy.held(HEAVE, 0.0).C * heavy.effective_inertia(heavy.layout.kinds["heave"])
     assert weight == pytest.approx(heavy["W"] - heavy["B"], rel=1e-13)
@@ -137,14 +137,14 @@ def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_bal
 
 def test_coefficients_of_a_vehicle_with_tables_can_be_changed() -> None:
     vehicle = load_vehicle(THRUST_EFFECTS)
-    assert vehicle.with_(k_t_main=1.1, T_d=0.3).rov["k_t_main"] == 1.1
+    assert vehicle.with_(k_t_main=1.1, T_d=0.3)["k_t_main"] == 1.1
 
 
 # ---- Motion ----
 
 
 @pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
-def test_a_step_is_exact(rov: Rov) -> None:
+def test_a_step_is_exact(rov: Vehicle) -> None:
     rng = random.Random(2)
     for h in (0.003, 0.04):
         inputs, state = inputs_of(rng, rov), random_state(rng, rov)
@@ -154,7 +154,7 @@ def test_a_step_is_exact(rov: Rov) -> None:
 
 
 @pytest.mark.parametrize("rov", [NOW, pytest.param(FINNED, marks=pytest.mark.long)], ids=["four axes", "six axes"])
-def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(rov: Rov) -> None:
+def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(rov: Vehicle) -> None:
     rng = random.Random(3)
     state = random_state(rng, rov)
     y = places(rov, state)
@@ -169,7 +169,7 @@ def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(rov: Rov) -> Non
 
 
 @pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
-def test_c_agrees_with_python(rov: Rov) -> None:
+def test_c_agrees_with_python(rov: Vehicle) -> None:
     rng = random.Random(4)
     for _ in range(30):
         inputs, state, h = inputs_of(rng, rov), random_state(rng, rov), 10.0 ** rng.uniform(-3.0, 0.0)
@@ -189,7 +189,7 @@ def test_thrust_is_linear_between_the_voltages_of_the_tables_and_constant_beyond
     layout = replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage)
     for command in (1.0, -0.5, 0.0, 2.0):
         share = max(-1.0, min(1.0, command)) * 1.5 / 2.0
-        assert Rov(layout, {"k_t_c": 1.5}).curve_force(curve, command) == pytest.approx(share * force, rel=1e-15)
+        assert Vehicle(layout, {"k_t_c": 1.5}).curve_force(curve, command) == pytest.approx(share * force, rel=1e-15)
 
 
 def test_thrust_rises_with_a_power_of_the_voltage_and_a_dead_band_comes_first() -> None:
@@ -197,7 +197,7 @@ def test_thrust_rises_with_a_power_of_the_voltage_and_a_dead_band_comes_first() 
     numbers = {"V_0_c": 10.0, "n_V_c": 2.0, "a_t_c": 40.0, "b_t_c": 8.0, "a_t_c_reverse": 20.0, "b_t_c_reverse": 4.0}
     numbers |= {"c_0_c": 0.25, "c_0_c_reverse": 0.5}
     for voltage, factor in ((10.0, 1.0), (15.0, 2.25), (0.0, 0.0), (-5.0, 0.0)):
-        rov = Rov(replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage), numbers)
+        rov = Vehicle(replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage), numbers)
         forces = {1.0: (40.0 * 0.75 + 8.0) * 0.75 / 4.0, 0.5: (40.0 * 0.25 + 8.0) * 0.25 / 4.0, 0.25: 0.0, 0.1: 0.0}
         forces |= {-1.0: -(20.0 * 0.5 + 4.0) * 0.5 / 4.0, -0.5: 0.0, -0.3: 0.0}
         found = {command: rov.curve_force(curve, command) for command in forces}
@@ -207,7 +207,7 @@ def test_thrust_rises_with_a_power_of_the_voltage_and_a_dead_band_comes_first() 
 # ---- Dead time ----
 
 
-def commands_of(rng: random.Random, rov: Rov, times: int) -> list[dict[str, float]]:
+def commands_of(rng: random.Random, rov: Vehicle, times: int) -> list[dict[str, float]]:
     """Return random inputs, of which each holds for one or several steps."""
     found: list[dict[str, float]] = []
     while len(found) < times:

@@ -40,6 +40,14 @@ def text_of(page: str) -> str:
     return " ".join(html.fromstring(page).text_content().split())
 
 
+def unfolded(page: str) -> str:
+    """The text of a page that is not folded, without plots."""
+    root = html.fromstring(page)
+    for element in root.xpath("//details/*[not(self::summary)] | //svg | //script | //style | //head"):
+        element.drop_tree()
+    return " ".join(root.text_content().split())
+
+
 def rows(page: str) -> list[list[str]]:
     """Return the text of the cells of all rows of all tables."""
     return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.identify.findings import facts, findings_of, warnings
+from rov_fmu.identify.findings import told
 from rov_fmu.identify.result import (
     Answer,
     AxisResult,
@@ -26,14 +26,15 @@ from rov_fmu.identify.result import (
     Sensor,
     Verdict,
 )
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.description import NO_ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Channel, Commands, Log, Source
+from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Provenance, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 FILES = ("log_1.csv", "log_2.csv")
 TIME = np.arange(0.0, 60.0, 0.1)
@@ -65,7 +66,7 @@ def answers(scale: float, share: float) -> tuple[Answer, ...]:
         V = scale * c
         return Answer(SURGE, c, known(V), known(0.5 / abs(c)), known(2.0 * V))
 
-    return tuple(map(answer, (-0.7, -0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7)))
+    return tuple(map(answer, (-1.0, -0.5, -0.3, 0.3, 0.5, 1.0)))
 
 
 def axis_result(
@@ -111,7 +112,8 @@ def without_findings() -> Identification:
         version="1",
         description="A small ROV that exists only in tests",
         source="Two dives in a pond",
-        provenance=Provenance("rov-fmu", "A result made by hand", {}, data="two dive logs"),
+        provenance=Provenance(tool="rov-fmu", method="A result made by hand", inputs={}),
+        measured_from="two dive logs",
         intervals={"a_d_u": (9.0, 11.0)},
         data=None,
         pictures=None,
@@ -162,15 +164,6 @@ def without_findings() -> Identification:
         objective=-1234.5,
         agreement=0.0,
     )
-
-
-def told(result: Identification) -> Identification:
-    """Return a result with its findings, which the vehicle has too, as `identify` puts them together."""
-    findings = findings_of(result)
-    made = result.vehicle.provenance
-    assert made
-    made = replace(made, warnings=warnings(findings), facts=facts(findings))
-    return replace(result, findings=findings, vehicle=replace(result.vehicle, provenance=made))
 
 
 @cache

@@ -4,7 +4,9 @@ SCREENSHOTS=docs pytest -m interop tests/report/test_browser.py takes the pictur
 """
 
 import importlib.util
+import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -14,7 +16,9 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from rov_fmu.fmu.variables import Variable, unit_of, variables
@@ -24,12 +28,15 @@ from tests.report.conftest import Visit
 from tests.report.pages import row_of
 from tests.report.results import example
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
 pytestmark = pytest.mark.interop
 
 
 @pytest.fixture(scope="module")
 def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
-    return variables(vehicle.rov)
+    return variables(vehicle)
 
 
 # ---- documentation/index.html ----------------------------------------------------------------------------------------
@@ -48,6 +55,10 @@ def test_the_documentation_asks_for_nothing_and_fits(
     assert seen.messages == []
     assert seen.requests == [url]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
+    seen.page.wait_for_selector("#live-section:not([hidden])")
+    assert axe.Axe().run(seen.page).response["violations"] == [], "folded"
+    seen.page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     plots = seen.page.locator("svg:not(.live svg), img")
     assert plots.count() == 12
     for plot in plots.all():
@@ -57,7 +68,6 @@ def test_the_documentation_asks_for_nothing_and_fits(
         assert box["height"] > 100
     light = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
     assert (int(light) > 128) == (scheme == "light")
-    seen.page.wait_for_selector("#live-section:not([hidden])")
     assert axe.Axe().run(seen.page).response["violations"] == []
 
 
@@ -66,8 +76,9 @@ def test_the_documentation_shows_the_variables_in_groups(
 ) -> None:
     page = visit().page
     page.goto((videoray_dir / "documentation" / "index.html").as_uri())
+    page.locator("summary", has_text="Variables").click()
     groups = page.evaluate(
-        "Array.from(document.querySelectorAll('#variables + .wide tbody'), group => Array.from(group.rows,"
+        "Array.from(document.querySelectorAll('#variables tbody'), group => Array.from(group.rows,"
         " row => Array.from(row.cells, cell => cell.innerText.trim())))"
     )
     expected = groupby(declared, lambda v: (v.causality, v.variability, v.initial))
@@ -96,24 +107,103 @@ def test_the_report_asks_for_nothing_and_fits(
     assert seen.requests == [report.as_uri()]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     tables = seen.page.evaluate(
-        "Array.from(document.querySelectorAll('.card .wide'), t => t.scrollWidth - t.clientWidth)"
+        "Array.from(document.querySelectorAll('.overview .wide'), t => t.scrollWidth - t.clientWidth)"
     )
-    assert tables == [0, 0], "neither verdicts nor answers are cut off"
+    assert tables == [0], "the answers are not cut off"
 
 
-def test_folded_tables_of_the_report_are_open_on_paper(report: Path, visit: Callable[..., Visit]) -> None:
+def test_what_is_folded_opens_by_a_click_or_a_link_and_on_paper(report: Path, visit: Callable[..., Visit]) -> None:
     page = visit().page
     page.goto(report.as_uri())
-    page.evaluate(
-        "document.querySelector('main').insertAdjacentHTML('beforeend', "
-        "'<details id=fold><summary>many</summary><p>rows</p></details>')"
-    )
-    rows = page.locator("#fold p")
-    assert not rows.is_visible()
+    effects, known = page.locator("#effects p"), page.locator("#known > p").first
+    assert not effects.is_visible()
+    page.locator("summary", has_text="Effects").click()
+    assert effects.is_visible()
+    page.evaluate("location.hash = '#known'")
+    known.wait_for(state="visible")
+    table = page.locator("#predictions table")
+    assert not table.is_visible()
     page.emulate_media(media="print")
-    box = rows.bounding_box()
+    page.set_viewport_size({"width": 720, "height": 1000})
+    assert page.locator(".picture .broad svg").is_visible(), "a page of A4 is as wide as a screen"
+    assert not page.locator(".picture .narrow svg").is_visible()
+    box = table.bounding_box()
     assert box is not None
-    assert box["height"] > 5
+    assert box["height"] > 50
+
+
+def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, visit: Callable[..., Visit]) -> None:
+    seen = visit(width=1440)
+    seen.page.goto(report.as_uri())
+    plot = seen.page.locator(".broad svg")
+    panel = json.loads(plot.locator('[data-plot*="box"]').first.get_attribute("data-plot") or "")
+    left, top, right, _ = panel["box"]
+    low, high = panel["x"]
+    box, width = plot.bounding_box(), plot.evaluate("svg => svg.viewBox.baseVal.width")
+    assert box is not None
+    scale = box["width"] / width
+    at = 20.0
+    x = left + (at - low) / (high - low) * (right - left)
+    plot.hover(position={"x": scale * x, "y": scale * (top + 10.0)})
+    texts = seen.page.locator(".broad .values span").all_inner_texts()
+    shown = dict(text.split(": ", 1) for text in texts)
+
+    def value(panel: str, line: str) -> float:
+        (found,) = re.findall(rf"(?:^|; ){re.escape(line)} ([−\d.]+)", shown[panel])
+        return float(found.replace("−", "-"))
+
+    expected = example().axes[0].predictions[0]
+    assert float(shown["time (s)"]) == pytest.approx(at, abs=0.2)
+    measured, predicted = (np.interp(at, expected.time, values) for values in (expected.measured, expected.predicted))
+    assert value("Distance (m)", "measured") == pytest.approx(measured, abs=0.03)
+    assert value("Distance (m)", "predicted, with 95 % band") == pytest.approx(predicted, abs=0.03)
+    assert value("Commands (%)", "u_t") == pytest.approx(50.0, abs=0.5)
+    seen.page.mouse.move(5, 5)
+    assert seen.page.locator(".broad .values span").count() == 0
+    assert not seen.problems()
+    assert seen.requests == [report.as_uri()]
+
+
+def test_a_plot_of_the_report_zooms_by_dragging_and_by_keys(report: Path, visit: Callable[..., Visit]) -> None:
+    seen = visit(width=1440)
+    seen.page.goto(report.as_uri())
+    plot = seen.page.locator(".broad svg")
+    box = plot.bounding_box()
+    assert box is not None
+    ticks = plot.locator(".zoomed").last.locator("text")
+    seen.page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
+    seen.page.mouse.down()
+    seen.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60, steps=4)
+    seen.page.mouse.up()
+    zoomed = [float(text) for text in ticks.all_text_contents()]
+    assert len(zoomed) >= 4
+    assert min(zoomed) > 0.0
+    assert max(zoomed) < 40.0, "a fifth of the minute"
+    assert plot.locator("g.clip > [transform]").count() > 5, "lines and bands of all panels"
+    plot.dblclick(position={"x": 0.4 * box["width"], "y": 60})
+    assert plot.locator(".zoomed").count() == 0
+    assert plot.locator("g.clip > [transform]").count() == 0
+    plot.focus()
+    seen.page.keyboard.press("ArrowRight")
+    first = seen.page.locator(".broad .values span").first.inner_text()
+    seen.page.keyboard.press("ArrowRight")
+    assert seen.page.locator(".broad .values span").first.inner_text() != first
+    seen.page.keyboard.press("+")
+    assert plot.locator(".zoomed").count() == 4
+    seen.page.keyboard.press("Escape")
+    assert plot.locator(".zoomed").count() == 0
+    assert not seen.problems()
+
+
+def test_without_scripts_the_report_has_its_plots(report: Path, browser: "Browser") -> None:
+    context = browser.new_context(java_script_enabled=False, viewport={"width": 1440, "height": 900})
+    page = context.new_page()
+    page.goto(report.as_uri())
+    box = page.locator(".broad svg").bounding_box()
+    assert box is not None
+    assert box["height"] > 200
+    assert page.locator(".values").count() == 0
+    context.close()
 
 
 # ---- FMPy's web app --------------------------------------------------------------------------------------------------
@@ -192,7 +282,7 @@ def test_the_web_app_offers_the_declared_values_simulates_and_describes_the_mode
         " plot.layout['yaxis' + (n ? n + 1 : '')].title.text)])(document.querySelector('.js-plotly-plot'))"
     )
     rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
-    end = vehicle.rov.step(rest | COMMANDS, rest, 10.0)
+    end = vehicle.step(rest | COMMANDS, rest, 10.0)
     assert titles == [f"{name} [{unit_of(unit).display or unit}]" for name, unit in SHOWN.items()]
     assert titles[0] == "u [knot]"
     assert last == pytest.approx([end[name] * unit_of(unit).factor for name, unit in SHOWN.items()], abs=1e-4)

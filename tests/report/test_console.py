@@ -1,16 +1,19 @@
-"""Text of strangers on the terminal: it is escaped at the two places that print."""
+"""What the terminal gets: text of strangers is escaped where it is printed, and long work shows its progress."""
 
 import io
 import re
+from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
+from time import sleep
 
 import pytest
-from rich.progress import Progress
+from rich.progress import Progress, TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, paragraph, print_end, print_table, table
-from rov_fmu.report.progress import Parts, _Words
+from rov_fmu.report.progress import Parts, StudyParts, compiling, parts, per_second
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -26,7 +29,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
     print_table(found, out)
     paragraph(out, FOREIGN)
     out.print(FOREIGN)
-    display = Progress(_Words(), console=out)
+    display = Progress(TextColumn("{task.description}", markup=False), console=out)
     shown = Parts(display)
     shown.begin(FOREIGN)
     shown.print(FOREIGN)
@@ -61,3 +64,82 @@ def test_only_these_places_print() -> None:
         for _ in prints.findall(path.read_text(encoding="utf-8"))
     ]
     assert found == ["__init__.py", "bridges/sitl.py", "bridges/sitl.py", "cli.py", "cli.py", "io/messages.py"]
+
+
+# ---- The progress of long work ---------------------------------------------------------------------------------------
+
+
+def test_a_pipe_gets_a_line_for_each_platform(capsys: pytest.CaptureFixture[str]) -> None:
+    with compiling(["linux64", "win64", "darwin64"]) as (begin, done):
+        begin()
+        for name in ("win64", "linux64", "darwin64"):
+            done(name)
+    lines = capsys.readouterr().err.splitlines()
+    assert [re.sub(r"\d\.\d", "0", line) for line in lines] == [
+        f"rov-fmu: compiling {name}: done in 0 s" for name in ("win64", "linux64", "darwin64")
+    ]
+
+
+def test_the_times_of_the_compilers_begin_with_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The content of the FMU takes longer than the first of them."""
+    clock = iter((7.0, 7.0, 8.0, 9.0))
+    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: next(clock))
+    with compiling(["linux64", "win64"]) as (begin, done):
+        begin()
+        done("linux64")
+        done("win64")
+    assert re.findall(r"done in (\S+) s", capsys.readouterr().err) == ["1.0", "2.0"]
+
+
+@dataclass
+class Runs:
+    """The progress of a study."""
+
+    done: int
+    total: int = 12_000
+    failed: int = 0
+    dashboard: str = "http://localhost"
+
+
+def test_a_pipe_gets_a_line_again_and_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where the work tells no progress, and of a study that is continued."""
+    monkeypatch.setattr("rov_fmu.report.progress._EVERY", 0.05)
+    with parts() as shown:
+        study = StudyParts(shown)
+        sleep(0.12)
+        study.update(Runs(6_000))
+        study.update(Runs(7_200, failed=2))
+        sleep(0.12)
+    sleep(0.12)
+    text = capsys.readouterr().err
+    assert "rov-fmu: starting the workers (0 s so far)" in text
+    assert "rov-fmu: starting the workers: done in 0.1 s" in text
+    found = re.findall(r"^rov-fmu: [\d,]+ runs/s, 2 failed, 7,200/12,000 runs \(0 s so far\)$", text, re.MULTILINE)
+    assert 1 <= len(found) <= 3, "none after the end"
+    sleep(0.1)
+    assert not capsys.readouterr().err
+
+
+def test_a_terminal_shows_a_bar_a_count_and_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = StringIO()
+    monkeypatch.setattr(file, "isatty", lambda: True)
+    monkeypatch.setattr("sys.stderr", file)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
+    with parts() as shown:
+        shown.begin("drawing \x1b[31m")("plot 3", 0.25)
+        assert shown.is_shown
+        shown._display.refresh()  # type: ignore[union-attr]
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", file.getvalue())
+    assert "plot 3" in text
+    assert "25%" in text
+    assert max(len(line) for line in re.split(r"[\r\n]", text)) <= 80
+
+
+@pytest.mark.parametrize(("rate", "words"), [(1120.4, "1,120 runs/s"), (10.0, "10 runs/s"), (0.25, "0.25 runs/s")])
+def test_a_rate_is_never_written_with_an_exponent(rate: float, words: str) -> None:
+    assert per_second(rate) == words

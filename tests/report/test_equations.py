@@ -9,19 +9,18 @@ from lxml import html
 
 from rov_fmu.model.expression import Expression, Name, Operation, compiled, where
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Equations, Line, MathML, Text, products
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, VEHICLES, random_body, random_inputs, random_state, random_vehicle
 from verification.references.equations import calculated
 
 ROVS = {
     **VEHICLES,
     "six axes": SIX,
-    **{name: load_vehicle(path).rov for name, path in SHIPPED.items()},
-    "everything": load_vehicle(EVERYTHING).rov,
+    **{name: load_vehicle(path) for name, path in SHIPPED.items()},
+    "everything": load_vehicle(EVERYTHING),
 }
 Values = Mapping[str, float]
 SIGN = {"sgn": lambda x: copysign(1.0, x) if x else 0.0}
@@ -45,7 +44,7 @@ def factor(x: Expression, at: Values) -> float:
     return value_as_shown(x, at) if is_sum else value_of(x, at)
 
 
-def exactly(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
+def exactly(rov: Vehicle, inputs: Values, state: Values) -> dict[str, float]:
     """Return the rates and the calculated variables of a vehicle."""
     if rov.layout.has_attitude:
         rates = {f"der({name})": x for name, x in rov.derivatives(inputs, state).items()}
@@ -53,7 +52,7 @@ def exactly(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
     return {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
 
 
-def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict[str, float]:
+def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> dict[str, float]:
     """Return the value of every name to the left of an equation by what is to its right; rates as der(<name>)."""
     exact = exactly(rov, inputs, state)
     at = {**rov.coefficients, **inputs, **state}
@@ -93,7 +92,7 @@ def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict
     return found
 
 
-def check(rov: Rov, rng: random.Random, times: int) -> set[str]:
+def check(rov: Vehicle, rng: random.Random, times: int) -> set[str]:
     """Check the equations at random inputs and states, and return the names that they give."""
     shown = equations.of(rov.layout)
     for _ in range(times):

@@ -14,8 +14,7 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import Content, native_content, python_content
-from rov_fmu.fmu.module import web_module
+from rov_fmu.fmu.archive import Content, native_content, python_content, web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.page.live import Flown, fly_page
@@ -53,7 +52,7 @@ def pilchard(vehicle: Vehicle) -> Vehicle:
         identifier="pilchard",
         description="An ROV",
         source="A tank test",
-        rov=vehicle.rov.replaced({"a_t_rear": 100.3, "b_t_rear": -27.09}),
+        coefficients={**vehicle.coefficients, "a_t_rear": 100.3, "b_t_rear": -27.09},
         command_range=(0.0, 1.0),
         data=None,
         pictures=None,
@@ -133,7 +132,7 @@ def test_what_flies_for_another_vehicle_is_the_same_twice(heavy: Vehicle) -> Non
 def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
     heavy: Vehicle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    declared = [replace(v, start=500.0) if v.name == "Z_ext" else v for v in variables(heavy.rov)]
+    declared = [replace(v, start=500.0) if v.name == "Z_ext" else v for v in variables(heavy)]
     monkeypatch.setattr("rov_fmu.report.page.live.variables", lambda _: declared)
     root = html.fromstring(fly_page([Flown(heavy, b"")]))
     letters = re.findall(r"<kbd>([A-Z])</kbd>", html.tostring(root, encoding="unicode"))
@@ -146,11 +145,11 @@ def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
 
 def test_every_variable_and_coefficient_has_its_row(page: str, vehicle: Vehicle) -> None:
     table = rows(page)
-    for v in variables(vehicle.rov):
+    for v in variables(vehicle):
         assert row_of(v) in table
     coefficients = {row[0]: row for row in table if len(row) == 5}  # the last table with five columns
     for name, source in vehicle.sources.items():
-        assert coefficients[name][2::2] == [number(vehicle.rov[name]), source]
+        assert coefficients[name][2::2] == [number(vehicle[name]), source]
 
 
 def test_published_tables_side_by_side(page: str, vehicle: Vehicle) -> None:
@@ -169,7 +168,7 @@ def test_published_tables_side_by_side(page: str, vehicle: Vehicle) -> None:
 
 def test_the_page_names_the_commands_for_which_the_model_holds(page: str) -> None:
     text = text_of(page)
-    assert "hold for commands of 20–70 %" in text
+    assert "Commands of 20 % to 70 %; beyond them the thrust curves extrapolate." in text
     assert "rear thrust is then negative below 27 %" in text  # curve (8), the alternative
 
 
@@ -202,7 +201,7 @@ def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
 def test_any_coefficients_and_any_range_of_commands(
     vehicle: Vehicle, changes: dict[str, float], limits: tuple[float, float]
 ) -> None:
-    changed = replace(vehicle, rov=vehicle.rov.replaced(changes), command_range=limits, data=None)
+    changed = replace(vehicle.replaced(changes), command_range=limits, data=None)
     assert "The rear thrust is negative" not in documentation_page(changed)
 
 
@@ -296,7 +295,7 @@ def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_p
     """Both directions where they differ, by the equation of the steady state: a_d V^2 + b_d V = F + F_0."""
     table = {row[0]: row for row in rows(heavy_page) if row and row[0].startswith(("Surge (", "Heave "))}
     assert table["Heave up (m/s)"][1] == "u_5 = −c, u_6 = −c, u_7 = −c, u_8 = −c"
-    k = heavy.rov
+    k = heavy
     for name, end, sign in (("Heave down (m/s)", "", 1.0), ("Heave up (m/s)", "_reverse", -1.0)):
         V = sign * float(table[name][-2].replace("−", "-"))  # at full command, to three digits
         m = 1.0 - k["c_0_t200"]
@@ -320,11 +319,11 @@ def test_the_page_of_six_axes_tells_of_attitude_and_weight() -> None:
         "F_a, F_b, F_c, phi_0, theta_0, psi_0.",
         "each axis alone and level",
         "A thruster loses k times its speed of advance",
-        "There is no delay.",
+        "Thrusters as machines: there is no delay.",
         "A current is steady and everywhere the same.",
     ):
         assert claim in text, claim
-    for claim in ("Pitch and roll.", "loss of thrust", "diagonal mass", "Neutral buoyancy", "heavy by 1 N"):
+    for claim in ("Pitch, roll", "loss of thrust", "diagonal mass", "uoyancy is neutral", "heavy by 1 N"):
         assert claim not in text, claim
 
 
@@ -357,7 +356,7 @@ def test_the_files_of_two_vehicles_have_their_folders_if_their_names_are_the_sam
 
 def test_keys_leave_the_other_axes_at_rest() -> None:
     """Each key of a vehicle with six axes pushes along its own axis only, where thrust is linear in the commands."""
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
     (script,) = html.fromstring(fly_page([Flown(a_vehicle(rov), b"")])).xpath("//script[@id='live-vehicles']")
     (data,) = json.loads(script.text)
     assert [axis["keys"] for axis in data["axes"]] == ["WS", "EQ", "FR", "LJ", "IK", "DA"]
@@ -377,7 +376,7 @@ def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
     turns = ["psi", "ψ"] if "yaw" in kind else []
     for name in ("Z_ext", "u_l", "F_t", "tau_rear", "m_a_w", "rear", "top thruster", *turns):
         assert name not in text, name
-    for v in variables(vehicle.rov):
+    for v in variables(vehicle):
         assert v.name in text
 
 
@@ -400,8 +399,8 @@ def test_the_page_mirrors_no_directions_that_differ() -> None:
         text_of(page_without_plots(a_vehicle(VEHICLES[kind])))
         for kind in ("drag by direction, coupled, late", "yaw only")
     )
-    assert "change sign with the direction" not in by_direction
-    assert "Directions. Drag only changes sign" in yaw
+    assert "between the two directions" not in by_direction
+    assert "What differs between the two directions of drag." in yaw
 
 
 def test_the_page_names_the_axes_that_a_command_pushes_too() -> None:
@@ -434,7 +433,5 @@ def test_a_sum_has_its_signs_before_its_numbers() -> None:
 def test_words_of_variables_fit_what_they_are_of(vehicle: Vehicle) -> None:
     layout, other = vehicle.layout, VEHICLES["neither lag nor coupling"].layout
     assert layout.inputs["u_l"].description == "Command u_l: left thruster, positive forward; saturates at ±1"
-    assert "(4)" in layout.calculated["tau_rear"].description
-    assert "(4)" not in other.calculated["tau_t200"].description
     assert other.coefficients["m_a_r"].description == "Added moment of inertia m_a of yaw"
     assert other.coefficients["m_a_u"].description == "Added mass m_a of surge"

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.module import web_module
+from rov_fmu.fmu.archive import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, Axis, Thruster
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, Axis
+from rov_fmu.model.layout import Thruster
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.tank.clocks import restart_rows
 from rov_fmu.tank.columns import Names, columns_of_log
@@ -125,7 +125,7 @@ def a_manoeuvre(vehicle: Vehicle) -> list[Leg]:
 
 def natively(folder: Path, vehicle: Vehicle, legs: list[Leg]) -> Iterator[list[float]]:
     """Yield all variables after each leg, computed by the FMU's binary."""
-    declared = variables(vehicle.rov)
+    declared = variables(vehicle)
     reference = {v.name: v.value_reference for v in declared}
     slave = fmpy_slave(folder)
     try:
@@ -167,7 +167,7 @@ def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path, longest: float = 
     """Check that all variables equal those of the FMU in this folder after each leg."""
     legs = [{**leg, "length": min(longest, leg["length"])} for leg in a_manoeuvre(vehicle)]
     flown = page.evaluate(_FLY, legs)
-    names = [v.name for v in variables(vehicle.rov)]
+    names = [v.name for v in variables(vehicle)]
     worst = 0.0
     for (done, values), expected in zip(flown, natively(folder, vehicle, legs), strict=True):
         assert done
@@ -287,7 +287,7 @@ def test_a_command_acts_after_the_dead_time(tmp_path: Path, quiet: Visitor) -> N
             return live.flight.pilot.model.get("F_bow");
         });
     }""")
-    assert vehicle.rov["T_d"] == 0.1
+    assert vehicle["T_d"] == 0.1
     assert before == anew == 0.0
     assert after > 1.0
 
@@ -295,7 +295,7 @@ def test_a_command_acts_after_the_dead_time(tmp_path: Path, quiet: Visitor) -> N
 def test_pulse_widths_are_flown_by_fractions(tmp_path: Path, quiet: Visitor) -> None:
     """The model gets pulse widths, from the sliders, the step tests and a reset alike."""
     vehicle, target = load_vehicle(SHIPPED["videoray"]), tmp_path / "pulses.html"
-    of_pulses = replace(vehicle, rov=pulsed(vehicle.rov, (1100.0, 1480.0, 1900.0)))
+    of_pulses = pulsed(vehicle, (1100.0, 1480.0, 1900.0))
     flown = [Flown(of_pulses, web_module(of_pulses.layout)), Flown(vehicle, web_module(vehicle.layout))]
     target.write_text(fly_page(flown), encoding="utf-8")
     moved = flying(quiet, target.as_uri()).page.evaluate("""() => {
@@ -382,7 +382,7 @@ def test_a_step_test_stands_beside_what_was_measured(page: Any, vehicle: Vehicle
     for row in heave.rows:
         page.select_option("#live-test", label=f"heave {row.command} %")
         page.click("#live-run")
-        V, Tau = vehicle.rov.response(HEAVE, float(row.command) / 100.0)
+        V, Tau = vehicle.response(HEAVE, float(row.command) / 100.0)
         until(page, "live.flight.time > 0.1")
         title = page.text_content("#live-chart-heave .marks") or ""
         assert title.endswith(f"V_ss {V:.3f} · Tau {Tau:.2f} s")
@@ -399,14 +399,14 @@ def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(page: Any
     page.locator("input[name=u_t]").fill("0.5")
     until(page, "live.flight.pilot.model.marks[2] !== 0")
     pilot, ghost = page.evaluate("[live.flight.pilot.model.marks[2], live.flight.ghost.model.marks[2]]")
-    assert pilot == pytest.approx(vehicle.rov.replaced({"alpha_w": 2.0}).response(HEAVE, 0.5)[0], rel=1e-12)
-    assert ghost == pytest.approx(vehicle.rov.response(HEAVE, 0.5)[0], rel=1e-12)
+    assert pilot == pytest.approx(vehicle.replaced({"alpha_w": 2.0}).response(HEAVE, 0.5)[0], rel=1e-12)
+    assert ghost == pytest.approx(vehicle.response(HEAVE, 0.5)[0], rel=1e-12)
     assert page.is_checked("#live-ghost")
     page.click("#live-file")
     tuned = page.evaluate(
         "Object.fromEntries(live.vehicle.tunable.map(name => [name, live.flight.pilot.model.get(name)]))"
     )
-    assert tuned == {name: vehicle.rov[name] for name in tuned}
+    assert tuned == {name: vehicle[name] for name in tuned}
 
 
 def test_a_vehicle_of_one_axis_flies_too(pages: Callable[[str], str], quiet: Visitor) -> None:
@@ -462,7 +462,7 @@ def test_loads_and_current_act(page: Any, vehicle: Vehicle) -> None:
     until(page, "live.flight.time > 1")
     time, y, z = page.evaluate("[live.flight.time, ...['y', 'z'].map(name => live.flight.pilot.model.get(name))]")
     rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
-    assert z > 0.9 * vehicle.rov.step(rest | {"Z_ext": 1.0}, rest, time)["z"] > 0.0
+    assert z > 0.9 * vehicle.step(rest | {"Z_ext": 1.0}, rest, time)["z"] > 0.0
     assert 0.4 * time < y <= 0.5 * time
 
 
@@ -482,8 +482,8 @@ def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, quie
     for form in other.layout.axes:
         for name, sign in other.layout.signs(form.axis).items():
             inputs[name] += sign * demands.get(form.axis.name, 0.0)
-    expected = other.rov.step(inputs, dict.fromkeys(other.layout.state, 0.0), 3.0)
-    names = [v.name for v in variables(other.rov)]
+    expected = other.step(inputs, dict.fromkeys(other.layout.state, 0.0), 3.0)
+    names = [v.name for v in variables(other)]
     assert {name: ghost[names.index(name)] for name in expected} == pytest.approx(expected, rel=1e-11, abs=1e-12)
     assert page.is_checked("#live-ghost")
 
@@ -546,7 +546,7 @@ def four_thrusters(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The address of the page of a vehicle whose thrusters have long labels and are close together."""
     vehicle = load_vehicle(SHIPPED["videoray"])
     layout = replace(vehicle.layout, thrusters=tuple(Thruster(*one) for one in _FOUR))
-    rov = Rov(layout, {name: vehicle.rov.coefficients[name] for name in layout.coefficients})
+    rov = Vehicle(layout, {name: vehicle.coefficients[name] for name in layout.coefficients})
     target = tmp_path_factory.mktemp("four") / "four.html"
     target.write_text(fly_page([Flown(a_vehicle(rov), web_module(rov.layout))]), encoding="utf-8")
     return target.as_uri()
@@ -679,7 +679,7 @@ def test_a_step_test_stops_at_its_end_and_keeps_its_curve(page: Any, vehicle: Ve
     page.select_option("#live-test", label="heave 50 %")
     page.click("#live-run")
     until(page, "live.paused")
-    V, Tau = vehicle.rov.response(HEAVE, 0.5)
+    V, Tau = vehicle.response(HEAVE, 0.5)
     assert page.evaluate("[live.flight.time, live.flight.times[0]]") == pytest.approx([ceil(6.0 * Tau), 0.0])
     assert "The test has ended." in page.inner_text("#live-message")
     marks = page.text_content("#live-chart-heave .marks")
@@ -750,7 +750,7 @@ def test_the_charts_tell_the_values_under_the_pointer(page: Any, vehicle: Vehicl
     words = page.text_content("#live-chart-heave .marks")
     (time,) = re.findall(r"^at (\S+) s$", words)
     rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
-    w = vehicle.rov.step(rest | {"u_t": 0.5}, rest, float(time))["w"]
+    w = vehicle.step(rest | {"u_t": 0.5}, rest, float(time))["w"]
     title = page.text_content("#live-chart-heave .title")
     assert float(re.findall(r"w (\S+) m/s", title)[0]) == pytest.approx(w, abs=2e-3)
     box = page.locator("#live-chart-heave .scale").evaluate(BOX)
@@ -927,7 +927,7 @@ def a_recording(vehicle: Vehicle, form: Callable[[float], str] = repr) -> str:
         heading = (state["psi"] * 57.29577951308232 + 180.0) % 360.0 - 180.0
         cells = [n / 10.0, *(100.0 * inputs[c] for c in ("u_l", "u_r", "u_t")), state["u"], state["z"], heading]
         lines.append(",".join(map(form, cells)))
-        state = vehicle.rov.step(inputs, state, 0.1)
+        state = vehicle.step(inputs, state, 0.1)
     return "\n".join(lines)
 
 

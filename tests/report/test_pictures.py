@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from io import BytesIO
+from itertools import combinations
 from math import atan2, hypot, sin
 from typing import Any
 
@@ -21,18 +22,18 @@ from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.drawing import VIEWS, draw_icon, draw_thrusters, place, scenes
 from rov_fmu.report.plots.png import png_file
-from rov_fmu.report.plots.svg import inline_svg, with_formulas
+from rov_fmu.report.plots.svg import LINES, PALETTE, inline_svg, with_formulas
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
 
-SIZES = {"diagram": 8_500, "icon": 3_000, "signal": 500}
+SIZES = {"diagram": 8_600, "icon": 3_000, "signal": 500}
 
 
 @cache
 def shipped(name: str) -> Mapping[str, bytes]:
     """Return the pictures of a vehicle that ships, by their path in the FMU."""
-    return pictures(load_vehicle(SHIPPED[name]).rov)
+    return pictures(load_vehicle(SHIPPED[name]))
 
 
 def decoded(png: bytes) -> Any:
@@ -148,6 +149,34 @@ def test_many_colours_become_few_near_ones() -> None:
     assert np.abs(grey - range(256)).max() <= 16
 
 
+_BLIND = {
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
+}
+"""What colour-blind people see of linear red, green and blue (Machado et al. 2009, doi:10.1109/TVCG.2009.113)."""
+
+
+def _lab(color: str, seen: Any) -> Any:
+    """A colour of sRGB in CIELAB (D65), as somebody sees it for whom `seen` holds."""
+    values = np.array([int(color[n : n + 2], 16) / 255 for n in (1, 3, 5)])
+    linear = np.clip(
+        np.array(seen) @ np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4), 0, 1
+    )
+    xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]) @ linear
+    x, y, z = np.where((t := xyz / [0.9505, 1.0, 1.089]) > 0.008856, np.cbrt(t), 7.787 * t + 16 / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize(("kind", "least"), [("protanopia", 20.0), ("deuteranopia", 20.0), ("tritanopia", 11.0)])
+def test_colour_blind_people_tell_the_lines_apart(kind: str, least: float) -> None:
+    """2.3 is just noticeable. The last kind is a thousand times as rare as the others."""
+    for scheme in (0, 1):
+        for one, other in combinations(LINES, 2):
+            colors = (_lab(PALETTE[role][scheme], _BLIND[kind]) for role in (one, other))
+            assert np.linalg.norm(np.subtract(*colors)) > least, (scheme, one, other)
+
+
 # ---- The thrusters in a drawing --------------------------------------------------------------------------------------
 
 
@@ -172,7 +201,7 @@ def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehi
     """An arrow begins at the thruster and points along its direction; in pixels y is down."""
     figure = Figure(figsize=(6.0, 6.0))
     ax = figure.subplots()
-    draw_thrusters(ax, heavy.rov, scenes(heavy.rov)["from above"])
+    draw_thrusters(ax, heavy, scenes(heavy)["from above"])
     arrows = {(round(a.xyann[0], 2), round(a.xyann[1], 2)): a.xy for a in ax.texts if isinstance(a, Annotation)}
     names = {text.get_text() for text in ax.texts}
     for thruster in heavy.layout.thrusters:
@@ -188,7 +217,7 @@ def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehi
 
 def test_the_arm_of_the_paper_stands_where_its_torque_says(vehicle: Vehicle) -> None:
     """(4): x F_y - y F_x of a force ahead is ±R sin γ, behind the centre of mass."""
-    k = vehicle.rov
+    k = vehicle
     for thruster, side in zip(vehicle.layout.thrusters[:2], (1.0, -1.0), strict=True):
         x, y, _ = place(k, thruster)
         assert x < 0.0

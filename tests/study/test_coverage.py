@@ -17,8 +17,7 @@ import pytest
 from rov_fmu.build import build
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.model.layout import SURGE
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import SURGE
 from rov_fmu.study import Results, study
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle
@@ -55,13 +54,13 @@ LEVELS = {95: (0.025, 0.975), 90: (0.05, 0.95)}
 """The quantiles of each band, by the share of the runs within it (%)."""
 
 
-def a_vehicle(random: Random) -> Rov:
+def a_vehicle(random: Random) -> Vehicle:
     """Return a VideoRay with coefficients that differ by a quarter, and any β that a body in water may have."""
     off = {name: value * np.exp(0.25 * random.standard_normal()) for name, value in NOMINAL.items()}
     return VIDEORAY.replaced({**off, "alpha_u": 1.0, "beta_u": random.uniform(0.5, 1.0)})
 
 
-def pulls(folder: Path, k: Rov, random: Random) -> None:
+def pulls(folder: Path, k: Vehicle, random: Random) -> None:
     """Write 16 forces with errors of 0.3 N, read from a scale with marks of 0.1 N."""
     c = np.tile(np.linspace(0.1, 0.8, 8), 2)
     force = np.round(k["a_t_rear"] * c**2 + k["b_t_rear"] * c + 0.3 * random.standard_normal(16), 1)
@@ -69,14 +68,14 @@ def pulls(folder: Path, k: Rov, random: Random) -> None:
     (folder / "thrust_rear.csv").write_text("\n".join([FORCE, *rows]) + "\n", encoding="utf-8")
 
 
-def recordings(folder: Path, k: Rov, random: Random) -> None:
+def recordings(folder: Path, k: Vehicle, random: Random) -> None:
     """Write two logs of the distance at 10 Hz: correlated errors of 2 cm, rounded to cm; time stamps with 5 ms."""
     for number, plan in enumerate(PLANS):
         found = run(k, SURGE, plan, 10.0).recorded(random, "distance", colour=0.5, jitter=0.005)
         write_log(folder, str(number), replace(found, values=np.round(found.values, 2)))
 
 
-def points(folder: Path, k: Rov, random: Random) -> None:
+def points(folder: Path, k: Vehicle, random: Random) -> None:
     """Write V_ss and Tau of six steps from rest, with errors of 3 % and 5 %, read to the hundredth."""
     tables: dict[str, list[str]] = {SPEED: [], TAU: []}
     for command in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7):
@@ -91,10 +90,10 @@ def points(folder: Path, k: Rov, random: Random) -> None:
         (folder / f"{name}.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
 
 
-KINDS: dict[str, Callable[[Path, Rov, Random], None]] = {"recordings": recordings, "points": points}
+KINDS: dict[str, Callable[[Path, Vehicle, Random], None]] = {"recordings": recordings, "points": points}
 
 
-def true_motion(k: Rov) -> dict[str, Array]:
+def true_motion(k: Vehicle) -> dict[str, Array]:
     """Return u and x at the times, and the stopping distance."""
     motion = run(k, SURGE, ((0.5, OFF), (0.0, OFF + 0.2)), 10.0)
     places = [round(10.0 * time) for time in TIMES]
@@ -110,7 +109,7 @@ class Fmus:
 
     def of(self, vehicle: Vehicle) -> Path:
         """Return the FMU for studies of a vehicle."""
-        key = tuple((name, name in vehicle.intervals or value) for name, value in vehicle.rov.coefficients.items())
+        key = tuple((name, name in vehicle.intervals or value) for name, value in vehicle.coefficients.items())
         if key not in self._made:
             path = self._folder / f"{len(self._made)}.fmu"
             self._made[key] = build(vehicle, path, platforms=["host"]).path

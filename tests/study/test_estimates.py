@@ -29,7 +29,7 @@ REFITTED = load_vehicle(FROZEN_REFIT)
 ROWS = {"a_d_u": (9.0, 0.5, {}), "b_d_u": (5.0, 0.3, {"a_d_u": -0.8}), "a_d_w": (18.0, 0.6, {})}
 MADE = replace(
     REFITTED,
-    rov=REFITTED.rov.replaced({name: value for name, (value, _, _) in ROWS.items()}),
+    coefficients={**REFITTED.coefficients, **{name: value for name, (value, _, _) in ROWS.items()}},
     intervals={name: (value - 1.96 * error, value + 1.96 * error) for name, (value, error, _) in ROWS.items()},
     estimates={name: Estimated(error=error, correlation=others) for name, (_, error, others) in ROWS.items()},
 )
@@ -43,7 +43,7 @@ def _has(vehicle: Vehicle, **other: float) -> dict[str, Variable]:
             name, n, "Real", "parameter", True, True, declaration.minimum, declaration.maximum, declaration.unit, value
         )
         for n, (name, declaration) in enumerate(vehicle.layout.coefficients.items())
-        for value in [other.get(name, vehicle.rov[name])]
+        for value in [other.get(name, vehicle[name])]
     }
 
 

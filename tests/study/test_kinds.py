@@ -62,7 +62,7 @@ def _close(one: Results, other: Results) -> None:
 
 def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
     """Each run is repeated in Python, which shares no code with the FMU."""
-    rov = load_vehicle(VIDEORAY).rov
+    rov = load_vehicle(VIDEORAY)
     for number, run in native.runs.iterrows():
         own = type(rov)(rov.layout, {**rov.coefficients, "alpha_u": run.alpha_u, "m_rov": run.m_rov})
         state = dict.fromkeys(rov.layout.state, 0.0) | {"w": 0.1}

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
 from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.templates import inline_script
 from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
 from rov_fmu.study.results.plots import Plot, draw_indices, in_rows
@@ -73,7 +74,9 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert labels == [label for label in (*shown, "Trajectories of y") for _ in ("broad", "narrow")]
     check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
-    assert "<script" not in text
+    (script,) = page.iter("script")
+    assert script.text == inline_script("plots.js").text, "the only one, which the policy allows"
+    assert inline_script("plots.js").policy in page.xpath("string(//meta[@http-equiv]/@content)")
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
     assert study_page(results) == text, "the page is the same for the same results"
 
@@ -130,6 +133,23 @@ def test_the_plots_fill_the_page_with_text_of_one_size(done: Path, visit: Callab
     sizes = shown.page.evaluate(_TEXT_SIZES)
     assert len(sizes) > 30
     assert 11.0 < min(sizes) < max(sizes) < 1.03 * min(sizes), "pixels"
+    assert not shown.problems()
+
+
+def test_the_plots_show_the_values_under_the_pointer(done: Path, visit: Callable[..., Visit]) -> None:
+    shown = visit(width=1440)
+    shown.page.goto((done / "study.html").as_uri())
+    read = {}
+    for label in ("Distribution of end", "Trajectories of y"):
+        plot = shown.page.locator(f'.broad svg[aria-label="{label}"]')
+        plot.scroll_into_view_if_needed()
+        plot.hover()
+        read[label] = shown.page.locator(".values span").all_inner_texts()
+    assert re.search(r"runs \(%\): share \d+", read["Distribution of end"][1])
+    median = re.search(r": 5 % (−?[\d.]+); 95 % (−?[\d.]+); median (−?[\d.]+)$", read["Trajectories of y"][1])
+    assert median
+    low, high, middle = (float(text.replace("−", "-")) for text in median.groups())
+    assert low < middle < high
     assert not shown.problems()
 
 

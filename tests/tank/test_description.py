@@ -11,12 +11,11 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
 from tests.folders import (
@@ -53,9 +52,9 @@ def read_again(found: Identification, path: Path) -> None:
 
 def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
     base = load_vehicle(SHIPPED["bluerov2"])
-    k = base.rov.replaced({"a_d_v": 30.0, "b_d_v": 9.0, "beta_v": 0.8})
+    k = base.replaced({"a_d_v": 30.0, "b_d_v": 9.0, "beta_v": 0.8})
     tests = read(tmp_path / "tests", BLUEROV2, responses(k, SWAY))
-    assert tests.given.rov.layout == base.layout
+    assert tests.given.vehicle.layout == base.layout
     assert {*base.layout.coefficients} - {*tests.given.known} == {
         "a_d_v",
         "b_d_v",
@@ -63,17 +62,15 @@ def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
     }
     assert tests.inputs.keys() == {ROV_FILE, "bluerov2", "steady_sway.csv", "time_constant_sway.csv"}
     found = identify(tests)
-    assert [found.vehicle.rov[name] for name in ("a_d_v", "b_d_v", "beta_v")] == pytest.approx(
-        [30.0, 9.0, 0.8], rel=0.03
-    )
+    assert [found.vehicle[name] for name in ("a_d_v", "b_d_v", "beta_v")] == pytest.approx([30.0, 9.0, 0.8], rel=0.03)
     for command in (0.2, 0.6, -0.4):
-        assert found.vehicle.rov.response(SWAY, command) == pytest.approx(k.response(SWAY, command), rel=1e-3)
+        assert found.vehicle.response(SWAY, command) == pytest.approx(k.response(SWAY, command), rel=1e-3)
     curve = {name for name in base.layout.coefficients if name.endswith("_t200") or "_t200_" in name}
     same = {*base.layout.coefficients} - {"a_d_v", "b_d_v", "beta_v", "alpha_v"} - curve
-    assert {name: found.vehicle.rov[name] for name in same} == {name: base.rov[name] for name in same}
+    assert {name: found.vehicle[name] for name in same} == {name: base[name] for name in same}
     assert {name: found.vehicle.sources[name] for name in same} == {name: base.sources[name] for name in same}
     for name in curve:  # thrust and drag have a common scale, which velocities do not tell
-        assert found.vehicle.rov[name] == pytest.approx(base.rov[name], rel=0.03)
+        assert found.vehicle[name] == pytest.approx(base[name], rel=0.03)
     assert found.vehicle.thruster_sources == base.thruster_sources
     assert not by_heading(found.findings)["Warnings"], (
         "untested axes are as they were, which is no shortcoming of the data"
@@ -83,17 +80,17 @@ def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
 
 def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
     """The log also replaces F_0, because another vehicle has another trim."""
-    base = load_vehicle(SHIPPED["bluerov2"]).rov
+    base = load_vehicle(SHIPPED["bluerov2"])
     folder = folder_of(tmp_path / "tests", BLUEROV2, {})
     true = base.replaced({"F_0_w": 0.0, "a_d_w": 50.0, "b_d_w": 8.0, "beta_w": 0.9})
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
     write_log(folder, "a", clean(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
     tests = load_tests(folder)
-    assert tests.given.rov.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
+    assert tests.given.vehicle.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
     assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.given.known}
     found = identify(tests).vehicle
     for name in ("a_d_w", "b_d_w", "beta_w"):
-        assert found.rov[name] == pytest.approx(true[name], rel=0.05)
+        assert found[name] == pytest.approx(true[name], rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -103,13 +100,13 @@ def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
 def test_thrust_ahead_leaves_reverse_as_it_is(
     commands: tuple[float, ...], keys: tuple[str, ...], tmp_path: Path
 ) -> None:
-    base = load_vehicle(SHIPPED["bluerov2"]).rov
+    base = load_vehicle(SHIPPED["bluerov2"])
     curve = base.layout.curves[0]
     rows = "".join(f"{c},{1.1 * base.curve_force(curve, c):.6f}\n" for c in commands)
     tests = read(tmp_path, BLUEROV2, {"thrust_T200.csv": f"{FORCE}\n{rows}"})
-    assert tests.given.rov.layout.curves[0].keys == keys
+    assert tests.given.vehicle.layout.curves[0].keys == keys
     if len(commands) == 2:
-        found = identify(tests).vehicle.rov
+        found = identify(tests).vehicle
         assert found.curve_force(curve, 0.6) == pytest.approx(1.1 * base.curve_force(curve, 0.6), rel=2e-3)
         assert found.curve_force(curve, -0.6) == base.curve_force(curve, -0.6)
 
@@ -121,12 +118,12 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "tests", HEAD, {})
     (folder / "old.toml").write_text(text, encoding="utf-8")
     table = '[axes.sway]\nm_a = { value = 7.0, unit = "kg", source = "a strip" }\n'
-    k = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"m_a_v": 7.0})
+    k = load_vehicle(SHIPPED["bluerov2"]).replaced({"m_a_v": 7.0})
     for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
         tests = read(folder, f'base = "old.toml"\n{HEAD}{also}', responses(k, SWAY))
-        assert [*tests.given.rov.layout.kinds] == ["surge", "sway", "heave", "yaw"]
-        assert tests.given.rov.layout.kinds["sway"].keys == keys
-    found = identify(tests).vehicle.rov
+        assert [*tests.given.vehicle.layout.kinds] == ["surge", "sway", "heave", "yaw"]
+        assert tests.given.vehicle.layout.kinds["sway"].keys == keys
+    found = identify(tests).vehicle
     assert found.response(SWAY, 0.5) == pytest.approx(k.response(SWAY, 0.5), rel=1e-3)
     inputs: list[Path] = []
     load_tests(folder, inputs.extend)
@@ -142,14 +139,14 @@ def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     drag = {"a_d_u": 18.0, "b_d_u": 4.0, "a_d_v": 22.0, "b_d_v": 6.0, "a_d_r": 1.5, "b_d_r": 0.1}
     placeholders = {f"steady_{name}.csv": f"{SPEED}\n0.1,0.1\n" for name in ("surge", "sway")}
     placeholders["steady_yaw.csv"] = f"{RATE}\n0.1,0.1\n"
-    layout = read(tmp_path / "all", VECTORED, tables | placeholders).given.rov.layout
-    true = Rov(layout, dict.fromkeys(layout.coefficients, 1.0) | known | drag)
+    layout = read(tmp_path / "all", VECTORED, tables | placeholders).given.vehicle.layout
+    true = Vehicle(layout, dict.fromkeys(layout.coefficients, 1.0) | known | drag)
     for axis in (SURGE, SWAY, YAW):
         tables |= responses(true, axis)
     found = identify(read(tmp_path / "tests", VECTORED, tables))
     assert [*found.vehicle.layout.kinds] == ["surge", "sway", "yaw"]
     for name, value in (known | drag | {"beta_u": 1.0, "beta_v": 1.0, "beta_r": 1.0}).items():
-        assert found.vehicle.rov[name] == pytest.approx(value, rel=0.02), name
+        assert found.vehicle[name] == pytest.approx(value, rel=0.02), name
     assert found.vehicle.sources["m_a_v"] == "a strip"
     assert found.vehicle.thruster_sources["3"] == {"direction": "drawn: 3", "position": "drawn too"}
     assert found.vehicle.layout.signs(SWAY) == {"u_1": 1.0, "u_2": -1.0, "u_3": 1.0, "u_4": -1.0}
@@ -163,8 +160,8 @@ def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
     )
     rows = {"thrust_t200.csv": pulled(30.0, 20.0), "steady_surge.csv": f"{SPEED}\n0.2,0.2\n0.4,0.35\n0.8,0.6\n"}
     tests = read(tmp_path, VECTORED + mix, rows)
-    assert [*tests.given.rov.layout.mix] == ["ahead"]
-    assert len(tests.given.rov.layout.thrusters) == 4
+    assert [*tests.given.vehicle.layout.mix] == ["ahead"]
+    assert len(tests.given.vehicle.layout.thrusters) == 4
     assert tests.findings == (Finding("axis left out", axis="sway", names={"drag": "a_d_v, b_d_v"}),)
 
 
@@ -183,7 +180,7 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     header = ",".join([*names, "surge distance [m]", "depth [m]"])
     tables = {"dive.csv": "\n".join([header, *rows]) + "\n", "thrust_t200.csv": pulled(30.0, 20.0)}
     tests = read(tmp_path, f"{rov}[axes.heave]\n", tables)
-    assert [*tests.given.rov.layout.kinds] == tests.tested.logs == ["surge"]
+    assert [*tests.given.vehicle.layout.kinds] == tests.tested.logs == ["surge"]
     assert Finding("cancelling thrusters", "heave", file="dive.csv") in tests.findings
     assert any(
         "heave: the logs have its motion, but in all of them its thrusters cancel each other" in line
@@ -196,10 +193,10 @@ def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
     tables = {f"steady_{name}.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n" for name in ("surge", "sway")}
     tables["thrust_t200.csv"] = pulled(30.0, 20.0)
     tests = read(tmp_path, rov, tables)
-    assert not tests.given.rov.layout.coupled
+    assert not tests.given.vehicle.layout.coupled
     assert tests.findings == (Finding("not coupled"),)
     tests = read(tmp_path, rov, tables | {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n"})
-    assert tests.given.rov.layout.coupled
+    assert tests.given.vehicle.layout.coupled
     assert tests.findings == ()
 
 
@@ -208,11 +205,11 @@ def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
 
 def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TOP}", {})
-    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_w": 1.0})
+    k = load_vehicle(VIDEORAY).replaced({"alpha_w": 1.0})
     plan = ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0), (0.7, 6.0))
     write_log(folder, "a", clean(k, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
     tests = load_tests(folder)
-    layout = tests.given.rov.layout
+    layout = tests.given.vehicle.layout
     assert [*layout.kinds] == ["heave"]
     assert [t.name for t in layout.thrusters] == ["t"]
     assert [curve.name for curve in layout.curves] == ["top"]
@@ -222,7 +219,7 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
         ("axis left out", "yaw"),
     ]
     found = identify(tests)
-    assert found.vehicle.rov["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
+    assert found.vehicle["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
     read_again(found, tmp_path / "mine.toml")
 
 
@@ -242,9 +239,9 @@ def test_any_coefficient_may_be_known(tmp_path: Path) -> None:
         'm_a_w = { value = 3.0, unit = "kg", source = "a sphere" }\nT_top = { value = 0.1, unit = "s", source = "s" }\n'
     )
     given = read(tmp_path, f"{HEAD}[known]\n{MASS}{TOP}{more}", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
-    assert given.rov.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
-    assert given.rov.layout.curves[0].has_lag
-    assert (given.rov["m_a_w"], given.known["m_a_w"].source) == (3.0, "a sphere")
+    assert given.vehicle.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
+    assert given.vehicle.layout.curves[0].has_lag
+    assert (given.vehicle["m_a_w"], given.known["m_a_w"].source) == (3.0, "a sphere")
 
 
 @pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",)), ("[]", ())])
@@ -258,7 +255,7 @@ def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> N
 def test_the_lag_of_a_base_is_found_anew_where_asked(tmp_path: Path) -> None:
     given = read(tmp_path, f"{BLUEROV2}[fit]\nlag = true\n", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
     assert given.requests.lag == ("t200",)
-    assert "T_t200" not in given.rov.layout.coefficients
+    assert "T_t200" not in given.vehicle.layout.coefficients
 
 
 def test_what_is_known_stands_instead_of_base_and_tests(tmp_path: Path) -> None:
@@ -268,8 +265,8 @@ a_d_v = { value = 25.0, unit = "N.s2/m2", source = "a tow" }
 """
     base = load_vehicle(SHIPPED["bluerov2"])
     given = read(tmp_path, BLUEROV2 + known, {"steady_sway.csv": f"{SPEED}\n0.3,0.2\n"}).given
-    assert (given.rov["m_rov"], given.known["m_rov"].source) == (12.0, "weighed")
-    assert (given.rov["a_d_v"], given.known["a_d_v"].source) == (25.0, "a tow")
+    assert (given.vehicle["m_rov"], given.known["m_rov"].source) == (12.0, "weighed")
+    assert (given.vehicle["a_d_v"], given.known["a_d_v"].source) == (25.0, "a tow")
     assert "b_d_v" not in given.known
     assert given.known["I_r"].source == base.sources["I_r"]
     assert given.description.limits == base.limits
@@ -288,7 +285,7 @@ def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
     found = identify(read(tmp_path / "tests", rov, tables))
     assert [*found.vehicle.layout.kinds] == ["heave"]
     read_again(found, tmp_path / "mine.toml")
-    identified = found.vehicle.rov
+    identified = found.vehicle
     (of_file,) = identified.layout.curves
     for c in (0.2, 0.5, 0.8):
         assert identified.curve_force(of_file, c) == pytest.approx((30.0 * (c - 0.1) + 20.0) * (c - 0.1), rel=0.03)
@@ -301,14 +298,14 @@ GIVEN = {"a_d_w": 40.0, "F_0_w": -1.0, "T_t200": 0.3, "c_0_t200": 0.02}
 @pytest.mark.parametrize("name", GIVEN)
 def test_a_number_of_rov_toml_is_in_the_vehicle_as_it_is(name: str, tmp_path: Path) -> None:
     """Even where the log would rather have another one."""
-    base = load_vehicle(SHIPPED["bluerov2"]).rov
+    base = load_vehicle(SHIPPED["bluerov2"])
     unit = base.layout.extended([name]).coefficients[name].unit
     known = f'[known]\n{name} = {{ value = {GIVEN[name]}, unit = "{unit}", source = "s" }}\n'
     folder = folder_of(tmp_path / "tests", f"{BLUEROV2}{known}", {})
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
     write_log(folder, "a", clean(base, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
     vehicle = identify(load_tests(folder)).vehicle
-    assert (vehicle.rov[name], vehicle.sources[name]) == (GIVEN[name], "s")
+    assert (vehicle[name], vehicle.sources[name]) == (GIVEN[name], "s")
     assert name not in vehicle.estimates
 
 
@@ -316,4 +313,4 @@ def test_the_rov_toml_of_the_docs(tmp_path: Path) -> None:
     (text,) = re.findall(r"```toml\n(base = .*?)```", (DOCS / "identify.md").read_text(encoding="utf-8"), re.DOTALL)
     given = read(tmp_path, text, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
     assert given.head.name == "Our BlueROV2"
-    assert given.rov.layout == load_vehicle(SHIPPED["bluerov2"]).layout
+    assert given.vehicle.layout == load_vehicle(SHIPPED["bluerov2"]).layout

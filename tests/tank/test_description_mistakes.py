@@ -307,11 +307,11 @@ def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int,
         except FileError as error:
             check_lines(str(error), folder)
             return
-        layout = given.rov.layout
+        layout = given.vehicle.layout
         assert [*check_layout(layout)] == []
         assert {"surge", "yaw"} <= layout.kinds.keys()
-        assert given.rov.coefficients.keys() == layout.coefficients.keys() >= given.known.keys()
-        assert all(isfinite(value) for value in given.rov.coefficients.values())
+        assert given.vehicle.coefficients.keys() == layout.coefficients.keys() >= given.known.keys()
+        assert all(isfinite(value) for value in given.vehicle.coefficients.values())
         assert given.thruster_sources.keys() == {thruster.name for thruster in layout.thrusters}
 
     fuzz(check, examples)

@@ -9,7 +9,8 @@ import pytest
 
 from rov_fmu.identify.likelihood.records import recorded
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import PAPER

@@ -13,7 +13,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
@@ -52,7 +52,7 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
     assert upward == [(-0.7, -0.37), (-0.5, -0.25), (-0.3, -0.17), (-0.2, -0.13)][::-1]
     known = found.given.known
     assert {name: q.value for name, q in known.items()} == {
-        name: vehicle.rov[name] for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
+        name: vehicle[name] for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
     }
     assert all("Table 9" in q.source for q in known.values())
     assert found.inputs == {

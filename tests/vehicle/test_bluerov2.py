@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
-from rov_fmu.model.layout import AXES
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -48,11 +48,11 @@ def rms(residuals: Any) -> float:
 def test_the_curve_is_that_of_the_makers_points_to_0_35_newton(ship: Vehicle) -> None:
     c, thrust = points()
     curve = ship.layout.curves[0]
-    shipped = np.array([ship.rov.curve_force(curve, float(x)) for x in c])
+    shipped = np.array([ship.curve_force(curve, float(x)) for x in c])
     assert rms((shipped - thrust)[c > 0.0]) < 0.35
     assert rms((shipped - thrust)[c < 0.0]) < 0.35
     assert np.all(shipped[np.abs(c) < 0.0872] == 0.0)
-    ends = [ship.rov.curve_force(curve, command) for command in (1.0, -1.0)]
+    ends = [ship.curve_force(curve, command) for command in (1.0, -1.0)]
     assert ends == pytest.approx([5.25 * NEWTON, -4.1 * NEWTON], rel=0.04), "forward is the strong side"
 
 
@@ -65,7 +65,7 @@ def test_the_curve_is_the_least_squares_fit(ship: Vehicle) -> None:
 
     fit = least_squares(residuals, [20.0, 20.0, 20.0, 20.0, 0.05], x_scale=[10.0, 10.0, 10.0, 10.0, 0.1])
     names = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
-    assert [ship.rov[name] for name in names] == pytest.approx(fit.x, rel=0.025)
+    assert [ship[name] for name in names] == pytest.approx(fit.x, rel=0.025)
 
 
 def test_one_symmetric_quadratic_leaves_nine_times_as_much() -> None:
@@ -79,7 +79,7 @@ def test_the_lag_loses_the_impulse_of_the_published_transfer_function() -> None:
     _, rise = step(TransferFunction([6136.0, 108700.0], [1.0, 89.0, 9258.0, 108700.0]), T=t)
     lost = float(np.trapezoid(1.0 - rise, t))
     for name in BOTH:
-        assert load_vehicle(SHIPPED[name]).rov["T_t200"] == pytest.approx(lost, abs=5e-5)
+        assert load_vehicle(SHIPPED[name])["T_t200"] == pytest.approx(lost, abs=5e-5)
 
 
 # ---- ArduSub ---------------------------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ def test_a_stick_moves_its_axis_alone(name: str, axis: str) -> None:
     vehicle, (place, sign) = load_vehicle(SHIPPED[name]), STICKS[axis]
     inputs = dict.fromkeys(vehicle.layout.inputs, 0.0)
     inputs |= {f"u_{n}": 0.4 * sign * factors[place] for n, factors in ARDUSUB[name].items()}
-    F = vehicle.rov.commanded(inputs)
+    F = vehicle.commanded(inputs)
     for other in (AXES[name] for name in STICKS):
         force = sum(thruster.effect(other) * F[thruster.name] for thruster in vehicle.layout.thrusters)
         assert (force > 1.0) if other.name == axis else (abs(force) < 1e-12), other.name
@@ -155,7 +155,7 @@ ROLLING = {"p": (0.26, 0.189, 0.0, 1.19), "q": (0.23, 0.135, 0.8, 0.47)}
 
 @pytest.mark.parametrize("name", BOTH)
 def test_the_coefficients_are_those_of_the_publication(name: str) -> None:
-    rov = load_vehicle(SHIPPED[name]).rov
+    rov = load_vehicle(SHIPPED[name])
     mass, inertia, weight, axes = PUBLISHED[name]
     assert (rov["m_rov"], rov["I_r"]) == (mass, inertia)
     net_weight = rov["W"] - rov["B"] if rov.layout.has_attitude else rov["F_0_w"]
@@ -166,7 +166,7 @@ def test_the_coefficients_are_those_of_the_publication(name: str) -> None:
 
 def test_the_heavy_rolls_and_pitches_as_published() -> None:
     """The centre of buoyancy is 1 cm above that of mass, and the horizontal thrusters push 8.5 cm below it."""
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
     for axis, numbers in ROLLING.items():
         assert tuple(rov[name] for name in (f"I_{axis}", f"m_a_{axis}", f"b_d_{axis}", f"a_d_{axis}")) == numbers
     assert (rov["W"], rov["B"], rov["z_B"]) == pytest.approx((9.82 * 13.5, 9.82 * 13.4, -0.01), abs=1e-12)

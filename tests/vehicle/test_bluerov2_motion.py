@@ -139,7 +139,7 @@ def flown() -> Flown:
 
 @pytest.mark.parametrize("longest", [100.0, pytest.param(0.01, marks=pytest.mark.long)])
 def test_the_heavy_agrees_with_dop853(flown: Flown, longest: float) -> None:
-    rov = four_axes(load_vehicle(HEAVY)).rov
+    rov = four_axes(load_vehicle(HEAVY))
     state, dead = flown[0][2], 0
     for h, inputs, wanted in flown[1:]:
         steps = max(1, round(h / longest))

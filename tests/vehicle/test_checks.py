@@ -10,7 +10,7 @@ import tomlkit
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.layout import ARM, AXES, AXIS, BODY, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW, declarations_of
+from rov_fmu.model.catalogue import ARM, AXES, AXIS, BODY, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW, declarations_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS
@@ -41,13 +41,13 @@ def test_an_axis_may_have_every_key_of_an_axis(tmp_path: Path) -> None:
     }
     path = tmp_path / "vehicle.toml"
     path.write_text(tomlkit.dumps(data), encoding="utf-8")
-    rov = load_vehicle(path).rov
+    rov = load_vehicle(path)
     form = rov.layout.kinds["heave"]
     assert {key: rov[form.coefficient(key)] for key in form.keys} == values
 
 
 def test_every_key_is_read(everything: Vehicle) -> None:
-    layout, rov = everything.layout, everything.rov
+    layout, rov = everything.layout, everything
     assert [form.axis for form in layout.axes] == [SURGE, SWAY, HEAVE, YAW]
     assert layout.coupled
     assert layout.kinds["heave"].keys == ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0")
@@ -58,7 +58,7 @@ def test_every_key_is_read(everything: Vehicle) -> None:
         "the maker's table",
         1,
     )
-    assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "(2)", 2)
+    assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "", 2)
     assert set(frame.keys) == {*_CURVE, "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse", "T"}
     assert (rov["F_0_w"], rov["a_d_w"], rov["a_d_w_reverse"], rov["T_frame"]) == (-1.0, 190.0, 210.0, 0.15)
     assert (rov["alpha_u"], rov["beta_u"], rov["alpha_r"], rov["beta_r"]) == (1.0, 1.0, 0.9, 0.8)
@@ -534,7 +534,7 @@ def test_a_valid_vehicle_can_be_simulated(case: str, tmp_path: Path) -> None:
     path.write_text(changed(VALID[case]), encoding="utf-8")
     vehicle = load_vehicle(path)
     start = dict.fromkeys(vehicle.layout.state, 0.0)
-    moved = vehicle.rov.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)
+    moved = vehicle.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)
     assert list(moved) == list(start)
     assert any(moved.values())
 
@@ -589,7 +589,7 @@ def test_the_command_line_prints_a_warning_on_one_line(tmp_path: Path, capsys: p
 def test_a_vehicle_without_weight_is_neutral(tmp_path: Path) -> None:
     path = tmp_path / "rov.toml"
     path.write_text(changed(_SINK, SIX), encoding="utf-8")
-    rov = load_vehicle(path).rov
+    rov = load_vehicle(path)
     tilted = {**rov.layout.at_rest, "eta": sqrt(0.5), "epsilon_1": sqrt(0.5)}
     after = rov.step(dict.fromkeys(rov.layout.inputs, 0.0), tilted, 10.0)
     assert {name: after[name] for name in tilted} == pytest.approx(tilted, abs=1e-12)

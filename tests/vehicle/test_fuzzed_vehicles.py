@@ -12,7 +12,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import archive, native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.identify.tuning import Target, tune
-from rov_fmu.model.layout import YAW
+from rov_fmu.model.catalogue import YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
@@ -46,19 +46,19 @@ def check_refusal(message: str, path: Path) -> None:
 def check_usable(vehicle: Vehicle) -> None:
     """Check that all numbers are within their bounds, and that a step gives finite numbers."""
     layout = vehicle.layout
-    assert set(vehicle.rov.coefficients) == set(layout.coefficients) == set(vehicle.sources)
+    assert set(vehicle.coefficients) == set(layout.coefficients) == set(vehicle.sources)
     for name, declaration in layout.coefficients.items():
-        assert declaration.minimum <= vehicle.rov[name] <= declaration.maximum
+        assert declaration.minimum <= vehicle[name] <= declaration.maximum
     low, high = vehicle.command_range
     assert 0.0 <= low < high <= 1.0
     assert all(isfinite(end) for interval in vehicle.intervals.values() for end in interval)
     inputs = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, (0.3, 0.2, -0.1, 1.0), strict=False))
     h = 0.1
     if layout.coupled:  # coupled axes settle together; until then the fastest decay limits each piece
-        axes = vehicle.rov.motions(inputs)
+        axes = vehicle.motions(inputs)
         drags = [(axis, drag) for axis in axes for drag in ((axis.A, axis.B), axis.reverse or (0.0, 0.0))]
         h = min(h, 1000.0 / max(1.0, *(B + 2.0 * sqrt(A * abs(axis.C)) for axis, (A, B) in drags)))
-    after = vehicle.rov.step(inputs, dict.fromkeys(layout.state, 0.0), h)
+    after = vehicle.step(inputs, dict.fromkeys(layout.state, 0.0), h)
     assert all(isfinite(value) for value in after.values())
 
 
@@ -112,13 +112,13 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
         if not vehicle.layout.has(YAW):
             return
         form = vehicle.layout.kinds["yaw"]
-        force, drag = vehicle.rov.force(YAW, 0.3), [vehicle.rov[form.coefficient(key)] for key in ("a_d", "b_d")]
+        force, drag = vehicle.force(YAW, 0.3), [vehicle[form.coefficient(key)] for key in ("a_d", "b_d")]
         if force > 1e-3 and max(drag) > 1e-3:
-            rov = tune(vehicle.rov, YAW, [Target("V_ss", 0.3, min(1.0, 0.1 * force / sum(drag)))]).rov
+            rov = tune(vehicle, YAW, [Target("V_ss", 0.3, min(1.0, 0.1 * force / sum(drag)))]).vehicle
             write_tuned(
                 path, path.with_name("tuned.toml"), {name: rov[name] for name in ("alpha_r", "beta_r")}, "Tuned"
             )
-            assert load_vehicle(path.with_name("tuned.toml")).rov["beta_r"] == vehicle.rov["beta_r"]
+            assert load_vehicle(path.with_name("tuned.toml"))["beta_r"] == vehicle["beta_r"]
             tuned += 1
 
     fuzz(check, examples)
@@ -145,8 +145,8 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
         again = load_vehicle(written)
         assert again.layout == vehicle.layout
         assert again.sources == vehicle.sources
-        for name, value in vehicle.rov.coefficients.items():
-            assert again.rov[name] == float(f"{value:.6g}")
+        for name, value in vehicle.coefficients.items():
+            assert again[name] == float(f"{value:.6g}")
 
     fuzz(check, examples)
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Curve, Declaration, Layout, Thruster, VehicleAxis
+from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.description import _identifier
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_mass, check_thruster_places, doubts
@@ -188,7 +189,8 @@ def test_an_entry_of_the_mass_matrix_is_less_than_the_mean_of_the_masses(share: 
     axes = tuple(VehicleAxis(axis, ("m_a", "a_d", "b_d")) for axis in (SURGE, SWAY))
     rov = numbered(Layout(axes, (), (), cross=(("m_a", "u", "v"),)))
     most = sqrt((MASS + 6.3567) * (MASS + 7.1206))
-    found = lines(check_mass(rov.replaced({"m_a_uv": share * most, "beta_u": 0.5})))
+    values = {**rov.coefficients, "m_a_uv": share * most, "beta_u": 0.5}
+    found = lines(check_mass(rov.layout, values))
     assert (found == []) == possible
     assert all(f"within ±{most:.4g} for a positive definite matrix, but it is {share * most:.4g}" in x for x in found)
 
@@ -208,7 +210,7 @@ def test_an_entry_of_the_mass_matrix_is_less_than_the_mean_of_the_masses(share: 
     ],
 )
 def test_numbers_are_doubted_beyond_a_limit(values: dict[str, float], words: str | None) -> None:
-    found = lines(doubts(SIX.replaced(values)))
+    found = lines(doubts(SIX.layout, {**SIX.coefficients, **values}))
     assert len(found) == (words is not None)
     assert words is None or words in found[0]
 
@@ -218,7 +220,7 @@ def test_a_voltage_of_more_than_one_and_a_half_times_that_of_the_curve_is_doubte
     voltage: float, is_doubted: bool
 ) -> None:
     layout = Layout((VehicleAxis(SURGE),), (Curve("c", ("V_0", "n_V", "a_t", "b_t")),), (), voltage=voltage)
-    found = lines(doubts(numbered(layout, V_0=10.0).replaced({"V_0_c": 10.0})))
+    found = lines(doubts(layout, {**numbered(layout, V_0=10.0).coefficients, "V_0_c": 10.0}))
     assert len(found) == is_doubted
     assert all("is 1.51 times V_0 = 10 V of curves.c" in line for line in found)
 

@@ -11,7 +11,7 @@ from rov_fmu.engine.simulation import simulate
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import at_rest
 
-REMUS = load_vehicle(Path(__file__).parents[2] / "examples" / "remus100" / "remus100.toml").rov
+REMUS = load_vehicle(Path(__file__).parents[2] / "examples" / "remus100" / "remus100.toml")
 W, B, m, z_g = 299.0, 306.0, 30.48, 0.0196
 I_xx, I_yy, I_zz = 0.177, 3.45, 3.45
 

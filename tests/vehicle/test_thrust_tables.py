@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import COMMANDS, CURVE, FIN
+from rov_fmu.model.catalogue import COMMANDS, CURVE, FIN
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -168,9 +168,9 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     write_vehicle(load_vehicle(here), folder / "written.toml")
     write_tuned(here, folder / "tuned.toml", {"lift_rudder": 10.0, "T_d": 0.2, "k_t_main": 1.1}, "by hand")
     written, tuned = (load_vehicle(folder / f"{name}.toml") for name in ("written", "tuned"))
-    assert (written.layout, written.rov.coefficients) == (vehicle.layout, dict(vehicle.rov.coefficients))
+    assert (written.layout, written.coefficients) == (vehicle.layout, dict(vehicle.coefficients))
     assert written.sources == vehicle.sources
-    assert {name: tuned.rov[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
+    assert {name: tuned[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
         "lift_rudder": 10.0,
         "T_d": 0.2,
         "k_t_main": 1.1,

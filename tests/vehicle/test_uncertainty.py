@@ -66,7 +66,7 @@ def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_pa
     others = load_vehicle(path).estimates
     assert "a_d_u" not in others
     assert others["b_d_u"] == refit.estimates["b_d_u"].model_copy(update={"correlation": {}})
-    write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit.rov[name] + 0.1 for name in refit.estimates}, "a test")
+    write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit[name] + 0.1 for name in refit.estimates}, "a test")
     assert "estimates" not in path.read_text(encoding="utf-8")
 
 
@@ -208,8 +208,8 @@ def test_a_value_set_by_hand_within_its_interval_keeps_the_error(refit: Vehicle,
 def test_an_interval_cut_on_one_side_gives_the_error_by_the_other(refit: Vehicle) -> None:
     """b_d_u is at least 0, β_w at most 1000. The interval of a_d_u is cut on both sides, so its larger side counts."""
     cut = {"a_d_u": (0.0, 1e6), "b_d_u": (0.0, 5.0 + 1.959964), "beta_w": (500.0, 1000.0)}
-    rov = refit.rov.replaced({"a_d_u": 9.0, "b_d_u": 5.0, "beta_w": 900.0})
-    found = replace(refit, rov=rov, intervals=cut, estimates={}).uncertainty
+    rov = refit.replaced({"a_d_u": 9.0, "b_d_u": 5.0, "beta_w": 900.0})
+    found = replace(rov, intervals=cut, estimates={}).uncertainty
     assert found.names == ("a_d_u", "b_d_u", "beta_w")
     assert found.errors == pytest.approx([(1e6 - 9.0) / 1.959964, 1.0, 900.0 * np.log(900.0 / 500.0) / 1.959964])
     drawn = found.drawn(qmc.Sobol(3, seed=0).random(1024))

@@ -43,7 +43,7 @@ TABLE_9 = {
 
 
 def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
-    assert vehicle.rov.coefficients == TABLE_9
+    assert vehicle.coefficients == TABLE_9
     assert vehicle.layout == PAPER
     assert set(vehicle.sources) == set(TABLE_9)
     assert all("Table 9" in source for source in vehicle.sources.values())
@@ -58,7 +58,7 @@ def test_optional_parts_may_be_absent(tmp_path: Path) -> None:
     vehicle = load_vehicle(path)
     assert vehicle.data is None
     assert vehicle.alternatives == {}
-    assert vehicle.rov.coefficients == TABLE_9
+    assert vehicle.coefficients == TABLE_9
 
 
 def edit(pattern: str, replacement: str) -> Callable[[str], str]:

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT, TESTS
 from tests.vehicle.test_vehicle import check_line, edit, refusal
@@ -28,7 +29,9 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
         pictures=None,
         alternatives={},
         intervals={"m_rov": (6.5, 6.6), "b_d_w": (0.0, 1.25)},
-        provenance=Provenance("tool", "heave: a\nyaw: b", inputs, ("a warning", "b"), ("a fact", "c")),
+        provenance=Provenance(
+            tool="tool", method="heave: a\nyaw: b", inputs=inputs, warnings=("a warning", "b"), facts=("a fact", "c")
+        ),
     )
     path = tmp_path / "made.toml"
     write_vehicle(made, path)
@@ -38,8 +41,10 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
 
 
 def test_the_first_words_of_a_file_say_what_it_was_made_from(vehicle: Vehicle) -> None:
-    made = Provenance("tool", "by thought", {}, data="tank tests and 2 dive logs")
-    text = vehicle_text(replace(vehicle, data=None, pictures=None, provenance=made))
+    made = Provenance(tool="tool", method="by thought", inputs={})
+    text = vehicle_text(
+        replace(vehicle, data=None, pictures=None, provenance=made, measured_from="tank tests and 2 dive logs")
+    )
     assert "\n# Made from tank tests and 2 dive logs: [provenance] tells how" in text
     assert "warnings" not in text
     assert "facts" not in text
@@ -73,10 +78,10 @@ def test_a_vehicle_with_six_axes_reads_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY], ids=lambda path: path.stem)
 def test_tuning_changes_only_the_given_coefficients(source: Path, tmp_path: Path) -> None:
     before, path = load_vehicle(source), tmp_path / "tuned.toml"
-    kept = float(before.rov["alpha_w"])
+    kept = float(before["alpha_w"])
     write_tuned(source, path, {"alpha_w": kept, "beta_w": 0.25, "a_d_w": 12.5}, "a test")
     after = load_vehicle(path)
-    assert after.rov.coefficients == {**before.rov.coefficients, "beta_w": 0.25, "a_d_w": 12.5}
+    assert after.coefficients == {**before.coefficients, "beta_w": 0.25, "a_d_w": 12.5}
     assert after.sources == {**before.sources, "beta_w": "a test", "a_d_w": "a test"}
     assert (after.layout, after.alternatives, after.limits) == (before.layout, before.alternatives, before.limits)
     lines = [file.read_text(encoding="utf-8").splitlines() for file in (source, path)]
@@ -92,20 +97,20 @@ def test_without_provenance_there_is_none(vehicle: Vehicle) -> None:
 
 
 def test_interval_encloses_a_rounded_value(vehicle: Vehicle, tmp_path: Path) -> None:
-    rov = vehicle.rov.replaced({"a_d_w": 18.72000049, "b_d_w": 0.63240051})
+    rov = vehicle.replaced({"a_d_w": 18.72000049, "b_d_w": 0.63240051})
     narrow = {"a_d_w": (18.72000048, 18.7200005), "b_d_w": (0.6324005, 0.6324006)}
-    write_vehicle(replace(vehicle, rov=rov, intervals=narrow), tmp_path / "narrow.toml")
+    write_vehicle(replace(rov, intervals=narrow), tmp_path / "narrow.toml")
     read = load_vehicle(tmp_path / "narrow.toml")
     assert set(read.intervals) == set(narrow)
     for name, (low, high) in read.intervals.items():
-        assert low <= read.rov[name] <= high
+        assert low <= read[name] <= high
 
 
 def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path: Path) -> None:
     path = tmp_path / "kept.toml"
     path.write_text("before", encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
-        write_vehicle(replace(vehicle, rov=vehicle.rov.replaced({"m_rov": -1.0})), path)
+        write_vehicle(vehicle.replaced({"m_rov": -1.0}), path)
     assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
@@ -115,7 +120,7 @@ def test_a_doubt_about_what_is_written_names_the_file(tmp_path: Path) -> None:
     path = tmp_path / "light.toml"
     light = load_vehicle(SIX_AXES)
     with pytest.warns(UserWarning, match=rf"^{re.escape(str(path))}: body\.W\.value = 10\.0: "):
-        write_vehicle(replace(light, rov=light.rov.replaced({"W": 10.0})), path)
+        write_vehicle(light.replaced({"W": 10.0}), path)
 
 
 @pytest.mark.parametrize("name", ["nowhere/out.toml", "."])

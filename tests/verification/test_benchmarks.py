@@ -35,9 +35,9 @@ class Small:
     """All methods on a few commands, with and without reversals."""
 
     def __init__(self, vehicle: Vehicle, plain_c: PlainC) -> None:
-        self.work = Work(vehicle.rov, False, 1.0, COMMANDS, COMMANDS)
-        self.ahead = Work(vehicle.rov, True, 1.0, COMMANDS, COMMANDS, ahead=True)
-        self.long = Work(vehicle.rov, False, 100.0, COMMANDS, 4)
+        self.work = Work(vehicle, False, 1.0, COMMANDS, COMMANDS)
+        self.ahead = Work(vehicle, True, 1.0, COMMANDS, COMMANDS, ahead=True)
+        self.long = Work(vehicle, False, 100.0, COMMANDS, 4)
         self.jobs = [
             *(self.ours(method, h) for method in _OURS for h in (0.01, 1.0, 100.0)),
             *(self.explicit(method, steps) for method in (EULER, RK4) for steps in (50, 100)),
@@ -117,7 +117,7 @@ def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
 @pytest.mark.long
 @in_plain_c
 def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, plain_c: PlainC) -> None:
-    runs = in_c(plain_c, Variations(vehicle.rov, 20), 2)
+    runs = in_c(plain_c, Variations(vehicle, 20), 2)
     assert runs.count == 20
     assert 0.0 < runs.rate < inf
     assert 0.0 < runs.error < 1e-11  # at 0 the C would be compared with itself
@@ -147,7 +147,7 @@ def test_cost_at_an_error_lies_between_the_settings() -> None:
 def test_heyoka_solves_the_same_equations(vehicle: Vehicle, plain_c: PlainC) -> None:
     """To rounding, in steps of every length; its cost over ours stands in the last row."""
     pytest.importorskip("heyoka")
-    plan = TaylorPlan(vehicle.rov, COMMANDS, COMMANDS)
+    plan = TaylorPlan(vehicle, COMMANDS, COMMANDS)
     measured = Measured(plain_c, plan.jobs, 2)
     for method in (CORE, HEYOKA):
         for h, job in plan.rows[method].items():
@@ -162,7 +162,7 @@ def test_heyoka_solves_the_same_equations(vehicle: Vehicle, plain_c: PlainC) -> 
 
 def test_without_heyoka_its_row_says_so(vehicle: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(steps, "installed", lambda: False)
-    plan = TaylorPlan(vehicle.rov, COMMANDS, COMMANDS)
+    plan = TaylorPlan(vehicle, COMMANDS, COMMANDS)
     measured = SimpleNamespace(cost=lambda _: 1e-7, error=lambda _: 1e-15)
     *_, last = sections.taylor(plan, cast(Any, measured))
     assert last == [f"heyoka: {taylor.NOT_INSTALLED}"]

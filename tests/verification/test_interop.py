@@ -1,4 +1,4 @@
-"""Independent importers agree with `rov_fmu.model.rov`, and the comparison notices when one does not."""
+"""Independent importers agree with the step in Python, and the comparison notices when one does not."""
 
 import csv
 import re
@@ -88,7 +88,7 @@ def test_a_vehicle_with_every_option_joins_the_importers_that_can_run_it() -> No
         "fmi-sim-cs-fmi3",
     }
     vehicle = load_vehicle(VEHICLES["every_option"])
-    root = etree.fromstring(model_description(vehicle, variables(vehicle.rov), guid="", interfaces=NATIVE[3], fmi=3))
+    root = etree.fromstring(model_description(vehicle, variables(vehicle), guid="", interfaces=NATIVE[3], fmi=3))
     discrete = [v for v in root.iter("Float64") if v.get("variability") == "discrete"]
     assert {v.get("name") for v in discrete} == {*layout.commands, *layout.delayed}
     assert not any(v.get("intermediateUpdate") for v in discrete)

@@ -71,7 +71,7 @@ def _command(quick: bool, picture_file: Path | None) -> None:
 
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
     vehicle = load_vehicle(VIDEORAY)
-    rov, say = vehicle.rov, Console(stderr=True).status
+    rov, say = vehicle, Console(stderr=True).status
     plain_c = PlainC(vehicle, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
     if plain_c:
         with say("steps in plain C"):
@@ -82,7 +82,7 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
                 write_whole(Output(picture_file, picture.cost_error_picture(plan, measured).encode()))
         with say("a vehicle with six axes and lag in plain C"):
             heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
-            heavier = HeavyPlan(heavy.rov, effort.commands, max(4, effort.known // 4))
+            heavier = HeavyPlan(heavy, effort.commands, max(4, effort.known // 4))
             heavy_c = PlainC(heavy, Path(tempfile.mkdtemp(dir=folder)))
             measured_heavy = Measured(heavy_c, heavier.jobs, effort.repetitions)
             yield sections.heavy(heavier, measured_heavy)

@@ -7,7 +7,7 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 from .importer import restart
 from .plain_c import PlainC, Reals
@@ -30,7 +30,7 @@ class Runs:
 class Variations:
     """Runs of 100 s with ten commands of 10 s. Each has its own α and β, within 30 % of the vehicle's."""
 
-    def __init__(self, rov: Rov, count: int) -> None:
+    def __init__(self, rov: Vehicle, count: int) -> None:
         self.rov, layout = rov, rov.layout
         self.parameters = [name for name, declaration in layout.coefficients.items() if declaration.tunable]
         self.values = np.random.default_rng(1).uniform(0.7, 1.3, (count, len(self.parameters)))

@@ -75,7 +75,7 @@ class PlainC:
         self._explicit = load("explicit", 2, *_FASTEST)
         self._measure, self._measure_3 = measure(2), measure(3)
         self._solver = cache(self._new_solver)
-        self._heyoka = cache(lambda: Heyoka(vehicle.rov))
+        self._heyoka = cache(lambda: Heyoka(vehicle))
 
     def _new_solver(self, method: str, tolerance: float) -> tuple[Any, Any]:
         """Return a solver of CVODE with equal relative and absolute tolerances, and its vector.

@@ -7,7 +7,7 @@ from itertools import chain
 
 import numpy as np
 
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 from .plain_c import ADAMS, BDF, CORE, CVODE, EULER, FMU, FMUS, HEYOKA, RK4, PlainC, Reals
 from .taylor import installed
@@ -80,7 +80,7 @@ class Measured:
 class Plan:
     """The jobs of the table and, for the picture, of cost over error of a held command of 1 s."""
 
-    def __init__(self, rov: Rov, commands: int, starts: int) -> None:
+    def __init__(self, rov: Vehicle, commands: int, starts: int) -> None:
         @cache
         def work(straight: bool, long: bool, ahead: bool) -> Work:
             known = 4 if ahead else starts // 4 if long else starts
@@ -109,7 +109,7 @@ class Plan:
 class HeavyPlan:
     """The jobs of a vehicle with six axes and lag: our steps, and RK4 with ever shorter steps."""
 
-    def __init__(self, rov: Rov, commands: int, starts: int) -> None:
+    def __init__(self, rov: Vehicle, commands: int, starts: int) -> None:
         short, long = (Work(rov, False, hold, commands, known) for hold, known in ((1.0, starts), (100.0, starts // 4)))
         works = {h: long if h > 1.0 else short for h in H}
         self.ours = {h: Job(CORE, 1.0, work, h) for h, work in works.items()}
@@ -121,7 +121,7 @@ class HeavyPlan:
 class TaylorPlan:
     """The jobs of the comparison with heyoka, while no velocity reverses."""
 
-    def __init__(self, rov: Rov, commands: int, starts: int) -> None:
+    def __init__(self, rov: Vehicle, commands: int, starts: int) -> None:
         def job(method: str, h: float) -> Job:
             hold, known = (100.0, starts // 4) if h > 1.0 else (1.0, starts)
             setting = max(1.0, round(h / SUBSTEP)) if method == RK4 else 1.0

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.model.equation import ONE, Term, equation_of
 from rov_fmu.model.expression import Expression, compiled
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'
 Reals = NDArray[np.float64]
@@ -32,7 +32,7 @@ def _value(formula: Expression, at: Mapping[str, float]) -> float:
 class Heyoka:
     """The integrator of a vehicle. Its tolerance is the rounding error, heyoka's default."""
 
-    def __init__(self, rov: Rov) -> None:
+    def __init__(self, rov: Vehicle) -> None:
         import heyoka
 
         self._rov, self._equation = rov, equation_of(rov.layout)

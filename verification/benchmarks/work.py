@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references import reference, rigid_vehicle
 
 SEED = 1
 Values = Mapping[str, float]
 
 
-def flight(rov: Rov, commands: Sequence[Values], hold: float) -> list[Values]:
+def flight(rov: Vehicle, commands: Sequence[Values], hold: float) -> list[Values]:
     """Return the state at rest, and after each command, held for so many s."""
     times = hold * np.arange(len(commands) + 1.0)
     inputs = {name: [*(command[name] for command in commands), 0.0] for name in rov.layout.inputs}
@@ -29,7 +29,7 @@ def flight(rov: Rov, commands: Sequence[Values], hold: float) -> list[Values]:
 class Work:
     """Commands of -1 ... 1, each held for `hold` s; the first `starts` of them from known states."""
 
-    rov: Rov
+    rov: Vehicle
     straight: bool
     """The first two commands are the same, so that the heading of the VideoRay stays."""
     hold: float

@@ -1,4 +1,4 @@
-"""Fly a manoeuvre of each vehicle in independent importers, and compare the results with rov_fmu.model.rov."""
+"""Fly a manoeuvre of each vehicle in independent importers, and compare the results with the step in Python."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""The manoeuvres that every importer flies, one for each vehicle, and their reference by `rov_fmu.model.rov`.
+"""The manoeuvres that every importer flies, one for each vehicle, and their reference by the step in Python.
 
 Inputs are held over each communication step. A runner finds the FMU as `rov.fmu`, and beside it:
 
@@ -21,10 +21,9 @@ from itertools import cycle
 from math import isfinite
 from pathlib import Path
 
-from rov_fmu.model.layout import AXES
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.vehicles import EVERY_OPTION
 
 VEHICLES = {**SHIPPED, "every_option": EVERY_OPTION}
@@ -56,9 +55,9 @@ class Manoeuvre:
     """
 
     @cached_property
-    def rov(self) -> Rov:
+    def rov(self) -> Vehicle:
         """The vehicle with its own parameters."""
-        return load_vehicle(VEHICLES[self.vehicle]).rov
+        return load_vehicle(VEHICLES[self.vehicle])
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -99,7 +98,7 @@ class Manoeuvre:
 
     @cached_property
     def reference(self) -> list[dict[str, float]]:
-        """The time and the outputs at each communication point by `rov_fmu.model.rov`."""
+        """The time and the outputs at each communication point by the step in Python."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
         state: Mapping[str, float] = rov.layout.at_rest
         line = rov.delay_line()

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from math import atan, atanh, copysign, cos, exp, expm1, hypot, inf, log, log1p, sin, sqrt
 
 from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 # Below this |q| a fraction in q replaces the hyperbolic and the circular functions, and it needs no branch on the sign.
 # With half the argument it holds up to four times this |q|.
@@ -40,7 +40,7 @@ def axis_of(equation: AxisAlone) -> Axis:
     return Axis(equation.A, equation.B, equation.C, equation.reverse)
 
 
-def axes(rov: Rov, inputs: Mapping[str, float]) -> tuple[Axis, ...]:
+def axes(rov: Vehicle, inputs: Mapping[str, float]) -> tuple[Axis, ...]:
     """Return the motion of every axis of a vehicle without lag and coupling under held inputs."""
     return tuple(map(axis_of, rov.motions(inputs)))
 

@@ -12,7 +12,7 @@ from mpmath import mp
 from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.model.layout import Curve, Thruster, ThrustTable
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # an mpmath number
 PLACES = {"u": 0, "v": 1, "w": 2}
@@ -82,7 +82,7 @@ def _limited(command: Number) -> Number:
     return min(mp.one, max(-mp.one, command))
 
 
-def thrust(rov: Rov, curve: Curve, command: Number, voltage: Number = mp.zero) -> Number:
+def thrust(rov: Vehicle, curve: Curve, command: Number, voltage: Number = mp.zero) -> Number:
     """Return the steady force of a thruster: by its tables or by its coefficients, at the voltage of the battery."""
     by_voltage, voltage = mp.one, max(mp.mpf(voltage), mp.zero)
     if "V_0" in curve.keys:
@@ -113,7 +113,7 @@ def _interpolated(table: ThrustTable, command: Number) -> Number:
     return first * (1 - t) ** 2 + last * t**2
 
 
-def _quadratic(rov: Rov, curve: Curve, command: Number) -> Number:
+def _quadratic(rov: Vehicle, curve: Curve, command: Number) -> Number:
     """Return F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0, -F(-c) with the reverse coefficients."""
     keys, reverse = curve.keys, "_reverse" if command < 0 else ""
 
@@ -128,7 +128,7 @@ def _quadratic(rov: Rov, curve: Curve, command: Number) -> Number:
     return -size if reverse else size
 
 
-def commands(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
+def commands(rov: Vehicle, inputs: Mapping[str, Number]) -> dict[str, Number]:
     """Return the command of every thruster, from -1 to 1."""
     found = {}
     for thruster in rov.layout.thrusters:
@@ -144,14 +144,14 @@ def commands(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
     return found
 
 
-def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
+def steady_forces(rov: Vehicle, inputs: Mapping[str, Number]) -> dict[str, Number]:
     """Return the force of every thruster under the commands after its lag has died out."""
     of_thruster = rov.layout.curve_of
     voltage = inputs.get("voltage", mp.zero)
     return {name: thrust(rov, of_thruster[name], command, voltage) for name, command in commands(rov, inputs).items()}
 
 
-def effect(rov: Rov, thruster: Thruster, velocity: str) -> Number:
+def effect(rov: Vehicle, thruster: Thruster, velocity: str) -> Number:
     """Return the force along an axis, or the yaw torque, by 1 N of a thruster.
 
     The torque is x Y - y X for a thruster with a position, and R sin γ for one with an arm (4).
@@ -166,7 +166,7 @@ def effect(rov: Rov, thruster: Thruster, velocity: str) -> Number:
     return thruster.arm * mp.mpf(rov.coefficients["R"]) * mp.sin(mp.mpf(rov.coefficients["gamma"]))
 
 
-def equations(rov: Rov, inputs: Mapping[str, Number]) -> Equations:
+def equations(rov: Vehicle, inputs: Mapping[str, Number]) -> Equations:
     """Return the equations of a vehicle with these inputs, in the current precision of mpmath."""
     k = {name: mp.mpf(value) for name, value in rov.coefficients.items()}
     F = steady_forces(rov, inputs)
@@ -193,9 +193,9 @@ def equations(rov: Rov, inputs: Mapping[str, Number]) -> Equations:
     return Equations(axes, lags, inertias, rov.layout.coupled)
 
 
-def calculated(rov: Rov, values: Mapping[str, Number]) -> dict[str, Number]:
+def calculated(rov: Vehicle, values: Mapping[str, Number]) -> dict[str, Number]:
     """Return every output and every derivative, for values of all inputs, states and coefficients."""
-    k = Rov(rov.layout, {name: values[name] for name in rov.coefficients})
+    k = Vehicle(rov.layout, {name: values[name] for name in rov.coefficients})
     rates = equations(k, values).rates({name: mp.mpf(values[name]) for name in rov.layout.state}, values)
     forces = steady_forces(k, values) | {n.removeprefix("F_"): mp.mpf(values[n]) for n in rov.layout.lagging}
     found = {name: mp.mpf(values[name]) for name in rov.layout.state} | {f"F_{n}": F for n, F in forces.items()}

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rov_fmu.model.layout import AXES, Layout, Thruster
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES
+from rov_fmu.model.layout import Layout, Thruster
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -83,7 +84,11 @@ NOTHING = Conditions()
 
 
 def swim(
-    k: Rov, time: Array, thrusters: Mapping[str, Array], delay: float = 0.0, current: tuple[float, float] = (0.0, 0.0)
+    k: Vehicle,
+    time: Array,
+    thrusters: Mapping[str, Array],
+    delay: float = 0.0,
+    current: tuple[float, float] = (0.0, 0.0),
 ) -> dict[str, Array]:
     """Return the motion of a vehicle whose commands switch at samples: `thrusters` has a command for each time."""
     changed = [np.diff(values) != 0.0 for values in thrusters.values()]
@@ -92,7 +97,7 @@ def swim(
     return motion(k, commands, time, Conditions(delay, current))
 
 
-def motion(k: Rov, commands: Commands, time: Array, conditions: Conditions = NOTHING) -> dict[str, Array]:
+def motion(k: Vehicle, commands: Commands, time: Array, conditions: Conditions = NOTHING) -> dict[str, Array]:
     """Return the velocities of the vehicle's axes and x, y, z, psi at ascending times (s), in SI units.
 
     The vehicle starts from rest at the first time or the first switch, whichever is earlier, with a heading of north.
@@ -148,7 +153,7 @@ def _holds(
 class _Vehicle:
     """The numbers of a vehicle, axis by axis and thruster by thruster."""
 
-    k: Rov
+    k: Vehicle
     conditions: Conditions
     axes: tuple[str, ...]
     """The symbols of the axes' velocities."""
@@ -169,7 +174,7 @@ class _Vehicle:
         return len(self.axes) + 4 + len(self.lags)
 
     @classmethod
-    def of(cls, k: Rov, conditions: Conditions) -> "_Vehicle":
+    def of(cls, k: Vehicle, conditions: Conditions) -> "_Vehicle":
         """Return the numbers of a vehicle."""
         get, names = k.coefficients.get, [axis.velocity for axis in AXES.values() if k.layout.has(axis)]
         bodies = [k["I_r" if v == "r" else "m_rov"] + get(f"m_a_{v}", 0.0) for v in names]
@@ -249,7 +254,7 @@ def _rotation(phi: float, theta: float, psi: float) -> tuple[Vector, Vector, Vec
     )
 
 
-def _arm(k: Rov, thruster: Thruster, velocity: str) -> float:
+def _arm(k: Vehicle, thruster: Thruster, velocity: str) -> float:
     """Return the force along an axis, or the yaw torque, by 1 N of a thruster."""
     if velocity in _ALONG:
         return thruster.direction[_ALONG[velocity]]
@@ -259,7 +264,7 @@ def _arm(k: Rov, thruster: Thruster, velocity: str) -> float:
     return x * thruster.direction[1] - y * thruster.direction[0]
 
 
-def _force(k: Rov, thruster: Thruster, command: float) -> float:
+def _force(k: Vehicle, thruster: Thruster, command: float) -> float:
     """Return the steady thrust (N) of one thruster.
 
     The curve a_t (c - c_0)^2 + b_t (c - c_0) is that of all its thrusters together.

@@ -15,7 +15,7 @@ from typing import Any
 from mpmath import mp
 from mpmath.calculus.quadrature import GaussLegendre
 
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 from .equations import Axis, Equations, equations
 from .extrapolation import integrate
@@ -222,7 +222,7 @@ class Step:
     """The largest velocity, the length of the path, or the angle turned back and forth."""
 
 
-def step(rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> Step:
+def step(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> Step:
     """Return the state of the vehicle after h seconds with the inputs held."""
     with mp.workdps(4 * DIGITS):
         equation = equations(rov, inputs)

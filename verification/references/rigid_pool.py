@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import pool, rigid_body, rigid_vehicle
 from .pool import NOTHING, Array, Commands, Conditions
@@ -17,7 +17,7 @@ _FINEST = 0.1
 """The longest time between two headings that are taken as less than half a turn apart, s."""
 
 
-def motion(k: Rov, commands: Commands, time: Array, conditions: Conditions = NOTHING) -> dict[str, Array]:
+def motion(k: Vehicle, commands: Commands, time: Array, conditions: Conditions = NOTHING) -> dict[str, Array]:
     """Return u, v, w, p, q, r through the water, x, y, z, phi, theta and psi at ascending times (s), in SI units.
 
     The vehicle starts upright and at rest, with a heading of north. The heading does not wrap.
@@ -42,7 +42,7 @@ def motion(k: Rov, commands: Commands, time: Array, conditions: Conditions = NOT
     return {name: values[asked] for name, values in found.items()}
 
 
-def _rates(k: Rov, command: Array, conditions: Conditions) -> pool.Rates:
+def _rates(k: Vehicle, command: Array, conditions: Conditions) -> pool.Rates:
     inputs = {f"u_{t.name}": c for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)}
     held = rigid_vehicle.body(k, inputs | dict(zip(("V_N", "V_E"), conditions.current, strict=True)))
     held = replace(held, propellers=[replace(p, target=float(p.target)) for p in held.propellers])

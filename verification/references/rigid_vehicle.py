@@ -9,8 +9,8 @@ import gmpy2
 from gmpy2 import mpfr
 from mpmath import mp
 
-from rov_fmu.model.layout import cross_name
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import cross_name
+from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import equations, rigid_body
 from .equations import commands, steady_forces
@@ -34,7 +34,7 @@ LOADS = ("X_ext", "Y_ext", "Z_ext", "K_ext", "M_ext", "N_ext")
 _TOLERANCE = 1e-22  # of a step of the extrapolation
 
 
-def body(rov: Rov, inputs: Values, number: Callable[[Number], Number] = float) -> Body:
+def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = float) -> Body:
     """Return a vehicle under held inputs as a rigid body. `number` converts numbers of mpmath to those of the body."""
     layout = rov.layout
     held = {name: number(mp.mpf(value)) for name, value in {**rov.coefficients, **inputs}.items()}
@@ -89,7 +89,7 @@ def body(rov: Rov, inputs: Values, number: Callable[[Number], Number] = float) -
     )
 
 
-def _propellers(rov: Rov, inputs: Values, number: Callable[[Number], Number]) -> list[Propeller]:
+def _propellers(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> list[Propeller]:
     forces, found = steady_forces(rov, inputs), []
     for name, command in commands(rov, inputs).items():
         curve = rov.layout.curve_of[name]
@@ -106,7 +106,7 @@ def _propellers(rov: Rov, inputs: Values, number: Callable[[Number], Number]) ->
     return found
 
 
-def _fins(rov: Rov, inputs: Values, number: Callable[[Number], Number]) -> dict[tuple[str, str], Number]:
+def _fins(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> dict[tuple[str, str], Number]:
     """Return the forces of the fins along each axis as factors of |u| u, at the angles for the commands."""
     found: dict[tuple[str, str], Number] = {}
     for fin in rov.layout.fins:
@@ -121,7 +121,7 @@ def _fins(rov: Rov, inputs: Values, number: Callable[[Number], Number]) -> dict[
     return found
 
 
-def places(rov: Rov, state: Values) -> list[Number]:
+def places(rov: Vehicle, state: Values) -> list[Number]:
     """Return the state of the rigid body for a vehicle's state.
 
     Without a quaternion, the attitude is that of the Euler angles at the start, or of the heading.
@@ -132,26 +132,26 @@ def places(rov: Rov, state: Values) -> list[Number]:
     return [*(state.get(v, 0.0) for v in VELOCITIES), *quaternion, *pose, *(state[F] for F in rov.layout.lagging)]
 
 
-def compared(rov: Rov, y: Sequence[Number]) -> list[Number]:
+def compared(rov: Vehicle, y: Sequence[Number]) -> list[Number]:
     """Return what two states of a rigid body are compared by: the quaternion as a rotation, only the axes there are."""
     pose = [x for name, x in zip("xyz", y[10:13], strict=True) if name in rov.layout.pose]
     attitude = [x for row in rotation(y[6:10]) for x in row]
     return [*(y[VELOCITIES.index(v)] for v in rov.layout.velocities), *attitude, *pose, *y[13:]]
 
 
-def integrate(rov: Rov, inputs: Values, y: Sequence[Number], h: float) -> Floats:
+def integrate(rov: Vehicle, inputs: Values, y: Sequence[Number], h: float) -> Floats:
     """Return the state of the rigid body after h seconds, to some 13 digits."""
     return rigid_body.integrate(body(rov, inputs), list(map(float, y)), h)
 
 
-def end(rov: Rov, inputs: Values, state: Values, h: float) -> list[Number]:
+def end(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
     """Return the vehicle's states after h seconds, to some 13 digits."""
     y = integrate(rov, inputs, places(rov, state), h).tolist()
     by_name = dict(zip((*VELOCITIES, *QUATERNION, *"xyz", *rov.layout.lagging), y, strict=True))
     return [by_name[name] for name in rov.layout.state]
 
 
-def step(rov: Rov, inputs: Values, state: Values, h: float) -> list[Number]:
+def step(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
     """Return the state of the rigid body after h seconds, to some 20 digits."""
     with mp.workdps(70), gmpy2.context(gmpy2.get_context(), precision=BITS):
         inverse = [[real(x) for x in row] for row in body(rov, inputs, mp.mpf).inverse]
@@ -172,7 +172,7 @@ def step(rov: Rov, inputs: Values, state: Values, h: float) -> list[Number]:
         return [plain(x) for x in y]
 
 
-def calculated(rov: Rov, values: Values, number: Callable[[Number], Number] = mp.mpf) -> dict[str, Number]:
+def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] = mp.mpf) -> dict[str, Number]:
     """Return every output and every derivative of a vehicle, for values of all inputs, states and parameters.
 
     The attitude may be given as in `places`. The heading of a vehicle that rolls lies between -pi and pi. `number` may
@@ -181,7 +181,7 @@ def calculated(rov: Rov, values: Values, number: Callable[[Number], Number] = mp
     layout = rov.layout
     if not layout.has_attitude:
         return equations.calculated(rov, values)
-    k = Rov(layout, {name: values[name] for name in rov.coefficients})
+    k = Vehicle(layout, {name: values[name] for name in rov.coefficients})
     of_vehicle = body(k, {name: values[name] for name in layout.inputs}, number)
     y = [number(x) for x in places(k, values)]
     rates = rigid_body.rates(of_vehicle, of_vehicle.inverse, y)

@@ -15,9 +15,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.layout import REVERSE, Axis, Curve, Layout, delayed_name
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import REVERSE, Axis, delayed_name
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
 
 KNOTS = (0.1, 0.25, 0.45, 0.7)
 """The commands at which eta is a parameter."""
@@ -81,20 +82,20 @@ class Shapes:
             found[:, place] = self.commands(curve.name, inputs[:, place])
         return found
 
-    def force(self, rov: Rov, curve: Curve, command: float) -> float:
+    def force(self, vehicle: Vehicle, curve: Curve, command: float) -> float:
         """Return the steady thrust of all thrusters that a curve describes together, N."""
         (acting,) = self.commands(curve.name, np.array([command])).tolist()
-        return curve.together * rov.curve_force(curve, acting)
+        return curve.together * vehicle.curve_force(curve, acting)
 
-    def motion(self, rov: Rov, axis: Axis, command: float) -> AxisAlone:
+    def motion(self, vehicle: Vehicle, axis: Axis, command: float) -> AxisAlone:
         """Return the equation of an axis alone under a held command, once the thrust is steady."""
-        layout = rov.layout
+        layout = vehicle.layout
         inputs = dict(layout.usual_inputs)
         for name, value in layout.driving(axis, command).items():
             curve = layout.curve_of.get(name.removeprefix("u_"))
             acting = self.commands(curve.name, np.array([value])) if curve else [value]
             inputs[name] = inputs[delayed_name(name)] = float(acting[0])
-        return rov.alone(axis, inputs)
+        return vehicle.alone(axis, inputs)
 
 
 NO_SHAPES = Shapes({})

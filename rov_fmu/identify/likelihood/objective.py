@@ -26,9 +26,10 @@ from rov_fmu.engine.simulation import usable_cores
 from rov_fmu.identify.likelihood.curves import Shapes
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.model.layout import Axis, Curve, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
@@ -59,11 +60,11 @@ class TableRow:
         curves = {thruster.curve for thruster in layout.drivers(self.subject)}
         return parameter.of in {"", self.subject.name, *curves}
 
-    def model(self, rov: Rov, shapes: Shapes) -> float:
+    def model(self, vehicle: Vehicle, shapes: Shapes) -> float:
         """Return the value by the model, in the unit of the row."""
         if isinstance(self.subject, Curve):
-            return shapes.force(rov, self.subject, self.command)
-        motion = shapes.motion(rov, self.subject, self.command)
+            return shapes.force(vehicle, self.subject, self.command)
+        motion = shapes.motion(vehicle, self.subject, self.command)
         return motion.steady_velocity() if self.quantity == "V_ss" else motion.time_constant()
 
 
@@ -115,16 +116,19 @@ class Objective:
         self.table, self.logs, self.rows = table, logs, rows
         self.records = [one.thinned if thinned else one.record for one in logs]
         steps = _QUICK_STEPS if thinned else {}
-        self.filters = [Filter(one.rov(table.base), **steps) for one in logs]
+        self.filters = [Filter(one.vehicle(table.base), **steps) for one in logs]
         p = table.parameters
         self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
         self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
 
     # ---- One log ----
 
-    def run(self, z: Array, number: int, **how: object) -> Run:
-        """Run the filter through a log. The options are those of `Filter.run`. Raises DivergedError."""
-        parameters = self.table.of_log(z.tolist(), self.logs[number])
+    def run(self, z: Array, number: int, *, table: Table | None = None, **how: object) -> Run:
+        """Run the filter through a log, if given with the coefficients of another table.
+
+        The other options are those of `Filter.run`. Raises DivergedError.
+        """
+        parameters = (table or self.table).of_log(z.tolist(), self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
 
     def concerns(self, parameter: Parameter, number: int) -> bool:
@@ -152,9 +156,9 @@ class Objective:
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
         """Return the innovations of all or some rows of tables and their variances."""
         rows = self.rows if rows is None else rows
-        rov = Rov(self.table.layout, self.table.coefficients(z.tolist()))
+        vehicle = Vehicle(self.table.layout, self.table.coefficients(z.tolist()))
         shapes = self.table.shapes(z.tolist())
-        off = np.array([row.measured - row.model(rov, shapes) for row in rows])
+        off = np.array([row.measured - row.model(vehicle, shapes) for row in rows])
         noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
         return off, noise**2
 

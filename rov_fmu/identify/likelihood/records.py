@@ -12,12 +12,13 @@ import numpy as np
 
 from rov_fmu.engine.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.io.messages import MOST, first_of
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 from rov_fmu.tank.quality import gaps, unwrapped
+from rov_fmu.vehicle.vehicle import Vehicle
 
 FASTEST = 20.0
 """Samples per second and sensor that are kept; faster ones are averaged in groups."""
@@ -69,15 +70,15 @@ class SampledLog:
             s.is_velocity and s.over_ground and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors
         )
 
-    def rov(self, coefficients: Mapping[str, float]) -> Rov:
+    def vehicle(self, coefficients: Mapping[str, float]) -> Vehicle:
         """Return the part of a vehicle that the log concerns."""
-        return Rov(self.layout, {name: coefficients[name] for name in self.layout.coefficients})
+        return Vehicle(self.layout, {name: coefficients[name] for name in self.layout.coefficients})
 
     def thrust(self, coefficients: Mapping[str, float], axis: Axis, rows: Array) -> Array:
         """Return the steady thrust of a vehicle along an axis for some rows of inputs, N or N m."""
-        rov, names, usual = self.rov(coefficients), [*self.layout.inputs], self.layout.usual_inputs
-        forces = (rov.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
-        return np.array([rov.along(axis, F) for F in forces])
+        vehicle, names, usual = self.vehicle(coefficients), [*self.layout.inputs], self.layout.usual_inputs
+        forces = (vehicle.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
+        return np.array([vehicle.along(axis, F) for F in forces])
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

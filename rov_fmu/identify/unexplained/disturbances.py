@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum
 from rov_fmu.identify.result import Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.tank.arrays import Array
 
 _LITTLE = 0.05

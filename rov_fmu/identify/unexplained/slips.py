@@ -26,7 +26,7 @@ from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
-from rov_fmu.model.layout import REVERSE
+from rov_fmu.model.catalogue import REVERSE
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 

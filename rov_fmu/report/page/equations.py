@@ -10,6 +10,7 @@ from itertools import groupby
 
 from markupsafe import escape
 
+from rov_fmu.model.catalogue import REVERSE, YAW
 from rov_fmu.model.equation import ONE, Equation, equation_of, mass_matrix
 from rov_fmu.model.expression import (
     FUNCTIONS,
@@ -27,14 +28,7 @@ from rov_fmu.model.expression import (
     written,
 )
 from rov_fmu.model.forces import COUPLING, forces_of
-from rov_fmu.model.layout import (
-    REVERSE,
-    YAW,
-    Curve,
-    Layout,
-    Thruster,
-    VehicleAxis,
-)
+from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.thrust import by_direction, steady_name
 from rov_fmu.report.templates import RAISED, number
 

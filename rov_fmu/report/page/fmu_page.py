@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
-from itertools import chain, groupby
+from itertools import groupby
 from math import isclose, isfinite
 from typing import Any
 
@@ -15,12 +15,11 @@ from matplotlib.axes import Axes
 from rov_fmu.engine.compile import INTERFACES
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import REPORT
+from rov_fmu.fmu.card import card, card_text, reversing
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
-from rov_fmu.model.forces import EXPECTED, effects_of
-from rov_fmu.model.layout import ARM, Axis, Layout
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import ARM, Axis
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
 from rov_fmu.report.page.pictures import pictures
@@ -34,13 +33,11 @@ from rov_fmu.report.plots.steps import (
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.report.plots.svg import LIGHT, image, inline_svg, with_formulas
+from rov_fmu.report.plots.svg import LIGHT, image, inline_svg
 from rov_fmu.report.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
-_AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
-"""The order in which the page names the missing axes."""
 _PANEL = (3.7, 2.9)  # inches
 _PICTURES = {
     "from_above.svg": "The vehicle from above: x forward, y to starboard",
@@ -56,7 +53,11 @@ def documentation(
 ) -> dict[str, bytes]:
     """Return the page and the pictures by their path in the FMU. Raises FileError."""
     text = documentation_page(vehicle, native=native, fmi=fmi, interface=interface, module=module)
-    return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
+    return {
+        "documentation/index.html": text.encode(),
+        "documentation/model_card.txt": card_text(vehicle).encode(),
+        **pictures(vehicle),
+    }
 
 
 def documentation_page(
@@ -68,7 +69,7 @@ def documentation_page(
     model as WebAssembly; without it the page has no live section. The page of a vehicle without a data folder has no
     tables and no measurements. Raises FileError.
     """
-    rov, layout = vehicle.rov, vehicle.layout
+    layout = vehicle.layout
     tables = tables_by_axis(vehicle)
     held = held_commands(vehicle, tables.values())
     axes = [form.axis for form in layout.axes]
@@ -81,41 +82,40 @@ def documentation_page(
         "index.html.j2",
         vehicle=vehicle,
         layout=layout,
-        is_tuned=_is_tuned(rov),
+        is_tuned=_is_tuned(vehicle),
         native=native,
         fmi=fmi,
         kinds=INTERFACES[interface if native else "cs"],
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
-        groups=[list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))],
-        reversing=_reversing,
-        settable=[v.name for v in variables(rov) if v.name in layout.state and v.initial == "exact"]
+        groups=[
+            list(group) for _, group in groupby(variables(vehicle), lambda v: (v.causality, v.variability, v.initial))
+        ],
+        reversing=reversing,
+        settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
-        other_axes=listed(name for name in _AXES if name not in layout.kinds).capitalize(),
+        card=card(vehicle),
         coupled=listed(equations.coupled(layout)),
         has_full_mass=any(line.coupled for line in shown.motion),
         equations=shown,
         mathml=equations.MathML(layout),
         choices=equations.choices,
-        mirrored=_mirrored(layout),
-        has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
-        missing=[effect.missed for effect in EXPECTED if effect not in effects_of(layout)],
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
-        arm=[rov[name] for name in ARM] if layout.has_arm else None,
+        arm=[vehicle[name] for name in ARM] if layout.has_arm else None,
         live=live([Flown(vehicle, module)]) if module else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
         first=first,
-        moved=float(simulate(rov, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
-        moves_at_rest=any(rov.derivatives(rest, rest).values()),
+        moved=float(simulate(vehicle, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
+        moves_at_rest=any(vehicle.derivatives(rest, rest).values()),
         held=held,
-        motions=[motion for axis in axes if layout.signs(axis) for motion in _motions(rov, axis, held)],
+        motions=[motion for axis in axes if layout.signs(axis) for motion in _motions(vehicle, axis, held)],
         frames=[image(label, path) for label, path in own],
         thrusters=[
-            _plot(f"Thrusters {view}", partial(draw_thrusters, rov=rov, scene=scene), scene.inches)
-            for view, scene in scenes(rov).items()
+            _plot(f"Thrusters {view}", partial(draw_thrusters, vehicle=vehicle, scene=scene), scene.inches)
+            for view, scene in scenes(vehicle).items()
         ],
-        curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, rov=rov, curve=c)) for c in layout.curves],
+        curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, vehicle=vehicle, curve=c)) for c in layout.curves],
         steady=[
             _plot(
                 f"V_ss over the command: {a.name}",
@@ -126,7 +126,7 @@ def documentation_page(
         steps=[
             _plot(
                 f"Step responses: {a.name}",
-                partial(plot_steps, rov=rov, axis=a, commands=held, table=tables.get(a.name)),
+                partial(plot_steps, vehicle=vehicle, axis=a, commands=held, table=tables.get(a.name)),
             )
             for a in axes
         ],
@@ -148,31 +148,31 @@ class Motion:
     """The other axes that the last command pushes too, and the force or torque along them."""
 
 
-def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
+def _motions(vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
     """Yield the motion along an axis, for each direction if they differ. The commands are in percent."""
     directions = [(1.0, "")]
-    if differs_by_direction(rov, axis):
+    if differs_by_direction(vehicle, axis):
         directions = [(1.0, f" {axis.positive}"), (-1.0, f" {axis.negative}")]
     for sign, words in directions:
-        signs = {name: sign * one for name, one in rov.layout.signs(axis).items()}
+        signs = {name: sign * one for name, one in vehicle.layout.signs(axis).items()}
         fractions = [sign * float(c) / 100.0 for c in commands]
-        responses = [rov.response(axis, fraction) for fraction in fractions]
-        yield Motion(axis, words, signs, responses, list(_side_effects(rov, axis, fractions[-1])))
+        responses = [vehicle.response(axis, fraction) for fraction in fractions]
+        yield Motion(axis, words, signs, responses, list(_side_effects(vehicle, axis, fractions[-1])))
 
 
-def _side_effects(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
+def _side_effects(vehicle: Vehicle, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
     """Yield the other axes that a command of an axis pushes, for example because thrust in reverse is weaker."""
-    F = rov.commanded(rov.held_inputs(axis, command))
-    for other in (form.axis for form in rov.layout.axes if form.axis is not axis):
-        pushes = [rov.effect(t, other) * F[t.name] for t in rov.layout.drivers(other)]
+    F = vehicle.commanded(vehicle.held_inputs(axis, command))
+    for other in (form.axis for form in vehicle.layout.axes if form.axis is not axis):
+        pushes = [vehicle.effect(t, other) * F[t.name] for t in vehicle.layout.drivers(other)]
         if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
             yield other, sum(pushes)
 
 
-def differs_by_direction(rov: Rov, axis: Axis) -> bool:
+def differs_by_direction(vehicle: Vehicle, axis: Axis) -> bool:
     """Return True if the motion under a negative command is not the mirror image of that under a positive one."""
     for c in (0.1, 0.3, 0.6, 1.0):
-        (V, Tau), (back, Tau_back) = rov.response(axis, c), rov.response(axis, -c)
+        (V, Tau), (back, Tau_back) = vehicle.response(axis, c), vehicle.response(axis, -c)
         if not (isclose(V, -back, rel_tol=1e-9) and isclose(Tau, Tau_back, rel_tol=1e-9)):
             return True
     return False
@@ -206,33 +206,9 @@ def _is_cut_off(cell: Cell) -> bool:
     return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed
 
 
-def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Return the thrust curves that push backward at small commands, and the command at which they change sign."""
-    found = []
-    for curve in layout.curves:
-        for end, words in (("", ""), ("_reverse", " in reverse")):
-            a, b = (values.get(curve.coefficient(key + end), 0.0) for key in ("a_t", "b_t"))
-            if b < 0.0 < a and f"a_t{end}" in curve.keys:
-                dead = values.get(curve.coefficient("c_0" + end), 0.0) if "c_0" in curve.keys else 0.0
-                found.append((f"{curve.name} thrust{words}", dead - b / a))
-    return found
-
-
-def _mirrored(layout: Layout) -> str:
-    """Return, in words, which thrust curves and axes behave in reverse as forward."""
-    curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
-    axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
-    found = []
-    if curves:
-        found.append("thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}")
-    if axes:
-        found.append("drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}")
-    return " and ".join(found)
-
-
-def _is_tuned(rov: Rov) -> bool:
+def _is_tuned(vehicle: Vehicle) -> bool:
     """Return True unless each alpha and beta is 1."""
-    return any(rov[name] != 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable)
+    return any(vehicle[name] != 1.0 for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------------------------
@@ -240,15 +216,15 @@ def _is_tuned(rov: Rov) -> bool:
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
     """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
-    rov, (low, high) = vehicle.rov, (100.0 * end for end in vehicle.command_range)
-    least = -100 if differs_by_direction(rov, axis) else 0
+    low, high = (100.0 * end for end in vehicle.command_range)
+    least = -100 if differs_by_direction(vehicle, axis) else 0
     ax.axvspan(low, high, label="range of the model", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     if least:
         ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     commands = range(least, 101, 2)
-    models = [("tuned α and β", rov, "blue", "-")]
-    if _is_tuned(rov):
-        models.insert(0, ("α = β = 1", untuned(rov), "grey", "--"))
+    models = [("tuned α and β", vehicle, "blue", "-")]
+    if _is_tuned(vehicle):
+        models.insert(0, ("α = β = 1", untuned(vehicle), "grey", "--"))
     for label, model, color, dashes in models:
         V_ss = [model.response(axis, c / 100.0)[0] for c in commands]
         name = label if len(models) > 1 else None
@@ -256,17 +232,19 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     if table and table.steady:
         points = [(float(c), float(V)) for c, V in table.steady.items()]
         ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
-    finish(ax, rf"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", "command (%)")
+    finish(ax, f"{axis.name.capitalize()}: steady velocity ({axis.unit})", "command (%)")
     ax.set_xlim(least, 100)
 
 
-def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
+def plot_steps(
+    ax: Axes, vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None
+) -> None:
     """Plot the velocity after steps of the command from rest, with the measured V_ss and Tau."""
     steps = [measured_step(table, c) for c in commands]
-    if differs_by_direction(rov, axis):
+    if differs_by_direction(vehicle, axis):
         steps += [Step(-step.command) for step in steps]
-    draw_steps(ax, axis, steps, [(rov, "-")])
-    with_formulas(ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left"))
+    draw_steps(ax, axis, steps, [(vehicle, "-")])
+    ax.set_title(f"{axis.name.capitalize()}: velocity ({axis.unit})", loc="left")
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:

@@ -1,9 +1,7 @@
 """The live section of a page: the model as WebAssembly, the data of the vehicle, and the scripts that fly it."""
 
 import base64
-import hashlib
 import json
-import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +13,11 @@ from markupsafe import Markup
 
 from rov_fmu.engine.compile import MODULE_SOURCES
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import Axis, Layout, Thruster
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Layout, Thruster
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
-from rov_fmu.report.templates import number, page, pretty_unit
+from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
 from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, Entry, LogColumn, columns_of_log
 from rov_fmu.tank.readers.tables import rules_of_page
@@ -31,8 +29,6 @@ _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
 _SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
-# The comments, types and indents are for readers of the source. They are a third of it, and are left out of the page.
-_FOR_READERS = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ |^ +|^\n")
 
 
 @dataclass(frozen=True)
@@ -78,20 +74,19 @@ def live(flown: Sequence[Flown]) -> Live:
     pilot = flown[0].vehicle
     data = [_data(one) for one in flown]
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    script = _FOR_READERS.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    script = inline_script(*_SCRIPTS, folder=MODULE_SOURCES)
     tests, start = data[0]["tests"], dict(data[0]["variables"])
     names = _names(flown)
     return Live(
         data=Markup(text),
-        script=Markup(script),
-        policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
+        script=script.text,
+        policy=f"{script.policy} 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
         keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
-        places=_places(pilot.rov),
+        places=_places(pilot),
         start=start,
-        loads=list(_loads(pilot.rov, start)),
-        tunable=list(_tunable(pilot.rov)),
+        loads=list(_loads(pilot, start)),
+        tunable=list(_tunable(pilot)),
         title=" beside ".join(names),
         other=names[1] if len(flown) > 1 else None,
     )
@@ -117,26 +112,27 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False) -> str:
 
 def _data(flown: Flown) -> dict[str, Any]:
     """Return the data of a vehicle for the scripts."""
-    vehicle, rov, layout = flown.vehicle, flown.vehicle.rov, flown.vehicle.layout
+    vehicle, layout = flown.vehicle, flown.vehicle.layout
     return {
         "identifier": vehicle.identifier,
         "name": vehicle.name,
         "module": base64.b64encode(zlib.compress(flown.module, 9)).decode(),
-        "variables": [(v.name, 0.0 if v.name in layout.commands else v.start or 0.0) for v in variables(rov)],
+        "variables": [(v.name, 0.0 if v.name in layout.commands else v.start or 0.0) for v in variables(vehicle)],
         "pulse": layout.pulse,
         "inputs": len(layout.inputs),
         "states": len(layout.state),
         "commands": list(layout.commands),
         "columns": list(_columns(layout)),
         "csv": rules_of_page(),
-        "axes": [_axis(rov, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
+        "axes": [_axis(vehicle, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
         "thrusters": [
-            _thruster(rov, thruster, label) for thruster, label in zip(layout.thrusters, _labels(rov), strict=True)
+            _thruster(vehicle, thruster, label)
+            for thruster, label in zip(layout.thrusters, _labels(vehicle), strict=True)
         ],
         "fins": [{"at": fin.position, "along": fin.direction} for fin in layout.fins],
         "tunable": [name for name, declaration in layout.coefficients.items() if declaration.tunable],
         "tests": list(_tests(vehicle)),
-        "size": size_of(rov),
+        "size": size_of(vehicle),
     }
 
 
@@ -168,7 +164,7 @@ def _keys(layout: Layout) -> list[str]:
     return [_KEYS[form.axis.name] if form.axis.name in _KEYS else next(spare) for form in layout.axes]
 
 
-def _axis(rov: Rov, axis: Axis, keys: str) -> dict[str, Any]:
+def _axis(vehicle: Vehicle, axis: Axis, keys: str) -> dict[str, Any]:
     position = {"heave": "z", "roll": "phi", "pitch": "theta", "yaw": "psi"}.get(axis.name)
     return {
         "name": axis.name,
@@ -178,24 +174,24 @@ def _axis(rov: Rov, axis: Axis, keys: str) -> dict[str, Any]:
         "position": position,
         "positionUnit": axis.position_unit,
         "quantities": as_json(axis),
-        "signs": rov.layout.signs(axis),
-        "shares": _shares(rov, axis),
+        "signs": vehicle.layout.signs(axis),
+        "shares": _shares(vehicle, axis),
         "keys": keys,
     }
 
 
-def _shares(rov: Rov, axis: Axis) -> dict[str, float]:
+def _shares(vehicle: Vehicle, axis: Axis) -> dict[str, float]:
     """Return the commands by which a key drives an axis, the largest of them ±1.
 
     Those of a vehicle that rolls or pitches leave the other axes at rest, as far as thrust is linear in the commands.
     """
-    layout = rov.layout
+    layout = vehicle.layout
     if not layout.has_attitude:
         return layout.signs(axis)
     axes = [form.axis for form in layout.axes]
     effects = [
         [
-            sum(rov.effect(t, one) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
+            sum(vehicle.effect(t, one) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
             for name in layout.commands
         ]
         for one in axes
@@ -206,37 +202,37 @@ def _shares(rov: Rov, axis: Axis) -> dict[str, float]:
     return {name: share for name, share in found.items() if share}
 
 
-def _thruster(rov: Rov, thruster: Thruster, label: str) -> dict[str, Any]:
-    curve = rov.layout.curve_of[thruster.name]
-    most = max(abs(rov.curve_force(curve, command)) for command in (1.0, -1.0))
+def _thruster(vehicle: Vehicle, thruster: Thruster, label: str) -> dict[str, Any]:
+    curve = vehicle.layout.curve_of[thruster.name]
+    most = max(abs(vehicle.curve_force(curve, command)) for command in (1.0, -1.0))
     return {
         "force": f"F_{thruster.name}",
         "label": label,
-        "at": place(rov, thruster),
+        "at": place(vehicle, thruster),
         "along": thruster.direction,
         "most": most or 1.0,
     }
 
 
-def _places(rov: Rov) -> dict[str, str]:
+def _places(vehicle: Vehicle) -> dict[str, str]:
     """Return the label of the thruster for each command that drives only one."""
-    if rov.layout.mix:
+    if vehicle.layout.mix:
         return {}
-    return {f"u_{one.name}": label for one, label in zip(rov.layout.thrusters, _labels(rov), strict=True)}
+    return {f"u_{one.name}": label for one, label in zip(vehicle.layout.thrusters, _labels(vehicle), strict=True)}
 
 
-def _labels(rov: Rov) -> list[str]:
+def _labels(vehicle: Vehicle) -> list[str]:
     """Return where each thruster is ("left rear"). Thrusters at the same place also have their names."""
-    found = [_label(rov, thruster) for thruster in rov.layout.thrusters]
+    found = [_label(vehicle, thruster) for thruster in vehicle.layout.thrusters]
     return [
         label if found.count(label) == 1 else f"{thruster.name} {label}".rstrip()
-        for label, thruster in zip(found, rov.layout.thrusters, strict=True)
+        for label, thruster in zip(found, vehicle.layout.thrusters, strict=True)
     ]
 
 
-def _label(rov: Rov, thruster: Thruster) -> str:
-    x, y, _ = place(rov, thruster)
-    least = 0.2 * size_of(rov)
+def _label(vehicle: Vehicle, thruster: Thruster) -> str:
+    x, y, _ = place(vehicle, thruster)
+    least = 0.2 * size_of(vehicle)
     words = [
         "left" if y < -least else "right" if y > least else "",
         "rear" if x < -least else "front" if x > least else "",
@@ -256,22 +252,22 @@ def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
             yield {"axis": n, "command": step.command, "V": V, "Tau": Tau}
 
 
-def _loads(rov: Rov, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:
+def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:
     """Yield the sliders of the inputs that are not commands.
 
     Loads end at the strongest thrust, and others at 1, or at twice their start value if that is more.
     """
-    most = {form.axis.external: _round(rov.strongest(form.axis)) for form in rov.layout.axes}
-    for name, declaration in rov.layout.inputs.items():
-        if name not in rov.layout.commands:
+    most = {form.axis.external: _round(vehicle.strongest(form.axis)) for form in vehicle.layout.axes}
+    for name, declaration in vehicle.layout.inputs.items():
+        if name not in vehicle.layout.commands:
             yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(declaration.unit)
 
 
-def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:
+def _tunable(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float]]:
     """Yield the sliders of the tunable coefficients."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
-        for axis in (form.axis for form in rov.layout.axes):
-            value = rov[name := axis.coefficient(key)]
+        for axis in (form.axis for form in vehicle.layout.axes):
+            value = vehicle[name := axis.coefficient(key)]
             yield name, f"{letter} of {axis.name}", min(0.1, value), max(3.0, 2.0 * value), value
 
 

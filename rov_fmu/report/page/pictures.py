@@ -6,17 +6,17 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from rov_fmu.fmu.terminals import FOLDER, ICON, SIGNAL
-from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.drawing import Scene, draw_icon, draw_thrusters, scenes
 from rov_fmu.report.plots.png import png_file
 from rov_fmu.report.plots.svg import LIGHT, Draw, svg_file
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _ICON, _SIGNAL = (2.0, 2.0), (0.2, 0.2)  # inches
 
 
-def pictures(rov: Rov) -> dict[str, bytes]:
+def pictures(vehicle: Vehicle) -> dict[str, bytes]:
     """Return all pictures by their path in the FMU."""
-    icon, (draw, size) = partial(_icon, rov=rov), _views(rov)
+    icon, (draw, size) = partial(_icon, vehicle=vehicle), _views(vehicle)
     return {
         "documentation/diagram.png": png_file(draw, size, background="white", margin=0.05),
         ICON: png_file(icon, _ICON, background="none"),
@@ -25,28 +25,28 @@ def pictures(rov: Rov) -> dict[str, bytes]:
     }
 
 
-def diagram(rov: Rov) -> str:
+def diagram(vehicle: Vehicle) -> str:
     """Return the thrusters and axes of a vehicle as SVG, from above and from the side."""
-    draw, size = _views(rov)
+    draw, size = _views(vehicle)
     return svg_file(draw, size, salt="diagram", background="white", margin=0.05)
 
 
-def _views(rov: Rov) -> tuple[Draw, tuple[float, float]]:
+def _views(vehicle: Vehicle) -> tuple[Draw, tuple[float, float]]:
     """Return the function that draws all views of a vehicle, and the size of its figure in inches."""
-    views = list(scenes(rov).values())
+    views = list(scenes(vehicle).values())
     widths, heights = zip(*(scene.inches for scene in views), strict=True)
-    return partial(_diagram, rov=rov, views=views), (sum(widths), max(heights))
+    return partial(_diagram, vehicle=vehicle, views=views), (sum(widths), max(heights))
 
 
-def _diagram(figure: Figure, rov: Rov, views: Sequence[Scene]) -> None:
+def _diagram(figure: Figure, vehicle: Vehicle, views: Sequence[Scene]) -> None:
     """Draw the thrusters and axes, one view beside the other."""
     for ax, scene in zip(figure.subplots(1, len(views)), views, strict=True):
-        draw_thrusters(ax, rov, scene)
+        draw_thrusters(ax, vehicle, scene)
         ax.set_anchor("NW")
 
 
-def _icon(figure: Figure, rov: Rov) -> None:
-    draw_icon(figure.subplots(), rov)
+def _icon(figure: Figure, vehicle: Vehicle) -> None:
+    draw_icon(figure.subplots(), vehicle)
 
 
 def _signal(figure: Figure) -> None:

@@ -6,90 +6,118 @@ from typing import Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
-from rov_fmu.identify.result import AxisResult, Identification, Interval, Point, Prediction
-from rov_fmu.report.plots.svg import LIGHT, with_formulas
-from rov_fmu.report.templates import pretty_unit
+from rov_fmu.identify.result import Answer, AxisResult, Point, Prediction
+from rov_fmu.report.plots.svg import LIGHT, add_knots, draw_commands
+from rov_fmu.report.templates import in_words
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.vehicle.uncertainty import quantile
+from rov_fmu.tank.log import Log
+from rov_fmu.vehicle.uncertainty import NORMAL
 
 _MOST_SAMPLES = 400
 """More samples than this would not be visible."""
 
 
+def plot_overview(figure: Figure, shown: Sequence[Prediction], log: Log | None) -> None:
+    """Plot the unseen motion of one log, one panel for each axis, above the commands of its thrusters."""
+    commands = log.commands if log else None
+    heights = [1.0] * len(shown) + [0.6] * bool(commands)
+    panels = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    for panel, p in zip(panels, shown, strict=False):
+        _draw_prediction(panel, p)
+    if commands:
+        time = np.linspace(shown[0].time[0], shown[0].time[-1], _MOST_SAMPLES)
+        names = [name if name == "command" else f"u_{name}" for name in commands.thrusters]
+        draw_commands(panels[-1], time, dict(zip(names, commands.at(time).T, strict=True)))
+    panels[-1].set_xlabel("time (s)")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
+
+
 def plot_prediction(figure: Figure, shown: Prediction) -> None:
     """Plot the measured and the predicted values of an unseen log, with the 95 % band."""
+    ax: Axes = figure.subplots()
+    _draw_prediction(ax, shown)
+    _finish(figure, "time (s)")
+
+
+def _draw_prediction(ax: Axes, shown: Prediction) -> None:
     factor, unit = in_degrees(shown.unit)
     some = slice(None, None, max(1, len(shown.time) // _MOST_SAMPLES))
-    time, half = shown.time[some], factor * quantile(np.inf) * shown.deviation[some]
-    measured, predicted = factor * shown.measured[some], factor * shown.predicted[some]
-    ax: Axes = figure.subplots()
+    time, half = shown.time[some], factor * NORMAL * shown.deviation[some]
+    predicted = factor * shown.predicted[some]
     _band(ax, time, predicted - half, predicted + half)
-    ax.plot(time, measured, color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
-    ax.plot(time, predicted, color=LIGHT["blue"], linewidth=1.3, label="predicted")
-    ax.set(xlim=(time[0], time[-1]), xlabel="time (s)")
+    ax.plot(time, factor * shown.measured[some], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
+    ax.plot(time, predicted, color=LIGHT["blue"], linewidth=1.3, label="predicted, with 95 % band")
+    if shown.compared is not None:
+        ax.plot(time, factor * shown.compared[some], "--", color=LIGHT["grey"], label="compared")
+    ax.set(xlim=(time[0], time[-1]))
     ax.margins(y=0.12)
-    _finish(figure, f"{shown.quantity.capitalize()} ({pretty_unit(unit)})")
+    _name(ax, shown.quantity, unit)
 
 
-def plot_answers(figure: Figure, results: Identification, result: AxisResult, quantity: Literal["V_ss", "Tau"]) -> None:
+def plot_answers(figure: Figure, result: AxisResult, quantity: Literal["V_ss", "Tau"]) -> None:
     """Plot V_ss or Tau over the command with its band, the points of tables, and the vehicle to compare with."""
     axis, is_steady = result.axis, quantity == "V_ss"
     factor, unit = in_degrees(axis.unit) if is_steady else (1.0, "s")
-    answers = sorted(result.answers, key=lambda answer: answer.command)
-    found = [answer.steady if is_steady else answer.rise for answer in answers]
-    commands = np.array([answer.command for answer in answers])
     ax: Axes = figure.subplots()
-    _curve(ax, factor, commands, found)
+    _curve(ax, factor, result.answers, quantity, "blue", "this fit, with 95 % band")
     _points(ax, factor, [p for p in result.points if p.quantity == quantity])
-    if results.against and results.against.layout.has(axis):
-        other = [results.against.rov.response(axis, c)[0 if is_steady else 1] for c in commands.tolist()]
-        ax.plot(100.0 * commands, factor * np.array(other), "--", color=LIGHT["grey"], label="compared")
-    ax.set_xlabel("command (%)")
-    symbol = "$V_{ss}$" if is_steady else "$Tau$"
-    with_formulas(_finish(figure, f"{symbol} ({pretty_unit(unit)})"))
+    _curve(ax, factor, result.compared, quantity, "grey", "compared")
+    _name(ax, "steady velocity" if is_steady else "time to 63 %", unit)
+    _finish(figure, "command (%)")
 
 
-def plot_forces(figure: Figure, points: Sequence[Point]) -> None:
+def plot_forces(figure: Figure, points: Sequence[Point], compared: Sequence[float | None] | None = None) -> None:
     """Plot the measured forces of a thrust curve over the command, and those of the model."""
-    shown = sorted(points, key=lambda p: p.command)
+    order = sorted(range(len(points)), key=lambda n: points[n].command)
+    shown = [points[n] for n in order]
+    commands = [100.0 * p.command for p in shown]
     ax: Axes = figure.subplots()
-    model = [p.model for p in shown]
-    ax.plot([100.0 * p.command for p in shown], model, color=LIGHT["blue"], linewidth=1.3, label="model")
+    ax.plot(commands, [p.model for p in shown], color=LIGHT["blue"], linewidth=1.3, label="this fit")
+    if compared:
+        other = np.array([compared[n] for n in order], float)
+        ax.plot(commands, other, "--", color=LIGHT["grey"], label="compared")
     _points(ax, 1.0, shown)
-    ax.set_xlabel("command (%)")
-    _finish(figure, f"Force ({points[0].unit})")
+    _name(ax, "force", points[0].unit)
+    _finish(figure, "command (%)")
 
 
-def _curve(ax: Axes, factor: float, commands: Array, found: Sequence[tuple[float, Interval]]) -> None:
+def _curve(ax: Axes, factor: float, answers: Sequence[Answer], quantity: str, color: str, label: str | None) -> None:
     """Draw values over the command with their intervals, apart for each direction."""
-    numbers = factor * np.array([(value, *interval) for value, interval in found]).reshape(-1, 3)
-    label: str | None = "model"
-    for side in (commands < 0.0, commands > 0.0):
-        if side.any():
-            values, low, high = numbers[side].T
-            _band(ax, 100.0 * commands[side], low, high)
-            ax.plot(100.0 * commands[side], values, ".-", color=LIGHT["blue"], linewidth=1.3, label=label)
+    for sign in (-1.0, 1.0):
+        own = sorted((a for a in answers if a.command * sign > 0.0), key=lambda a: a.command)
+        if own:
+            known = [a.steady if quantity == "V_ss" else a.rise for a in own]
+            values, low, high = factor * np.array([(value, *interval) for value, interval in known]).T
+            commands = np.array([100.0 * a.command for a in own])
+            _band(ax, commands, low, high, color)
+            style = ".-" if color == "blue" else ".--"
+            ax.plot(commands, values, style, color=LIGHT[color], linewidth=1.3, label=label)
             label = None
 
 
-def _band(ax: Axes, x: Array, low: Array, high: Array) -> None:
-    ax.fill_between(x, low, high, color=LIGHT["blue"], alpha=0.25, linewidth=0.0)
+def _band(ax: Axes, x: Array, low: Array, high: Array, color: str = "blue") -> None:
+    ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.25, linewidth=0.0)
 
 
 def _points(ax: Axes, factor: float, points: Sequence[Point]) -> None:
     """Draw measured points. Those that do not count are hollow."""
-    for counts, face, label in ((True, LIGHT["orange"], "measured"), (False, "none", "not counted")):
+    for counts, face, label in ((True, LIGHT["orange"], "measured"), (False, "none", "measured, not counted")):
         if some := [(100.0 * p.command, factor * p.measured) for p in points if p.counts is counts]:
             x, y = zip(*some, strict=True)
             ax.plot(x, y, "o", color=LIGHT["orange"], markerfacecolor=face, markersize=4.5, zorder=5, label=label)
 
 
-def _finish(figure: Figure, title: str) -> Text:
-    """Add the title, and a legend below the plot, where it hides nothing."""
-    (ax,) = figure.axes
+def _name(ax: Axes, quantity: str, unit: str) -> None:
+    """Name what an axis shows, in words and with its unit, and add knots beside m/s."""
+    ax.set_title(in_words(quantity, unit), loc="left")
     ax.locator_params(nbins=6)
-    figure.legend(loc="outside lower center", ncols=4, columnspacing=1.0)
-    return ax.set_title(title, loc="left")
+    if unit == "m/s":
+        add_knots(ax)
+
+
+def _finish(figure: Figure, x: str) -> None:
+    """Name the horizontal axis, and add a legend below the plot, where it hides nothing."""
+    figure.axes[0].set_xlabel(x)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, columnspacing=1.0)

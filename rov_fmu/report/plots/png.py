@@ -17,5 +17,7 @@ def png_file(draw: Draw, size: tuple[float, float], *, background: str, margin: 
     inches = (width + 1e-6) / _DPI, (height + 1e-6) / _DPI  # Matplotlib cuts off a pixel that is not whole
     drawn = saved(draw, inches, background=background, margin=margin, format="rgba", dpi=_DPI)
     picture, file = frombytes("RGBA", (width, height), drawn), BytesIO()
+    if background != "none":
+        picture = picture.convert("RGB")  # nothing is transparent, and no rounded colour becomes so
     picture.quantize(_COLOURS, Quantize.FASTOCTREE, dither=Dither.NONE).save(file, "PNG", optimize=True)
     return file.getvalue()

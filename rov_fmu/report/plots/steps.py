@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.alone import RISE
-from rov_fmu.model.layout import Axis, Curve
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import Axis
+from rov_fmu.model.layout import Curve
 from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -77,38 +77,38 @@ def finish(
         with_formulas(*ax.legend(loc=where).get_texts())
 
 
-def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
+def draw_curve(ax: Axes, vehicle: Vehicle, curve: Curve) -> None:
     """Plot the steady thrust of a thruster over its command, with reverse and the dead band."""
     commands = {n / 50.0 for n in range(-50, 51)}
     if "c_0" in curve.keys:
-        ends = -rov[curve.coefficient("c_0_reverse")], rov[curve.coefficient("c_0")]
+        ends = -vehicle[curve.coefficient("c_0_reverse")], vehicle[curve.coefficient("c_0")]
         commands |= set(ends)
         low, high = (100.0 * end for end in ends)
         ax.axvspan(low, high, label="dead band", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     c = sorted(commands)
-    ax.plot([100.0 * x for x in c], [rov.curve_force(curve, x) for x in c], color=LIGHT["blue"], linewidth=1.8)
+    ax.plot([100.0 * x for x in c], [vehicle.curve_force(curve, x) for x in c], color=LIGHT["blue"], linewidth=1.8)
     finish(ax, f"Curve {curve.name}: thrust (N)", "command (%)")
     ax.set_xlim(-100, 100)
 
 
-def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
+def after_step(vehicle: Vehicle, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
     """Return the velocity along an axis at each time, the first 0, under a held command from rest.
 
     The other axes are left without a force, so that they stay at rest and do not act on this one.
     """
     others = {
         name: 0.0
-        for form in rov.layout.axes
+        for form in vehicle.layout.axes
         if form.axis is not axis
         for name in (form.axis.coefficient("alpha"), form.coefficient("F_0"))
-        if name in rov.coefficients
+        if name in vehicle.coefficients
     }
-    values = {**rov.held_inputs(axis, command), **others}
-    velocity: list[float] = simulate(rov, np.array(times), values, [axis.velocity]).values[0, 0].tolist()
+    values = {**vehicle.held_inputs(axis, command), **others}
+    velocity: list[float] = simulate(vehicle, np.array(times), values, [axis.velocity]).values[0, 0].tolist()
     return velocity
 
 
-def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
+def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Vehicle, str]]) -> None:
     """Plot the velocity after steps of the command for every model, and label the curve of the last model.
 
     A measured V_ss is a dotted line, and a measured Tau is a point at 1 - 1/e of it.
@@ -120,8 +120,8 @@ def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tup
     roles = dict(zip(sorted({abs(step.command) for step in steps}), LINES, strict=False))
     for step in steps:
         color = LIGHT[roles[abs(step.command)]]
-        for rov, dashes in models:
-            v = after_step(rov, axis, step.command, t)
+        for vehicle, dashes in models:
+            v = after_step(vehicle, axis, step.command, t)
             ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
         label = f"{100.0 * step.command:g} %".replace("-", "−")
         ax.text(1.015 * end, v[-1], label, color=color, va="center", fontsize=8.5)

@@ -1,22 +1,29 @@
 """Plots as SVG, in the colours and fonts of the page that holds them. The bytes are the same at every call."""
 
 import base64
+import json
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from html import escape
 from io import BytesIO
+from operator import mul
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+from cycler import cycler
 from lxml import etree
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.style import context
 from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
 
 from rov_fmu.io.messages import brief
 from rov_fmu.io.picture import read_svg
@@ -31,21 +38,26 @@ PALETTE = {
     "grey": ("#84919c", "#8796a3"),
     "teal": ("#12877b", "#4fd0c0"),
     "blue": ("#0a5cad", "#6db3f2"),
-    "violet": ("#8444b8", "#c99af0"),
+    "violet": ("#8e1eff", "#ac6bff"),
     "orange": ("#c43e12", "#ff9468"),
     "steel": ("#22303d", "#4d6172"),
     "metal": ("#5d6f7e", "#8497a6"),
 }
 """The colours on a light and on a dark page, by role. A plot in a page refers to the role, so it follows the page."""
 LIGHT = {role: light for role, (light, _) in PALETTE.items()}
+LINES = ("blue", "orange", "teal", "violet", "steel")
+"""The colours of lines, in the order of their use. They differ for colour-blind people, too."""
+KNOTS = 3600.0 / 1852.0
+"""Knots in 1 m/s."""
 _FONTS = "system-ui, sans-serif"
-_STYLE: Any = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "mathtext.fontset": "dejavusans",
     "text.parse_math": False,  # names and units may come from anyone; `with_formulas` marks our own formulas
     "font.size": 9.5,
     "axes.facecolor": "none",
+    "axes.prop_cycle": cycler(color=[LIGHT[role] for role in LINES]),
     "axes.titlesize": 10.5,
     "axes.titleweight": "bold",
     "axes.spines.top": False,
@@ -74,14 +86,15 @@ _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}hr
 Draw = Callable[[Figure], None]
 
 
-def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str = "") -> Markup:
+def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str = "", marked: bool = False) -> Markup:
     """Return a plot as part of a page, with a label for screen readers. The colours of the palette become the page's.
 
+    `marked` adds what the script plots.js needs, for a page that has it.
     Two plots of a page must differ in their label or in their salt, because their ids follow from these. A plot that
     cannot be drawn becomes a line with the reason, because the rest of the page does not depend on it.
     """
     try:
-        svg = svg_file(draw, size, salt=label + salt, background="none", margin=0.02)
+        svg = svg_file(draw, size, salt=label + salt, background="none", margin=0.02, marked=marked)
     except Exception as error:  # Matplotlib raises any kind
         reason = brief(str(error) or type(error).__name__)
         return Markup("<p>{}: this plot cannot be drawn: {}</p>").format(label, reason)
@@ -93,7 +106,33 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str =
     return Markup(svg)
 
 
-def with_even_text(draw: Draw, size: float = _STYLE["font.size"]) -> Draw:
+def add_knots(ax: Axes) -> None:
+    """Add a scale in knots at the right of a panel in m/s."""
+    scales: Any = partial(mul, KNOTS), partial(mul, 1.0 / KNOTS)
+    knots = ax.secondary_yaxis("right", functions=scales)
+    knots.set_ylabel("knots")
+    knots.spines["right"].set_visible(False)
+    knots.yaxis.set_major_locator(MaxNLocator(5))
+
+
+def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = "1") -> None:
+    """Draw the commands of all thrusters as steps in one small panel: fractions in percent, or pulse widths in µs.
+
+    Equal commands share a line.
+    """
+    factor, shown = (100.0, "%") if unit == "1" else (1.0, "µs")
+    groups: dict[bytes, list[str]] = {}
+    for name, values in commands.items():
+        groups.setdefault(np.asarray(values, float).tobytes(), []).append(name)
+    for names in groups.values():
+        label = ", ".join(names)
+        ax.plot(time, factor * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
+    ax.set_title(f"Commands ({shown})", loc="left")
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    ax.locator_params("y", nbins=4)
+
+
+def with_even_text(draw: Draw, size: float = STYLE["font.size"]) -> Draw:
     """Return a function that draws the same figure with all text in one size, in points."""
 
     def drawn(figure: Figure) -> None:
@@ -120,10 +159,17 @@ def image(label: str, path: Path) -> Markup:
 
 
 def svg_file(
-    draw: Draw, size: tuple[float, float], *, salt: str, background: str = "white", margin: float = 0.1
+    draw: Draw,
+    size: tuple[float, float],
+    *,
+    salt: str,
+    background: str = "white",
+    margin: float = 0.1,
+    marked: bool = False,
 ) -> str:
     """Return a figure (size in inches) as SVG, independent of the user's settings of Matplotlib."""
-    svg = saved(draw, size, background=background, margin=margin, salt=salt, format="svg", metadata={"Date": None})
+    kind: Any = {"format": "svg", "metadata": {"Date": None}, "marked": marked}
+    svg = saved(draw, size, background=background, margin=margin, salt=salt, **kind)
     return _without_ballast(_NO_XML.sub("\N{REPLACEMENT CHARACTER}".encode(), svg)).replace("'DejaVu Sans'", _FONTS)
 
 
@@ -135,6 +181,7 @@ def saved(
     margin: float,
     salt: str = "",
     style: Mapping[str, Any] = MappingProxyType({}),
+    marked: bool = False,
     **how: Any,
 ) -> bytes:
     """Return a figure (size in inches) as Matplotlib saves it, in the common style; `how` has the format and other
@@ -144,10 +191,12 @@ def saved(
     """
     file = BytesIO()
     margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
-    with context(["default", _STYLE, {"svg.hashsalt": salt, **margins, **style}]), without_font_warnings():
+    with context(["default", STYLE, {"svg.hashsalt": salt, **margins, **style}]), without_font_warnings():
         figure = Figure(figsize=size, layout="constrained", facecolor=background)
         draw(figure)
         _arrange(figure, how["format"])
+        if marked:
+            _mark(figure)
         figure.savefig(file, **how)
     return file.getvalue()
 
@@ -172,6 +221,22 @@ def _arrange(figure: Figure, form: str) -> None:
     figure.set_layout_engine(None)
 
 
+def _mark(figure: Figure) -> None:
+    """Mark each panel and each line that has a name with what rov_fmu/report/templates/plots.js needs of it, as JSON in
+    the id of its group: where the panel is, in which coordinates, and the names."""
+    height = 72.0 * figure.get_figheight()
+    for ax in figure.axes:
+        box, title = ax.bbox, ax.get_title(loc="left")
+        place = [round(part, 2) for part in (box.x0, height - box.y1, box.x1, height - box.y0)]
+        panel = {"box": place, "x": ax.get_xlim(), "y": ax.get_ylim(), "title": title or ax.get_ylabel()}
+        ax.set_gid(json.dumps(panel | {"along": ax.get_xlabel() or figure.axes[-1].get_xlabel()}))
+        ax.xaxis.set_gid('{"ticks": "x"}')
+        named = [(line.get_label(), [line]) for line in ax.lines] + [(bars.get_label(), bars) for bars in ax.containers]
+        for label, artists in named:
+            for artist in artists if not str(label).startswith("_") else ():
+                artist.set_gid(json.dumps({"line": label}))
+
+
 def _without_ballast(svg: bytes) -> str:
     """Return the picture without metadata, unused groups and ids, and invisible digits."""
     parser = etree.XMLParser(remove_comments=True, remove_blank_text=True)
@@ -180,7 +245,9 @@ def _without_ballast(svg: bytes) -> str:
     used = set(re.findall(rb'(?:href="|url\()#(\w+)', svg))
     for element in list(root.iter()):
         if element.get("id", "").encode() not in used:
-            element.attrib.pop("id", None)
+            name = element.attrib.pop("id", "")
+            if name.startswith("{"):
+                element.set("data-plot", name)
         if element.get("transform", "").startswith("rotate(-0 "):
             del element.attrib["transform"]
         if link := element.attrib.pop(_XLINK, None):

@@ -83,7 +83,7 @@ class Estimates:
                 yield f"the plan gives {name}: its correlation with {_listed(others)} in {file} is left out"
         differ = [
             f"{name} ({has[name].start:g}, not {value:g})"
-            for name, value in self._vehicle.rov.coefficients.items()
+            for name, value in self._vehicle.coefficients.items()
             if name in has
             and name not in self.names
             and not self._given(name)

@@ -10,7 +10,7 @@ import pandas as pd
 
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output
-from rov_fmu.report.templates import number, page
+from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.results.plots import (
     Plot,
     draw_band,
@@ -92,6 +92,7 @@ def study_page(results: Results) -> str:
         few=_FEW,
         bands=in_rows([_band(results, name) for name in outputs]),
         warnings=results.warnings,
+        script=inline_script("plots.js"),
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
         failures=reasons[:_REASONS],
         more_failures=len(reasons[_REASONS:]),

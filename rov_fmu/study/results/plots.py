@@ -56,9 +56,9 @@ def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
     found = []
     for plot, count in zip(plots, _counts(len(plots)), strict=True):
         draw = with_even_text(plot.draw)
-        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height))
+        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height), marked=True)
         if count < 3:
-            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad")
+            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad", marked=True)
             narrow = Markup('<div class="broad">{}</div><div class="narrow">{}</div>').format(broad, narrow)
         found.append({"name": plot.name, "text": plot.text, "row": count, "svg": narrow})
     return found
@@ -87,7 +87,9 @@ def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit:
     low, median, high = (quantiles[n] / scale for n in (0, len(quantiles) // 2, -1))
     ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     shares = np.full(len(values), 100.0 / len(values))
-    ax.hist(values, bins=min(_BINS, max(5, round(len(values) ** 0.5))), weights=shares, color=LIGHT["blue"], alpha=0.75)
+    bins = min(_BINS, max(5, round(len(values) ** 0.5)))
+    _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
+    bars.set_label("share")  # type: ignore[union-attr]
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
     ax.set(xlabel=axis_label("", unit, scale), ylabel="runs (%)")
     _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
@@ -124,7 +126,9 @@ def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     low, below, median, above, high = np.where(np.isfinite(values), values / scale, np.nan).T
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
-    ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
+    for edge, label in ((low, "5 %"), (high, "95 %")):
+        ax.plot(t, edge, color=LIGHT["blue"], linewidth=0.5, alpha=0.5, label=label)
+    ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6, label="median")
     ax.set(xlabel="time (s)", ylabel=axis_label("", unit, scale))
     _set_ticks(ax)
 

@@ -52,7 +52,7 @@ class References(NamedTuple):
 
 
 def _references(fmi: int) -> References:
-    found = {v.name: v.reference(fmi) for v in variables(load_vehicle(VIDEORAY).rov)}
+    found = {v.name: v.reference(fmi) for v in variables(load_vehicle(VIDEORAY))}
     chosen = (found[name] for name in ("u_l", "u", "der(u)", "F_l", "beta_u"))
     return References(*(references(n) for n in (*chosen, max(found.values()) + (1 if fmi == 2 else 2))))
 

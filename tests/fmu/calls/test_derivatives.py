@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 from mpmath import mp
 
-from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi3
 from tests.fmi import (
     CO_SIMULATION,
@@ -36,7 +35,7 @@ ROVS = {
     "videoray3_dir": VIDEORAY,
     "heavy_dir": HEAVY,
     "heavy3_dir": HEAVY,
-    "everything_dir": load_vehicle(EVERYTHING).rov,
+    "everything_dir": load_vehicle(EVERYTHING),
 }
 
 
@@ -52,12 +51,12 @@ def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
 
 
 @pytest.fixture
-def rov(fmu: Fmu) -> Rov:
+def rov(fmu: Fmu) -> Vehicle:
     """Return the vehicle of the FMU."""
     return rov_of(fmu)
 
 
-def rov_of(fmu: Fmu) -> Rov:
+def rov_of(fmu: Fmu) -> Vehicle:
     return next(rov for rov in ROVS.values() if set(rov.layout.inputs) == set(fmu.inputs))
 
 
@@ -99,7 +98,7 @@ _SLOPES: dict[tuple[Any, ...], dict[str, float]] = {}
 """Slopes by vehicle, point, known and side. All versions and interfaces are compared with the same slopes."""
 
 
-def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, float]:
+def slopes(rov: Vehicle, point: Values, known: str, side: int = 1) -> dict[str, float]:
     """Return the one-sided slope of every output and derivative by one known, computed in 50 digits."""
     key = (id(rov), *point.items(), known, side)
     if key not in _SLOPES:
@@ -110,7 +109,7 @@ def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, floa
     return _SLOPES[key]
 
 
-def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, side: int = 1) -> None:
+def check_slopes(rov: Vehicle, instance: AnyInstance, point: Values, known: str, side: int = 1) -> None:
     unknowns = instance.fmu.outputs + instance.fmu.derivatives
     found, expected = instance.derivatives(unknowns, known), slopes(rov, point, known, side)
     size = max(1.0, *map(abs, expected.values()))  # for rounding in a sum of large terms
@@ -121,7 +120,7 @@ def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, sid
 @pytest.mark.parametrize(
     "number", [1, pytest.param(6, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.weekly)]
 )
-def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
+def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """The knowns are all inputs, states and coefficients; the unknowns are all calculated variables."""
     for point, kind in product(points(fmu, number, seed=1), MODES):
         with at_point(fmu, kind, INITIALIZATION, point) as instance:
@@ -129,7 +128,7 @@ def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: 
                 check_slopes(rov, instance, point, known)
 
 
-def kinks(rov: Rov, point: Values) -> Iterator[tuple[State, str, int]]:
+def kinks(rov: Vehicle, point: Values) -> Iterator[tuple[State, str, int]]:
     """Yield points at the limit of saturation or a dead band, or at rest, each with a known to vary and the side."""
     layout = rov.layout
     still = {**point, **dict.fromkeys(layout.commands, 0.0)}
@@ -146,7 +145,7 @@ def kinks(rov: Rov, point: Values) -> Iterator[tuple[State, str, int]]:
         yield {**point, velocity: 0.0}, velocity, 1
 
 
-def test_at_a_kink_the_derivative_is_one_sided(fmu: Fmu, rov: Rov) -> None:
+def test_at_a_kink_the_derivative_is_one_sided(fmu: Fmu, rov: Vehicle) -> None:
     """The side is a command within ±1, a wider dead band, and a positive velocity."""
     for kink, known, inside in kinks(rov, *points(fmu, 1, seed=9)):
         with at_point(fmu, CO_SIMULATION, INITIALIZATION, kink) as instance:
@@ -243,9 +242,9 @@ def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu
 # ---- Derivatives by time ----
 
 
-def exact_rates(rov: Rov, point: Values) -> dict[str, Any]:
+def exact_rates(rov: Vehicle, point: Values) -> dict[str, Any]:
     """Return the first time derivative of every output, with the inputs held."""
-    k = Rov(rov.layout, {name: point[name] for name in rov.coefficients})
+    k = Vehicle(rov.layout, {name: point[name] for name in rov.coefficients})
     found: dict[str, Any] = equations(k, point).rates({n: mp.mpf(point[n]) for n in rov.layout.state}, point)
     forces = {t.name: found.get(f"F_{t.name}", mp.zero) for t in rov.layout.thrusters}  # without lag they are constant
     found = found | {f"F_{name}": F for name, F in forces.items()}
@@ -256,7 +255,7 @@ def exact_rates(rov: Rov, point: Values) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("number", [8, pytest.param(300, marks=pytest.mark.weekly)])
-def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
+def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """Every fourth point is at rest."""
     for n, point in enumerate(points(fmu, number, seed=7)):
         motion = point | (at_rest(rov) if n % 4 == 0 else {})

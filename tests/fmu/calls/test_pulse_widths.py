@@ -22,7 +22,6 @@ from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmu.terminals import terminals
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi2
 from tests.conftest import Made, unzipped
@@ -35,11 +34,11 @@ from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 
 PULSE = (1100.0, 1480.0, 1900.0)
 DELAYED = load_vehicle(THRUST_EFFECTS)
-FRACTIONS = replace(DELAYED, identifier="fractions", rov=immediate(DELAYED.rov))
-PULSES = replace(FRACTIONS, identifier="pulses", rov=pulsed(FRACTIONS.rov, PULSE))
+FRACTIONS = replace(immediate(DELAYED), identifier="fractions")
+PULSES = replace(pulsed(FRACTIONS, PULSE), identifier="pulses")
 
 
-def _with_another_range(rov: Rov) -> Rov:
+def _with_another_range(rov: Vehicle) -> Vehicle:
     """Return a vehicle whose curve bow has tables at 14 and 20 V; those of main are at 12 and 16 V."""
     main = rov.layout.curves_by_name["main"]
     tables = tuple(
@@ -47,10 +46,10 @@ def _with_another_range(rov: Rov) -> Rov:
         for n, (table, voltage) in enumerate(zip(main.tables, (14.0, 20.0), strict=True))
     )
     curves = (replace(curve, tables=tables) if curve.name == "bow" else curve for curve in rov.layout.curves)
-    return Rov(replace(rov.layout, curves=tuple(curves)), rov.coefficients)
+    return replace(rov, layout=replace(rov.layout, curves=tuple(curves)))
 
 
-RANGES = replace(PULSES, identifier="ranges", rov=_with_another_range(PULSES.rov))
+RANGES = replace(_with_another_range(PULSES), identifier="ranges")
 COMMANDS = [*FRACTIONS.layout.commands]
 STATES = [*FRACTIONS.layout.state]
 
@@ -218,14 +217,14 @@ def python_slave(vehicle: Vehicle, folder: Path, callbacks: Any = None) -> tuple
 
 
 def test_the_python_flavour_waits_at_neutral_for_the_dead_time(tmp_path: Path) -> None:
-    vehicle = replace(DELAYED, identifier="delayed_pulses", rov=pulsed(DELAYED.rov, PULSE))
+    vehicle = replace(pulsed(DELAYED, PULSE), identifier="delayed_pulses")
     slave, place = python_slave(vehicle, tmp_path)
     acting, states = [place[f"delayed_{name}"] for name in COMMANDS], [place[name] for name in STATES]
     commands, times = commands_of(random.Random(3)), 0.04 * np.arange(31)
     rows = [next(commands)[0] for _ in times]
     tables = {name: np.array([row[name] for row in rows]) for name in COMMANDS}
     names = [*STATES, *(f"delayed_{name}" for name in COMMANDS)]
-    in_c = simulate(vehicle.rov, times, tables, names, workers=1).values[:, 0].T
+    in_c = simulate(vehicle, times, tables, names, workers=1).values[:, 0].T
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
     slave.exitInitializationMode()

@@ -22,8 +22,7 @@ from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.layout import AXES
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -126,8 +125,8 @@ def test_the_tables_of_the_paper_are_experiments() -> None:
         v = table.axis.velocity
         for row in table.rows:
             for name, model, response in (
-                ("tuned", vehicle.rov, row.scaled),
-                ("untuned", untuned(vehicle.rov), row.non_linear),
+                ("tuned", vehicle, row.scaled),
+                ("untuned", untuned(vehicle), row.non_linear),
             ):
                 experiment = experiments.pop(f"{table.axis.name}_{row.command}_{name}")
                 printed += 1
@@ -152,7 +151,7 @@ def test_the_tables_of_the_paper_are_experiments() -> None:
     assert list(experiments) == ["manoeuvre"]
 
 
-def _check(rov: Rov, files: Mapping[str, bytes], name: str) -> None:
+def _check(rov: Vehicle, files: Mapping[str, bytes], name: str) -> None:
     """Compare every expected value with a computation in 50 digits."""
     experiment = _experiments(files)[name]
     stimuli, expected = (_rows(files, experiment.find(part).get("source")) for part in ("Stimuli", "References"))
@@ -177,7 +176,7 @@ def _check(rov: Rov, files: Mapping[str, bytes], name: str) -> None:
 )
 def test_expected_values_are_right_to_their_last_digit(name: str, experiment: str) -> None:
     vehicle, files = _shipped(name)
-    _check(vehicle.rov, files, experiment)
+    _check(vehicle, files, experiment)
 
 
 @pytest.mark.parametrize(
@@ -188,7 +187,7 @@ def test_all_expected_values_are_right_to_their_last_digit(name: str) -> None:
     """All experiments of the shipped vehicles; with coupling and lag, 50 digits take minutes."""
     vehicle, files = _shipped(name)
     for experiment in _experiments(files):
-        _check(untuned(vehicle.rov) if experiment.endswith("_untuned") else vehicle.rov, files, experiment)
+        _check(untuned(vehicle) if experiment.endswith("_untuned") else vehicle, files, experiment)
 
 
 # ---- Fast motions ----------------------------------------------------------------------------------------------------
@@ -200,14 +199,14 @@ def spinner() -> Vehicle:
     rov = VEHICLES["sway and yaw"]
     coefficients = {name: rov[name] for name in rov.layout.coefficients} | {"a_d_r": 0.0, "b_d_r": 0.01}
     vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
-    return replace(vehicle, data=None, rov=Rov(rov.layout, coefficients))
+    return replace(vehicle, data=None, layout=rov.layout, coefficients=coefficients)
 
 
 def test_expected_values_of_a_vehicle_that_spins_fast_are_right(spinner: Vehicle) -> None:
     files = reference_results(spinner)
-    assert spinner.rov.response(AXES["yaw"], 1.0)[0] > 1000.0
+    assert spinner.response(AXES["yaw"], 1.0)[0] > 1000.0
     for experiment in ("sway_100", "yaw_40", "yaw_100", "manoeuvre"):
-        _check(spinner.rov, files, experiment)
+        _check(spinner, files, experiment)
 
 
 # ---- Roll and pitch --------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, fitted
-from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VIDEORAY
@@ -62,7 +62,7 @@ def test_the_deviation_is_smooth_and_constant_below_the_knots() -> None:
 
 def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
     """The thrust of another maker's propeller, 51.5 N ((c - 0.06) / 0.94)^1.45, from the curve of the BlueROV2."""
-    k = load_vehicle(SHIPPED["bluerov2"]).rov
+    k = load_vehicle(SHIPPED["bluerov2"])
     (curve,) = k.layout.curves
     commands = np.linspace(0.02, 0.8, 40)
     truth = 51.5 * np.maximum(commands - 0.06, 0.0) ** 1.45 / 0.94**1.45
@@ -78,7 +78,7 @@ def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
 
 
 def test_thrust_begins_at_the_dead_band_whatever_the_shape() -> None:
-    k = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"c_0_t200": 0.07})
+    k = load_vehicle(SHIPPED["bluerov2"]).replaced({"c_0_t200": 0.07})
     (curve,) = k.layout.curves
     for seed, size in ((0, 0.1), (1, 0.1), (2, 10.0)):
         deviation = size * np.random.default_rng(seed).standard_normal(COUNT)
@@ -133,7 +133,7 @@ def test_a_quadratic_curve_is_fitted_exactly() -> None:
 
 
 def test_directions_and_the_dead_band_are_taken_into_account() -> None:
-    k = load_vehicle(SHIPPED["bluerov2"]).rov
+    k = load_vehicle(SHIPPED["bluerov2"])
     (curve,) = k.layout.curves
     assert {"a_t_reverse", "c_0"} <= {*curve.keys}
     found = fitted(curve, lambda c: k.curve_force(curve, c), k["c_0_t200"], 0.0, 0.9)

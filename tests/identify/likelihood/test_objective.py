@@ -11,7 +11,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.objective import Data, Objective, cost
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, total
-from rov_fmu.model.layout import HEAVE, YAW
+from rov_fmu.model.catalogue import HEAVE, YAW
 from rov_fmu.tank.arrays import Array
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled, responses
 from tests.recordings import clean, write_log

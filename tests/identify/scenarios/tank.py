@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.identify.scenarios.scenario import (
     COMMANDS,
     EXACT_THRUST,
@@ -34,8 +33,8 @@ Random = np.random.Generator
 Motion = Mapping[str, Array]
 
 TRUTHS = {
-    "videoray": load_vehicle(SHIPPED["videoray"]).rov.replaced({"beta_u": 0.8}),
-    "bluerov2_heavy": load_vehicle(SHIPPED["bluerov2_heavy"]).rov.replaced({"z_B": -0.05}),
+    "videoray": load_vehicle(SHIPPED["videoray"]).replaced({"beta_u": 0.8}),
+    "bluerov2_heavy": load_vehicle(SHIPPED["bluerov2_heavy"]).replaced({"z_B": -0.05}),
 }
 """The true vehicles. β of the VideoRay in surge differs from 1, where a fit may start. The centre of buoyancy of the
 Heavy lies 5 cm above that of mass, so that a pilot without an autopilot can fly it."""
@@ -110,7 +109,7 @@ class Tank:
     expected: Expected = NOTHING_SPECIAL
 
     @property
-    def truth(self) -> Rov:
+    def truth(self) -> Vehicle:
         """The true vehicle."""
         return with_more(TRUTHS[self.vehicle], **self.more)
 
@@ -134,7 +133,7 @@ class Tank:
         truth = self.truth
         seconds = self.logs.seconds if "voltage" in self.logs.columns else 0.0
         factor = sagging(0.5 * seconds, seconds) if seconds else 1.0
-        pushed = Rov(
+        pushed = Vehicle(
             truth.layout, {n: v * factor if n[:4] in ("a_t_", "b_t_") else v for n, v in truth.coefficients.items()}
         )
         found: dict[tuple[str, str], float] = {}
@@ -249,7 +248,7 @@ def _rows(random: Random, logs: Logs, commands: Commands) -> Array:
     return time
 
 
-def moved(truth: Rov, commands: Commands, at: Array, conditions: Conditions) -> Motion:
+def moved(truth: Vehicle, commands: Commands, at: Array, conditions: Conditions) -> Motion:
     """Return the motion at ascending times, with the surge and sway velocity over ground as `u ground`, `v ground`."""
     simulate = rigid_pool.motion if truth.layout.has_attitude else pool.motion
     found = simulate(truth, commands, np.maximum(at, 0.0), conditions)
@@ -278,7 +277,7 @@ def true_values(sensor: Sensor, motion: Motion) -> Array:
 # ---- Logs ------------------------------------------------------------------------------------------------------------
 
 
-def _table(scenario: Tank, truth: Rov, flight: Flight, random: Random) -> dict[str, Array]:
+def _table(scenario: Tank, truth: Vehicle, flight: Flight, random: Random) -> dict[str, Array]:
     """Return the columns of a log by their headers."""
     logs, rows = scenario.logs, flight.time
     stamps = rows + logs.jitter * random.standard_normal(len(rows))

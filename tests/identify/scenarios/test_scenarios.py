@@ -22,10 +22,9 @@ from rov_fmu.identify.result import (
     Prediction,
     Verdict,
 )
-from rov_fmu.model.layout import HEAVE, YAW, Axis
-from rov_fmu.model.rov import Rov
+from rov_fmu.model.catalogue import HEAVE, YAW, Axis
 from rov_fmu.tank.folder import read_folder
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.identify.scenarios import outcome as of_outcome
 from tests.identify.scenarios.catalogue import COMPLETE, DEPTH, HEADING, INCOMPLETE, OWNERS, SCENARIOS
 from tests.identify.scenarios.judge import broken, promises
@@ -91,7 +90,7 @@ def test_pulses_that_were_not_fitted_are_predicted(tmp_path: Path) -> None:
         pulses = Commands(PULSES.switches, {name: sign * PULSES.thrusters[""] for name, sign in thrusters.items()})
         velocity = {"surge": "u", "heave": "w", "yaw": "r"}[axis]
         true = pool.motion(scenario.truth, pulses, time, scenario.conditions)[velocity]
-        modelled = pool.motion(result.vehicle.rov, pulses, time, Conditions(delay=delay))[velocity]
+        modelled = pool.motion(result.vehicle, pulses, time, Conditions(delay=delay))[velocity]
         error = np.linalg.norm(true - modelled) / np.linalg.norm(true - true.mean())
         assert error < 0.1, axis
 
@@ -341,7 +340,7 @@ def test_an_owners_vehicle_moves_as_in_the_pool(conditions: Conditions, tmp_path
     assert np.abs(states[:, :4]).max() > 0.3
 
 
-def in_pool(kind: Kind, folder: Path, command: float) -> Rov:
+def in_pool(kind: Kind, folder: Path, command: float) -> Vehicle:
     """Return the vehicle with curves that agree at a command and its opposite."""
     (curve,) = kind.curves.values()
     values = {"a_t_t200": 0.0, "a_t_t200_reverse": 0.0, "c_0_t200": 0.0, "T_t200": curve.lag, "F_0_w": kind.load}
@@ -349,7 +348,7 @@ def in_pool(kind: Kind, folder: Path, command: float) -> Rov:
     values |= {"m_rov": kind.mass, "I_r": kind.turning}
     for key, numbers in (("m_a", kind.added), ("a_d", kind.quadratic), ("b_d", kind.linear)):
         values |= {f"{key}_{name}": number for name, number in zip("uvwr", numbers, strict=True)}
-    return load_vehicle(folder / "similar.toml").rov.replaced(values)
+    return load_vehicle(folder / "similar.toml").replaced(values)
 
 
 def test_rotors_approach_their_speed() -> None:

@@ -1,4 +1,4 @@
-"""The declarations of a vehicle's variables (rov_fmu/model/layout.py)."""
+"""The declarations of a vehicle's variables (rov_fmu/model/catalogue.py and layout.py)."""
 
 import re
 from dataclasses import replace
@@ -8,7 +8,8 @@ import pytest
 
 import rov_fmu
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import (
+from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.catalogue import (
     AXES,
     HEAVE,
     PITCH,
@@ -16,20 +17,14 @@ from rov_fmu.model.layout import (
     SURGE,
     SWAY,
     YAW,
-    Curve,
-    Fin,
-    Layout,
-    Thruster,
-    ThrustTable,
-    VehicleAxis,
-    arm,
     cited,
     cross_declaration,
     cross_name,
     cross_of,
-    effect_along,
 )
+from rov_fmu.model.layout import Curve, Fin, Layout, Thruster, ThrustTable, VehicleAxis, arm, effect_along
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import SIX
 
 WORDS = {
@@ -40,19 +35,18 @@ WORDS = {
         "r": "Yaw velocity r, positive bow to starboard",
         "F_l": "Thrust F_l: left thruster, half of the pair's, positive forward, "
         "equation (9) of Enevoldsen et al. 2018",
-        "m_rov": "Mass m_rov, equations (3a) and (3b) of Enevoldsen et al. 2018",
-        "a_d_u": "Quadratic drag coefficient a_d of surge, equation (14) of Enevoldsen et al. 2018",
-        "alpha_r": "Tuning α_r: scales torque in yaw, equation (18c) of Enevoldsen et al. 2018",
-        "beta_u": "Tuning β_u: scales acceleration in surge, equation (18a) of Enevoldsen et al. 2018; at 0 the "
-        "velocity never changes",
-        "tau_rear": "Torque τ_rear of the thrusters with the curve of the rear pair, positive bow to starboard, "
-        "equation (4) of Enevoldsen et al. 2018",
+        "m_rov": "Mass m_rov",
+        "a_d_u": "Quadratic drag coefficient a_d of surge",
+        "a_t_rear": "Quadratic thrust coefficient a_t of the rear pair, equation (9) of Enevoldsen et al. 2018",
+        "alpha_r": "Tuning α_r: scales torque in yaw",
+        "beta_u": "Tuning β_u: scales acceleration in surge; at 0 the velocity never changes",
+        "tau_rear": "Torque τ_rear of the thrusters with the curve of the rear pair, positive bow to starboard",
     },
     "bluerov2_heavy": {
         "u_1": "Command u_1: thruster 1 (front starboard), positive astern and to starboard; saturates at ±1",
         "Y_ext": "Load from outside in sway (tether, contact), positive to starboard",
         "V_E": "Velocity of a steady horizontal current, eastward",
-        "beta_u": "Tuning β_u: scales acceleration in surge, equation (18a) of Enevoldsen et al. 2018",
+        "beta_u": "Tuning β_u: scales acceleration in surge",
         "m_a_w": "Added mass m_a of heave",
         "m_a_r": "Added moment of inertia m_a of yaw",
         "T_t200": "Time constant T of the lag of the T200 at 16 V, T dF/dt = F(c) - F",
@@ -69,19 +63,36 @@ def test_variables_are_described_in_the_terms_of_the_vehicle(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_no_description_has_a_number_without_its_source(name: str) -> None:
-    described = [v.description for v in variables(rov_fmu.load(name).rov)]
+def test_only_the_vehicle_of_the_paper_cites_the_paper(name: str) -> None:
+    described = [v.description for v in variables(rov_fmu.load(name))]
     assert all(re.findall(r"(?<=, )\(\d+\w?\)", text) == [] for text in described)
     with_number = [text for text in described if re.search(r"equations? \(\d", text)]
-    assert with_number
     assert all("of Enevoldsen et al. 2018" in text for text in with_number)
+    assert bool(with_number) == name.startswith("videoray")
+    assert any("Enevoldsen" in text for text in described) == name.startswith("videoray")
+
+
+def test_angles_are_shown_in_degrees_and_only_shares_in_percent() -> None:
+    shown = {v.name: v.display_unit for v in variables(SIX)}
+    expected: dict[str, str | None] = dict.fromkeys(("phi", "theta", "psi", "phi_0", "theta_0", "psi_0"), "deg")
+    expected |= dict.fromkeys((*QUATERNION, "alpha_u", "c_0_t200", "x", "X_ext", "F_a", "a_d_u"))
+    expected |= {"u_a": "%", "u": "knot", "V_N": "knot", "r": "deg/s", "der(x)": "knot"}
+    assert {name: shown[name] for name in expected} == expected
+    (late,) = (v for v in variables(_with_dead_time()) if v.name == "delayed_u_a")
+    assert (late.unit, late.display_unit) == ("1", "%")
+
+
+def _with_dead_time() -> Vehicle:
+    """Return the vehicle SIX with a dead time."""
+    return Vehicle(replace(SIX.layout, has_dead_time=True), {**SIX.coefficients, "T_d": 0.1})
 
 
 def test_another_source_of_a_curve_is_kept() -> None:
-    assert [cited("(9)"), cited("(18a)"), cited("the maker's table")] == [
-        "equation (9) of Enevoldsen et al. 2018",
-        "equation (18a) of Enevoldsen et al. 2018",
-        "the maker's table",
+    assert [cited("(9)"), cited("(18a)"), cited("the maker's table"), cited("")] == [
+        ", equation (9) of Enevoldsen et al. 2018",
+        ", equation (18a) of Enevoldsen et al. 2018",
+        ", the maker's table",
+        "",
     ]
 
 
@@ -184,8 +195,7 @@ def test_a_pulse_width_stands_for_a_fraction_on_each_side_of_neutral(pulse: floa
 def test_the_thrust_of_a_thruster_is_described_as_its_share_of_the_curve(together: int, share: str) -> None:
     thrusters = (Thruster("a", "c", (-0.6, 0.8, 1e-9)),)
     layout = replace(_layout(*thrusters), curves=(Curve("c", ("a_t", "b_t", "d"), together),))
-    place = f"Thrust F_a: thruster a{share}, in water at rest, positive astern and to starboard"
-    words = f"{place}, equation (2) of Enevoldsen et al. 2018"
+    words = f"Thrust F_a: thruster a{share}, in water at rest, positive astern and to starboard"
     assert layout.calculated["F_a"].description == words
 
 

@@ -23,9 +23,8 @@ from rov_fmu.engine.source import sources
 from rov_fmu.io.paths import FMU_SRC
 from rov_fmu.model.equation import equation_of
 from rov_fmu.model.layout import Layout
-from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.geometry import check_part_names
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS, random_inputs, random_state
 
 Toml = dict[str, Any]
@@ -148,19 +147,19 @@ def renamed(data: Toml, names: Names) -> Toml:
     return data
 
 
-def load(data: Toml, folder: Path) -> Rov:
+def load(data: Toml, folder: Path) -> Vehicle:
     """Return the vehicle of a file."""
     for table in ("thrust_12_v.csv", "thrust_16_v.csv"):
         shutil.copy(THRUST_EFFECTS.with_name(table), folder)
     path = folder / "vehicle.toml"
     path.write_text(tomlkit.dumps(data), encoding="utf-8")
-    return load_vehicle(path).rov
+    return load_vehicle(path)
 
 
 # ---- Equal motion ----------------------------------------------------------------------------------------------------
 
 
-def check_c(plain: Rov, other: Rov) -> None:
+def check_c(plain: Vehicle, other: Vehicle) -> None:
     """Check that the C of two vehicles differs in names only, and that different names stay different.
 
     A new name must not be a word of the C sources, because it could have another meaning there.
@@ -175,7 +174,7 @@ def check_c(plain: Rov, other: Rov) -> None:
     assert not {renamed_word for word, renamed_word in new.items() if renamed_word != word} & FIXED
 
 
-def check_python(rng: random.Random, plain: Rov, other: Rov) -> None:
+def check_python(rng: random.Random, plain: Vehicle, other: Vehicle) -> None:
     """Check that two vehicles move equally to the last bit, with equal derivatives, and equal V_ss and Tau."""
     pair = plain, other
     inputs, state = random_inputs(rng, plain), random_state(rng, plain)
@@ -187,7 +186,7 @@ def check_python(rng: random.Random, plain: Rov, other: Rov) -> None:
         for rov in pair
     ]
 
-    def same(numbers: Callable[[Rov, dict[str, float], dict[str, float]], Iterable[float]]) -> None:
+    def same(numbers: Callable[[Vehicle, dict[str, float], dict[str, float]], Iterable[float]]) -> None:
         one, two = (np.array([*numbers(rov, *values)]) for rov, values in zip(pair, named, strict=True))
         assert np.array_equal(one, two, equal_nan=True)
 
@@ -196,7 +195,7 @@ def check_python(rng: random.Random, plain: Rov, other: Rov) -> None:
     same(lambda rov, inputs, state: rov.derivatives(inputs, state).values())
     same(lambda rov, inputs, state: rov.step(inputs, state, h).values())
 
-    def jacobian(rov: Rov, inputs: dict[str, float], state: dict[str, float]) -> Iterable[float]:
+    def jacobian(rov: Vehicle, inputs: dict[str, float], state: dict[str, float]) -> Iterable[float]:
         found = step_jacobian(rov, inputs, state, h, [*rov.layout.coefficients])
         return [*found.after.values(), *np.hstack([found.states, found.inputs, found.coefficients]).flat]
 
@@ -205,7 +204,7 @@ def check_python(rng: random.Random, plain: Rov, other: Rov) -> None:
     same(lambda rov, *_: [x for axis in driven for c in (0.4, -0.7) for x in rov.response(axis, c)])
 
 
-def check_engine(rng: random.Random, plain: Rov, other: Rov) -> None:
+def check_engine(rng: random.Random, plain: Vehicle, other: Vehicle) -> None:
     """Check that the FMU's C moves two vehicles equally to the last bit."""
     inputs = random_inputs(rng, plain)
     found = [
@@ -215,11 +214,11 @@ def check_engine(rng: random.Random, plain: Rov, other: Rov) -> None:
     assert np.array_equal(found[0].values, found[1].values, equal_nan=True)
 
 
-Check = Callable[[random.Random, Rov, Rov], None]
+Check = Callable[[random.Random, Vehicle, Vehicle], None]
 IN_TEXT: tuple[Check, ...] = (lambda _, plain, other: check_c(plain, other), check_python)
 
 
-def check_renamed(rng: random.Random, data: Toml, names: Names, folder: Path, checks: Iterable[Check]) -> Rov:
+def check_renamed(rng: random.Random, data: Toml, names: Names, folder: Path, checks: Iterable[Check]) -> Vehicle:
     """Check that a renamed vehicle moves as before, and return it."""
     plain, other = load(data, folder), load(renamed(data, names), folder)
     assert [*other.coefficients] == [*other.layout.coefficients]

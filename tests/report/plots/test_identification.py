@@ -8,14 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
+from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.result import Prediction
-from rov_fmu.model.layout import HEAVE, SURGE, YAW
-from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_prediction
+from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
 from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.report.results import example, prediction
+from tests.report.results import FILES, example, log, prediction
 
 
 def lines(ax: Axes) -> dict[str, tuple[list[float], list[float]]]:
@@ -47,7 +48,7 @@ def test_a_prediction_has_its_measured_and_predicted_values_and_the_band() -> No
     ax = drawn(p)
     shown = lines(ax)
     assert shown["measured"][1] == pytest.approx(p.measured[:: len(p.time) // 400].tolist())
-    assert shown["predicted"][1] == pytest.approx(p.predicted[:: len(p.time) // 400].tolist())
+    assert shown["predicted, with 95 % band"][1] == pytest.approx(p.predicted[:: len(p.time) // 400].tolist())
     (band,) = bands(ax)
     assert band[:, 1].max() == pytest.approx((p.predicted + 1.96 * p.deviation).max(), rel=1e-3)
     assert band[:, 1].min() == pytest.approx((p.predicted - 1.96 * p.deviation).min(), rel=1e-3)
@@ -66,35 +67,63 @@ def test_no_more_samples_are_drawn_than_can_be_seen() -> None:
     many = (np.repeat(part, 20) for part in (p.time, p.measured, p.predicted, p.deviation))
     time, measured, predicted, deviation = many
     ax = drawn(replace(p, time=time, measured=measured, predicted=predicted, deviation=deviation))
-    assert 350 < len(lines(ax)["predicted"][0]) < 450
+    assert 350 < len(lines(ax)["predicted, with 95 % band"][0]) < 450
+
+
+def test_a_prediction_has_the_compared_one_and_knots_beside_metres_per_second() -> None:
+    p = prediction(SURGE, "surge velocity")
+    ax = drawn(replace(p, compared=p.predicted + 1.0))
+    assert lines(ax)["compared"][1] == pytest.approx((p.predicted + 1.0)[:: len(p.time) // 400].tolist())
+    (knots,) = ax.child_axes
+    assert knots.get_ylabel() == "knots"
+    ax.set_ylim(0.0, 1852.0 / 3600.0)
+    ax.figure.draw_without_rendering()  # type: ignore[union-attr]
+    assert knots.get_ylim() == pytest.approx((0.0, 1.0))
+    assert not drawn(prediction(HEAVE, "depth")).child_axes
+
+
+def test_the_large_picture_has_a_panel_for_each_axis_and_one_for_all_commands() -> None:
+    shown = [result.predictions[0] for result in example().axes]
+    figure = Figure()
+    plot_overview(figure, shown, log(FILES[1], full=0.5))
+    assert [ax.get_title(loc="left") for ax in figure.axes] == [
+        "Distance (m)",
+        "Depth (m)",
+        "Heading (°)",
+        "Commands (%)",
+    ]
+    time, commands = lines(figure.axes[-1])["u_t"]
+    assert (time[0], time[-1]) == (shown[0].time[0], shown[0].time[-1])
+    assert set(commands) == {50.0, 100.0}
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert legend == ["measured", "predicted, with 95 % band"]
 
 
 # ---- Over the command ------------------------------------------------------------------------------------------------
 
 
 def test_answers_have_a_curve_and_a_band_for_each_direction_and_the_measured_points() -> None:
-    results = replace(example(), against=load_vehicle(VIDEORAY))
-    surge, *_ = results.axes
+    other = load_vehicle(VIDEORAY)
+    surge = replace(example().axes[0], compared=answers_of_file(other, SURGE))
     figure = Figure()
-    plot_answers(figure, results, surge, "V_ss")
+    plot_answers(figure, surge, "V_ss")
     (ax,) = figure.axes
-    assert len(bands(ax)) == 2
-    commands, values = lines(ax)["model"]
-    assert commands == pytest.approx([-70, -50, -30, -10])
-    assert values == pytest.approx([-0.7, -0.5, -0.3, -0.1])
+    assert len(bands(ax)) == 4
+    commands, values = lines(ax)["this fit, with 95 % band"]
+    assert commands == pytest.approx([-100, -50, -30])
+    assert values == pytest.approx([-1.0, -0.5, -0.3])
     assert lines(ax)["measured"] == ([30.0, 50.0], [0.29, 0.51])
-    other = load_vehicle(VIDEORAY).rov.response(SURGE, 0.7)[0]
-    assert lines(ax)["compared"][1][-1] == pytest.approx(other)
-    assert ax.get_title(loc="left") == "$V_{ss}$ (m/s)"
+    assert lines(ax)["compared"][1][0] == pytest.approx(other.response(SURGE, -1.0)[0])
+    assert ax.get_title(loc="left") == "Steady velocity (m/s)"
 
 
 def test_tau_is_in_seconds_and_points_that_do_not_count_are_hollow() -> None:
     yaw = example().axes[2]
     figure = Figure()
-    plot_answers(figure, example(), yaw, "Tau")
+    plot_answers(figure, yaw, "Tau")
     (ax,) = figure.axes
-    assert ax.get_title(loc="left") == "$Tau$ (s)"
-    (point,) = [line for line in ax.lines if line.get_label() == "not counted"]
+    assert ax.get_title(loc="left") == "Time to 63 % (s)"
+    (point,) = [line for line in ax.lines if line.get_label() == "measured, not counted"]
     assert point.get_markerfacecolor() == "none"
     assert "measured" not in lines(ax)
     assert "compared" not in lines(ax)
@@ -102,16 +131,16 @@ def test_tau_is_in_seconds_and_points_that_do_not_count_are_hollow() -> None:
 
 def test_the_band_of_yaw_is_in_degrees_per_second() -> None:
     figure = Figure()
-    plot_answers(figure, example(), example().axes[2], "V_ss")
+    plot_answers(figure, example().axes[2], "V_ss")
     (ax,) = figure.axes
-    assert max(band[:, 1].max() for band in bands(ax)) == pytest.approx(63.0 * 1.3)
+    assert max(band[:, 1].max() for band in bands(ax)) == pytest.approx(90.0 * 1.3)
 
 
 def test_forces_stand_in_the_order_of_the_command() -> None:
     figure = Figure()
     plot_forces(figure, example().forces[::-1])
     (ax,) = figure.axes
-    commands, values = lines(ax)["model"]
+    commands, values = lines(ax)["this fit"]
     assert commands == pytest.approx([20, 40, 60])
     assert values == pytest.approx([2.1, 4.2, 6.3])
     assert [line.get_color() for line in ax.lines] == [LIGHT["blue"], LIGHT["orange"], LIGHT["orange"]]

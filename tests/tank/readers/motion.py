@@ -11,7 +11,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.tank.logs import Read, commanded, measured, used
 
-BLUEROV2: Layout = load_vehicle(SHIPPED["bluerov2"]).rov.layout
+BLUEROV2: Layout = load_vehicle(SHIPPED["bluerov2"]).layout
 TIME: Array = np.linspace(0.0, 9.9, 100)
 COMMAND: Array = np.where(TIME > 0.95, 0.25, 0.0)
 THRUSTERS = {"1": COMMAND, "2": -COMMAND, "3": 0.5 * COMMAND, "4": COMMAND, "5": 2.0 * COMMAND, "6": 1.6 * COMMAND}

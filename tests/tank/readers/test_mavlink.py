@@ -13,7 +13,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, Layout
+from rov_fmu.model.catalogue import HEAVE
+from rov_fmu.model.layout import Layout
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -28,7 +29,7 @@ N = 60
 
 @pytest.fixture(scope="module")
 def bluerov2() -> Layout:
-    return load_vehicle(SHIPPED["bluerov2"]).rov.layout
+    return load_vehicle(SHIPPED["bluerov2"]).layout
 
 
 def pulse(command: float) -> int:

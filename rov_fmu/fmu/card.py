@@ -1,0 +1,102 @@
+"""The model card of a vehicle: what it is, from which data, where it holds, how far to trust it, what it leaves out.
+
+It is made from the vehicle file alone, and is the same in the FMU's page, in the report of an identification, in the
+file documentation/model_card.txt, and in the annotations of modelDescription.xml.
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import chain
+from textwrap import fill
+
+from rov_fmu.io.messages import listed
+from rov_fmu.model.forces import EXPECTED, effects_of
+from rov_fmu.model.layout import Layout
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
+_WIDTH = 100
+"""The width of the card as text, in characters."""
+
+
+def card(vehicle: Vehicle) -> dict[str, list[str]]:
+    """Return the paragraphs of the card by their headings."""
+    low, high = vehicle.command_range
+    made = vehicle.provenance
+    data = [f"Source of the coefficients: {vehicle.source}."]
+    trust = ["No errors on unseen data are known: the vehicle file does not say how it was identified."]
+    holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
+    holds += [
+        f"The {thrust} is negative below {c:.0%}." for thrust, c in reversing(vehicle.layout, vehicle.coefficients)
+    ]
+    if made:
+        data.append(f"Identified from {vehicle.measured_from} by {made.tool}: {made.method}.")
+        data += [f"{name}: SHA-256 {digest}" for name, digest in made.inputs.items()]
+        trust = [*made.verdicts, *(f"Unseen data: {error}." for error in made.errors)]
+        trust += [f"Open: {warning}." for warning in made.warnings] or ["There are no warnings."]
+        holds += [f"Tested: {quantity}." for quantity in made.tested]
+    return {
+        "What it is": [f"{vehicle.name}, version {vehicle.version}. {vehicle.summary}."],
+        "From which data": data,
+        "Where it holds": holds,
+        "How far to trust it": trust,
+        "What it leaves out": [*_left_out(vehicle.layout), *vehicle.limits],
+    }
+
+
+def card_text(vehicle: Vehicle) -> str:
+    """Return the card as plain text."""
+    lines = [f"Model card of {vehicle.name}"]
+    for heading, paragraphs in card(vehicle).items():
+        lines += ["", heading]
+        lines += [fill(f"- {one}", _WIDTH, subsequent_indent="  ", break_long_words=False) for one in paragraphs]
+    return "\n".join(lines) + "\n"
+
+
+def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:
+    """Yield the thrust curves that push backward at small commands, and the command at which they change sign."""
+    for curve in layout.curves:
+        for end, words in (("", ""), ("_reverse", " in reverse")):
+            a, b = (values.get(curve.coefficient(key + end), 0.0) for key in ("a_t", "b_t"))
+            if b < 0.0 < a and f"a_t{end}" in curve.keys:
+                dead = values.get(curve.coefficient("c_0" + end), 0.0) if "c_0" in curve.keys else 0.0
+                yield f"{curve.name} thrust{words}", dead - b / a
+
+
+def _left_out(layout: Layout) -> Iterator[str]:
+    """Yield what the equation of the vehicle lacks, in sentences."""
+    keys = {*chain.from_iterable(one.keys for one in layout.axes), *chain.from_iterable(c.keys for c in layout.curves)}
+    if not layout.coupled and len(layout.axes) > 1 and not layout.cross:
+        yield "Coupling between the axes."
+    if missing := [name for name in _AXES if name not in layout.kinds]:
+        drifts = {"surge", "yaw"} <= layout.kinds.keys() and "sway" in missing
+        yield f"{', '.join(missing).capitalize()}.{' The vehicle does not drift outward in a turn.' if drifts else ''}"
+    if same := _mirrored(layout):
+        yield f"What differs between the two directions of {same}."
+    effects = effects_of(layout)
+    if some := [effect.missed for effect in EXPECTED if effect not in effects]:
+        yield f"Thrusters as machines: there is no {listed(some, 'or')}."
+    static = [
+        "" if "m_a" in keys else "added mass",
+        "static drag",
+        "" if layout.has_dead_time else "a delay at the start",
+    ]
+    yield f"As terms of their own: {listed(filter(None, static))}; β < 1 stands for a slow start."
+    if "heave" in layout.kinds and not layout.restoring:
+        load = "Beyond the constant load F_0_w, buoyancy" if "F_0_w" in layout.coefficients else "Buoyancy"
+        yield f"{load} is neutral."
+    yield "The tether pulls at nothing unless it is connected as loads."
+    yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.kinds else ''}"
+    level = "" if layout.has_attitude else ", horizontal"
+    yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
+
+
+def _mirrored(layout: Layout) -> str:
+    """Return, in words, which thrust curves and axes behave in reverse as forward."""
+    curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
+    axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
+    found = []
+    if curves:
+        found.append("thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}")
+    if axes:
+        found.append("drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}")
+    return " and ".join(found)

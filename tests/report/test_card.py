@@ -1,0 +1,89 @@
+"""The model card: one source, which the page, a text file and the annotations of the FMU share."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from lxml import etree, html
+
+from rov_fmu.fmu.archive import Content, native_content, python_content
+from rov_fmu.fmu.card import card, card_text
+from rov_fmu.report.page.fmu_page import documentation
+from rov_fmu.report.templates import sentence
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.report.pages import text_of, unfolded
+from tests.report.results import example
+
+MOST_WORDS = 1200
+"""The most words of the FMU's page that are not folded."""
+
+
+def test_the_card_of_an_identified_vehicle_has_its_data_ranges_verdicts_and_errors() -> None:
+    vehicle = example().vehicle
+    made = vehicle.provenance
+    assert made
+    made = made.model_copy(update={"inputs": {"log_1.csv": "1" * 64}})
+    found = card(replace(vehicle, provenance=made, limits=("It leaks.",)))
+    assert [*found] == ["What it is", "From which data", "Where it holds", "How far to trust it", "What it leaves out"]
+    assert found["What it is"] == ["Tadpole, version 1. A small ROV that exists only in tests."]
+    assert found["From which data"][-1] == "log_1.csv: SHA-256 " + "1" * 64
+    assert found["Where it holds"][0] == "Commands of 20% to 70%; beyond them the thrust curves extrapolate."
+    assert "Tested: depth: -1.0 to 1.0 m." in found["Where it holds"]
+    trust = found["How far to trust it"]
+    assert trust[:3] == [*made.verdicts]
+    assert trust[3:6] == [f"Unseen data: {error}." for error in made.errors]
+    assert trust[6:] == [f"Open: {warning}." for warning in made.warnings]
+    assert found["What it leaves out"][-1] == "It leaks."
+    assert "Sway, pitch, roll. The vehicle does not drift outward in a turn." in found["What it leaves out"]
+
+
+def test_the_card_of_a_vehicle_by_hand_claims_no_errors(vehicle: Vehicle) -> None:
+    assert card(vehicle)["How far to trust it"] == [
+        "No errors on unseen data are known: the vehicle file does not say how it was identified."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content_of", "path"),
+    [
+        (native_content, "fmi:VendorAnnotations/Tool/ModelCard"),
+        (lambda vehicle: native_content(vehicle, fmi=3), "fmi:Annotations/Annotation"),
+        (python_content, "fmi:VendorAnnotations/Tool/ModelCard"),
+    ],
+)
+def test_the_description_of_the_fmu_contains_the_card(
+    vehicle: Vehicle, content_of: Callable[..., Content], path: str
+) -> None:
+    odd = replace(vehicle, limits=("Less than <1> & more",))
+    root = etree.fromstring(content_of(odd).files["modelDescription.xml"])
+    (found,) = root.findall(path.removeprefix("fmi:"))
+    assert found.text == card_text(odd)
+    assert "Less than <1> & more" in found.text
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_page_and_text_file_have_the_card_and_little_of_the_page_is_unfolded(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing: dict[str, Any] = {"inline_svg": lambda *_, **__: "", "pictures": lambda _: {}}
+    for function, value in nothing.items():
+        monkeypatch.setattr(f"rov_fmu.report.page.fmu_page.{function}", value)
+    vehicle = load_vehicle(SHIPPED[name])
+    files = documentation(vehicle, native=True)
+    text = " ".join(files["documentation/model_card.txt"].decode().split())
+    page = files["documentation/index.html"].decode()
+    shown = unfolded(page)
+    for heading, paragraphs in card(vehicle).items():
+        assert heading in shown
+        for one in paragraphs:
+            assert f"- {' '.join(one.split())}" in text
+            assert " ".join(sentence(one).split()) in shown
+    words = len(shown.split())
+    assert 300 < words <= MOST_WORDS
+    assert len(text_of(page).split()) > 2.0 * words
+    h2 = [h2.text_content() for h2 in html.fromstring(page).iter("h2") if h2.getparent().tag != "summary"]
+    assert h2[:2] == ["How to drive it", "Model card"]
+    assert re.search(r"V<sub>ss</sub>", page)
