@@ -324,13 +324,13 @@ def _simulate(
     from rov_fmu.interface.model import load
     from rov_fmu.interface.simulate_command import (
         check_outputs,
-        is_mcap,
         moves,
         print_final,
         run,
         title,
         write_results,
     )
+    from rov_fmu.io.file_kinds import is_mcap
     from rov_fmu.report.console import print_end
 
     opens = plot == Path()
@@ -463,8 +463,8 @@ def _open(path: Path, option: str) -> None:
     "--log",
     type=_FILE,
     metavar="LOG.csv",
-    help="Log to write, which identify reads. If the autopilot is restarted, the next log is LOG_2.csv, or the next "
-    "free name. A run writes at most 20 logs, and at most 1,000,000 rows in all.",
+    help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. If the autopilot is restarted, the "
+    "next log is LOG_2.csv, or the next free name. A run writes at most 20 logs, and at most 1,000,000 rows in all.",
 )
 @click.option("--force", is_flag=True, help="Replace logs that exist, also those with a number in their name.")
 @click.option(

@@ -12,10 +12,13 @@ from socket import socket
 from time import monotonic, thread_time
 from typing import Any
 
+import numpy as np
+
 from rov_fmu.bridges.sitl_frames import Servos
 from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.engine.stepper import Stepper
 from rov_fmu.io.csv_table import NO_OUTPUT, pulses
+from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
@@ -64,7 +67,7 @@ class Setup:
     bottom: float = inf
     """The depth of the bottom, m."""
     log: Path | None = None
-    """The log to write (CSV). Later flights add a number to its name."""
+    """The log to write: a table (CSV) that `identify` reads, or MCAP. Later flights add a number to its name."""
     log_interval: float = 0.1
     """The time between two rows of the log, s."""
     force: bool = False
@@ -72,16 +75,20 @@ class Setup:
 
 
 class Log:
-    """A log of one flight in the form that `identify` reads: commands, velocities over ground, depth and angles.
+    """A log of one flight: a table in the form that `identify` reads, or MCAP with the variables of the FMU.
 
-    A row holds the motion at its time, and the mean commands up to the next row.
+    The table has commands, velocities over ground, depth and angles. A row holds the motion at its time, and the mean
+    commands up to the next row.
     """
 
     def __init__(self, setup: Setup, most_rows: int) -> None:
         """Begin a log, whose rows end after the first `most_rows`."""
         layout = setup.vehicle.layout
         self._interval, self._most_rows = setup.log_interval, most_rows
+        self._vehicle = setup.vehicle
         self._motion = [title for title, axis in _LOGGED.items() if layout.has(axis)]
+        if is_mcap(setup.log):
+            self._motion = [*layout.state, *layout.calculated]
         self._titles = ["time [s]", *(f"{name} [1]" for name in layout.commands), *self._motion]
         self._rows = array("d")
         self._row: list[float] = []
@@ -105,12 +112,25 @@ class Log:
         return len(self._rows) // len(self._titles)
 
     def write(self, path: Path) -> None:
-        """Write all complete rows. Raises WriteError."""
+        """Write all complete rows. Raises WriteError, and InputError where foxglove-sdk is not installed."""
+        if is_mcap(path):
+            write_whole(Output(path, self._mcap()))
+            return
         text, width = StringIO(), len(self._titles)
         print(*self._titles, sep=",", file=text)
         for first in range(0, len(self._rows), width):
             print(*(f"{value:.9g}" for value in self._rows[first : first + width]), sep=",", file=text)
         write_whole(Output(path, text.getvalue().encode()))
+
+    def _mcap(self) -> bytes:
+        """Return all complete rows as the content of an MCAP file."""
+        from rov_fmu.bridges.mcap import motion_mcap  # imports SciPy, which most flights do not need
+
+        layout = self._vehicle.layout
+        time, *columns = np.array(self._rows).reshape(self.rows, len(self._titles)).T
+        values = dict(zip([*layout.commands, *self._motion], columns, strict=True))
+        command_of = np.vectorize(layout.command_of, otypes=[np.float64])
+        return motion_mcap(self._vehicle, time, values | {name: command_of(values[name]) for name in layout.commands})
 
 
 class Flight:
@@ -121,6 +141,8 @@ class Flight:
         self._setup, layout = setup, setup.vehicle.layout
         self._names = [name for name in _MOTION if name in layout.state or name in layout.angles]
         self._names += [f"der({name})" for name in _RATES if name in layout.state]
+        if is_mcap(setup.log):
+            self._names += [name for name in (*layout.state, *layout.calculated) if name not in self._names]
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self._held = {**layout.usual_inputs, **setup.start}
@@ -157,7 +179,7 @@ class Flight:
         if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
             values["battery"] = battery
         if self.log:
-            self.log.add(h, fractions, self.time, motion)
+            self.log.add(h, fractions, self.time, at | motion)
         return reply(values)
 
     def _fraction(self, pulse: int) -> float:

@@ -11,6 +11,7 @@ from rov_fmu.interface.arguments import STEP, TIME, Array, result_times
 from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
+from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, one_line, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.model.layout import Layout
@@ -151,11 +152,6 @@ def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None)
     """Return the title of a plot: the vehicle, and what the options set."""
     given = [*([f"commands of {shell_words(commands.name)}"] if commands else []), *map(one_line, settings)]
     return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
-
-
-def is_mcap(path: Path | None) -> bool:
-    """Return True if a result is to be written as MCAP."""
-    return path is not None and path.suffix.lower() == ".mcap"
 
 
 def write_results(vehicle: VehicleModel, result: Result, table: Path | None, plot: Path | None, title: str) -> None:

@@ -14,6 +14,7 @@ from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings
+from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
@@ -65,7 +66,8 @@ def serve(path: Path, options: Options) -> None:
             connection.write_log()
             paragraph(console(), _summary(connection))
             if connection.logs:
-                print_end(connection.logs, shell_words("rov-fmu", "identify", "--inspect", connection.logs[0]))
+                inspect = shell_words("rov-fmu", "identify", "--inspect", connection.logs[0])
+                print_end(connection.logs, "open it in Foxglove or PlotJuggler" if is_mcap(options.log) else inspect)
             elif options.log:
                 paragraph(console(), "No log was written, because no row was complete.")
 
@@ -75,8 +77,8 @@ def serve(path: Path, options: Options) -> None:
 
 def _setup(path: Path, options: Options) -> Setup:
     """Return the setup of a flight. Raises FileError, InputError, WriteError."""
-    if options.log and options.log.suffix.lower() != ".csv":
-        raise InputError(f"--log {options.log}: the name must end with .csv")
+    if options.log and options.log.suffix.lower() not in (".csv", ".mcap"):
+        raise InputError(f"--log {options.log}: the name must end with .csv or .mcap")
     if options.frame is not None and options.frame not in FRAMES:
         hint = did_you_mean(options.frame, FRAMES)
         raise InputError(f"--frame {shown(options.frame)}: must be one of {', '.join(FRAMES)}{hint}")

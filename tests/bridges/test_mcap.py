@@ -18,6 +18,9 @@ from mcap_protobuf.decoder import DecoderFactory
 import rov_fmu
 from rov_fmu.bridges.mcap import motion_mcap, poses
 from rov_fmu.bridges.mcap_logs import identification_mcap
+from rov_fmu.bridges.sitl import Flight, Setup
+from rov_fmu.bridges.sitl_frames import servos_of
+from rov_fmu.bridges.sitl_protocol import ServoPacket
 from rov_fmu.cli import main
 from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
@@ -221,6 +224,26 @@ def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "must end with .mcap" in refusal
     assert main(["identify", str(folder), "--mcap", str(tmp_path / "logs.mcap")]) == 0
     assert make_reader(BytesIO((tmp_path / "logs.mcap").read_bytes())).get_header()
+
+
+def test_a_flight_with_ardusub_is_a_motion(heavy: VehicleModel, tmp_path: Path) -> None:
+    """The log of a flight has the pulses of ArduSub as commands, and the motion that they cause."""
+    setup = Setup(heavy, servos_of(heavy.layout, None, {}), log=tmp_path / "flight.mcap", log_interval=0.1)
+    flight = Flight(setup, 1000)
+    for count in range(401):
+        flight.step(ServoPacket(100, count, (1700, 1300) + (1500,) * 14))
+    assert flight.log
+    flight.log.write(tmp_path / "flight.mcap")
+    found = messages((tmp_path / "flight.mcap").read_bytes())
+    assert found["/inputs"][0][1]["u_1"] == pytest.approx(0.5)
+    assert found["/inputs"][0][1]["u_2"] == pytest.approx(-0.5)
+    times = np.array([stamp for stamp, _ in found["/outputs"]]) * 1e-9
+    assert np.diff(times) == pytest.approx(0.1)
+    pushed = {"u_1": 0.5, "u_2": -0.5}
+    expected = heavy.simulate([0.0, *times], pushed)
+    for name in ("u", "r", "F_1"):
+        values = [row[name] for _, row in found["/outputs"]]
+        assert values == pytest.approx(expected[name][1:], abs=1e-9)
 
 
 def test_layouts(heavy: VehicleModel) -> None:

@@ -439,7 +439,7 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
         (["videoray", "--servo", "1=t", "--servo", "1=l"], "--servo 1=l: servo 1 is given before"),
         (["videoray", "--set", "u_l=0.5"], "--set u_l: servo 2 drives this input"),
         (["videoray", "--set", "V_X=0.5"], "--set V_X=0.5: the vehicle has no such"),
-        (["videoray", "--log", "a.txt"], "--log a.txt: the name must end with .csv"),
+        (["videoray", "--log", "a.txt"], "--log a.txt: the name must end with .csv or .mcap"),
         (["videoray", "--host", "192.0.2.1"], "--host 192.0.2.1, --port 9002: cannot listen there"),
         (["videoray", "--bottom", "x"], "Invalid value for '--bottom': 'x' must be a number"),
         ([str(ROOT / "verification" / "fuzzing" / "bare.toml")], "VEHICLE: none of ArduSub's frames"),
