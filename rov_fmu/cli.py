@@ -464,7 +464,7 @@ def _open(path: Path, option: str) -> None:
     type=_FILE,
     metavar="LOG.csv",
     help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. If the autopilot is restarted, "
-    "the next log is LOG_2.csv, or the next free name. A run writes at most 20 logs, and at most 1,000,000 rows in all.",
+    "the next log is LOG_2.csv, or the next free name. A run writes at most 20 logs, and 1,000,000 rows in all.",
 )
 @click.option("--force", is_flag=True, help="Replace logs that exist, also those with a number in their name.")
 @click.option(
