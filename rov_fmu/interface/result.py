@@ -172,7 +172,7 @@ class Result(Mapping[str, Array]):
             panel.set_title(in_words(quantity, unit), loc="left")
             if unit == "m/s":
                 add_knots(panel)
-            panel.legend(loc="center left", bbox_to_anchor=(1.13, 0.5))
+            panel.legend(loc="center left", bbox_to_anchor=(1.16, 0.5))
         if commands:
             draw_commands(axes[-1], self.time, commands, self.command_unit)
         axes[-1].set_xlabel("time (s)")
