@@ -27,7 +27,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
 
-SIZES = {"diagram": 8_600, "icon": 3_000, "signal": 500}
+SIZES = {"diagram": 9_000, "icon": 3_000, "signal": 500}
 
 
 @cache
