@@ -51,7 +51,9 @@ class Plot {
       const panel = JSON.parse(/** @type {HTMLElement} */ (group).dataset.plot ?? "");
       return { ...panel, group, lines: this.lines(group), ticks: group.querySelector('[data-plot*="ticks"]') };
     });
-    [this.low, this.high] = this.panels[0].x;
+    const [low, high] = this.panels[0].x;
+    this.low = low;
+    this.high = high;
     /** @type {number | null} */
     this.from = null;
     this.cursor = draw(svg, "path", { stroke: "var(--muted)", "stroke-width": 0.8, fill: "none" });
@@ -109,8 +111,16 @@ class Plot {
     const selects = at !== null && this.from !== null;
     const [a, b] = selects ? [this.place(/** @type {number} */ (this.from)), this.place(at)] : [0, 0];
     this.selection.setAttribute("d", selects ? `M${a} ${top}H${b}V${bottom}H${a}Z` : "");
-    const lines = at === null ? [] : [`${first.along}: ${inDigits(at, this.high - this.low)}`, ...this.panels.map((panel) => this.read(panel, at)).filter(Boolean)];
-    this.values.replaceChildren(...lines.map((text) => Object.assign(document.createElement("span"), { textContent: text })));
+    const lines =
+      at === null
+        ? []
+        : [
+            `${first.along}: ${inDigits(at, this.high - this.low)}`,
+            ...this.panels.map((panel) => this.read(panel, at)).filter(Boolean),
+          ];
+    this.values.replaceChildren(
+      ...lines.map((text) => Object.assign(document.createElement("span"), { textContent: text })),
+    );
   }
 
   /** @param {Plot["panels"][number]} panel @param {number} at */
@@ -160,7 +170,7 @@ class Plot {
     for (const panel of this.panels) {
       const [left, , right, bottom] = panel.box;
       const factor = (most - least) / (high - low);
-      const shift = left - factor * (this.placeIn(panel, low));
+      const shift = left - factor * this.placeIn(panel, low);
       for (const shape of this.shapes(panel.group)) {
         if (isWhole) shape.removeAttribute("transform");
         else shape.setAttribute("transform", `matrix(${factor} 0 0 1 ${shift} 0)`);
@@ -174,7 +184,12 @@ class Plot {
         const x = left + ((value - low) / (high - low)) * (right - left);
         draw(own, "path", { d: `M${x} ${panel.box[1]}V${bottom}`, stroke: "var(--rule)", "stroke-width": 0.6 });
         if (!text) continue;
-        const label = draw(own, "text", { x, y: bottom + 13, "text-anchor": "middle", style: text.getAttribute("style") ?? "" });
+        const label = draw(own, "text", {
+          x,
+          y: bottom + 13,
+          "text-anchor": "middle",
+          style: text.getAttribute("style") ?? "",
+        });
         label.style.textAnchor = "middle";
         label.textContent = words;
       }
