@@ -21,7 +21,6 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.engine.simulation import Array
 from rov_fmu.io.messages import InputError
 from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.report.plots.drawing import place
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -206,6 +205,8 @@ def _picture(vehicle: Vehicle, shares: Mapping[str, float]) -> "SceneEntity":
 
 def hull_size(vehicle: Vehicle) -> Array:
     """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
+    from rov_fmu.report.plots.drawing import place  # imports Matplotlib, which takes a second
+
     corners = np.abs([place(vehicle, thruster) for thruster in vehicle.layout.thrusters])
     size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
     return size
@@ -214,6 +215,8 @@ def hull_size(vehicle: Vehicle) -> Array:
 def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iterator["ArrowPrimitive"]:
     """Yield the jets as arrows in the frame of the vehicle. An arrow of Foxglove points along its own x axis."""
     from foxglove.messages import ArrowPrimitive, Pose
+
+    from rov_fmu.report.plots.drawing import place
 
     for thruster in vehicle.layout.thrusters:
         share = shares.get(thruster.name, 0.0)

@@ -262,7 +262,7 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     have no width.
     """
     known = vehicle.uncertainty
-    drawn = known.drawn(Sobol(max(len(known.names), 1), rng=1).random(_DRAWS)[:, : len(known.names)])
+    drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     rovs = [vehicle, *(vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
     found = []
     for command in ANSWERED:

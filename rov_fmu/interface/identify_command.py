@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rov_fmu.bridges.mcap_logs import identification_mcap
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.result import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
@@ -56,6 +55,8 @@ def identify_folder(
     if vehicle:
         outputs.append(_vehicle_output(identification, vehicle, report))
     if mcap:
+        from rov_fmu.bridges.mcap_logs import identification_mcap
+
         outputs.append(Output(mcap, identification_mcap(identification)))
     write_whole(*outputs)
     return identification, replaced

@@ -149,24 +149,17 @@ static bool is_calm(const fmu *f, double h)
 
 /* ---- Axes alone ---- */
 
-/* Return the velocity at which drag balances the force. */
-static double equilibrium(double A, double B, double C)
-{
-    const double root = hypot(B, 2.0 * sqrt(A) * sqrt(fabs(C)));
-    return C == 0.0 ? 0.0 : 2.0 * C / (B + root);
-}
-
 /* Check that the velocity of an uncoupled axis moves towards its equilibrium and not beyond. Without force and drag it is
  * constant to the last bit. */
 static void check_velocity(const fmu *start, int a, double v)
 {
     const char *const name = VARIABLES[FIRST_STATE + a].name;
     const double v0 = start->now.values[FIRST_STATE + a];
-    double C[N_VELOCITIES], A[N_VELOCITIES], B[N_VELOCITIES], y[N_SERIES] = {0.0}, drag[N_SERIES];
-    model_alone(start->now.values, &start->numbers, C, A, B);
-    const double limit = equilibrium(A[a], B[a], C[a]);
+    double marks[N_VELOCITIES][2], y[N_SERIES] = {0.0}, drag[N_SERIES];
+    model_alone(start->now.values, &start->numbers, marks);
+    const double limit = marks[a][0]; /* V_ss, which is 0 without force, and infinite without drag */
     PROPERTY(isfinite(v), "%s is %g", name, v);
-    if (C[a] == 0.0) {
+    if (limit == 0.0) {
         y[a] = 1.0;
         sizes_at(start, y, v0 < 0.0, drag);
         PROPERTY(fabs(v) <= fabs(v0) && v * v0 >= 0.0, "%s without force: from %a to %a", name, v0, v);
