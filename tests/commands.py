@@ -56,7 +56,7 @@ COMMANDS = {
 
 def without_progress(err: str) -> str:
     """Return what a command printed on stderr, without the lines about parts and runs that are done."""
-    return re.sub(r"^rov-fmu: (?:.*: done in [\d.]+ s|(?:.*, )?[\d,]+/[\d,]+ runs.*)\n", "", err, flags=re.M)
+    return re.sub(r"^rov-fmu: .*(?:: done in [\d.]+ s|so far\)|[\d,]+/[\d,]+ runs, .*)\n", "", err, flags=re.M)
 
 
 _DRIVER = """

@@ -179,7 +179,8 @@ def _declared(model: type[Strict], place: _Place) -> Any:
 
 def _is_table(kind: Any) -> bool:
     """Return True for a type whose keys are declared."""
-    return isinstance(kind, type) and issubclass(kind, Strict)
+    is_class = isinstance(kind, type) and get_origin(kind) is None  # Python 3.10 takes list[str] for a class, too
+    return is_class and issubclass(kind, Strict)
 
 
 def _fields(kind: Any) -> dict[str, FieldInfo]:
