@@ -23,6 +23,8 @@ _LONG_WORDS = """() => {
   return changed;
 }"""
 """Replaces all text of a page by a long word, except the texts that are our own."""
+UNFOLD = "document.querySelectorAll('details').forEach((fold) => { fold.open = true; })"
+"""The script that opens everything that is folded on a page."""
 
 
 def check_breaks_long_words(page: str, path: Path, visit: Callable[..., Visit]) -> None:

@@ -25,7 +25,7 @@ from rov_fmu.fmu.variables import Variable, unit_of, variables
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.conftest import Visit
-from tests.report.pages import row_of
+from tests.report.pages import UNFOLD, row_of
 from tests.report.results import example
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def test_the_documentation_asks_for_nothing_and_fits(
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
     seen.page.wait_for_selector("#live-section:not([hidden])")
     assert axe.Axe().run(seen.page).response["violations"] == [], "folded"
-    seen.page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+    seen.page.evaluate(UNFOLD)
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     plots = seen.page.locator("svg:not(.live svg), img")
     assert plots.count() == 12

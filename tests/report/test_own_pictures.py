@@ -19,6 +19,7 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.report.conftest import Visit
+from tests.report.pages import UNFOLD
 
 Capsys = pytest.CaptureFixture[str]
 _OPEN = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 200 100"'
@@ -63,6 +64,7 @@ def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., 
     path = _page(tmp_path, HOSTILE[case])
     seen = visit()
     seen.page.goto(path.as_uri())
+    seen.page.evaluate(UNFOLD)
     picture = seen.page.get_by_alt_text("The vehicle from above")
     assert picture.evaluate("image => image.complete && image.naturalWidth > 0"), "it is shown"
     title = seen.page.title()
@@ -100,6 +102,7 @@ def test_the_shipped_pictures_are_seen_on_light_ground(
     path.write_text(documentation_page(load_vehicle(VIDEORAY)), encoding="utf-8")
     seen = visit(scheme=scheme)
     seen.page.goto(path.as_uri())
+    seen.page.evaluate(UNFOLD)
     pictures = seen.page.locator(".frames img")
     assert pictures.count() == 2
     for picture in pictures.all():

@@ -34,6 +34,7 @@ from rov_fmu.vehicle.writer import vehicle_output
 from tests.commands import TESTS
 from tests.report.conftest import Visit
 from tests.report.pages import (
+    UNFOLD,
     check_breaks_long_words,
     check_is_whole,
     check_refers_to_itself_alone,
@@ -499,7 +500,7 @@ def test_the_page_is_accessible_and_as_wide_as_the_screen(
     assert shown.page.evaluate("document.documentElement.scrollWidth") <= width
     found = axe.Axe().run(shown.page)
     assert not [(one["id"], one["nodes"][0]["html"]) for one in found.response["violations"]]
-    shown.page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+    shown.page.evaluate(UNFOLD)
     found = axe.Axe().run(shown.page)
     assert not [(one["id"], one["nodes"][0]["html"]) for one in found.response["violations"]]
     widths = shown.page.evaluate("[...document.querySelectorAll('.plots svg')].map((svg) => svg.clientWidth)")
