@@ -9,6 +9,7 @@ IMPORTED(cos) double cos(double x);
 IMPORTED(atan2) double atan2(double y, double x);
 IMPORTED(expm1) double expm1(double x);
 IMPORTED(atanh) double atanh(double x);
+IMPORTED(hypot) double hypot(double x, double y);
 IMPORTED(log) double log(double x);
 IMPORTED(pow) double pow(double x, double y);
 

@@ -42,7 +42,7 @@ def closed_form(A: Expression, B: Expression, C: Expression) -> dict[str, Expres
     D = Name("D")
     without_drag = where(equal(C, 0.0), 0.0, directed(C, inf, -inf))
     return {
-        "D": where(A < 0.0, 0.0, call("sqrt", B * B + 4.0 * A * call("abs", C))),
+        "D": where(A < 0.0, 0.0, call("hypot", B, 2.0 * call("sqrt", A) * call("sqrt", call("abs", C)))),
         "V_ss": where(D > 0.0, 2.0 * C / (B + D), without_drag),
         "Tau": where(D > 0.0, 2.0 * call("atanh", RISE / (1.0 + (1.0 / e) * (B / D))) / D, inf),
     }

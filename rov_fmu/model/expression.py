@@ -221,7 +221,7 @@ def plain(x: Expression) -> Expression:
 
 # ---- Printing --------------------------------------------------------------------------------------------------------
 
-FUNCTIONS = ("sin", "cos", "abs", "sqrt", "pow", "log", "atan2", "atanh")
+FUNCTIONS = ("sin", "cos", "abs", "sqrt", "hypot", "pow", "log", "atan2", "atanh")
 """The functions of expressions besides the thrust tables."""
 _RANK = {"if": 0, "or": 1, "and": 2, "<": 3, ">": 3, ">=": 3, "==": 3, "+": 4, "-": 4, "*": 5, "/": 5, "neg": 6}
 """How strongly operations bind."""

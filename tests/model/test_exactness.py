@@ -34,7 +34,7 @@ from tests.vehicles import (
 from verification.references import reference
 from verification.references.closed_form import Axis, axes
 
-VELOCITY, PATH = 1e-14, 1e-13
+VELOCITY, PATH = 2e-14, 1e-13
 """The allowed errors, relative to the largest velocity and to the length of the path."""
 LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
 EVERY = pytest.mark.parametrize("stride", [4, pytest.param(1, marks=LONG)])
