@@ -92,7 +92,7 @@ def test_the_velocity_approaches_the_steady_one_and_never_passes_it(case: Case, 
     A, B, C, v0, h = case
     V = steady_velocity(A, B, C)
     early, late = (step_alone(A, B, C, v0, time)[0] for time in (h, h * longer))
-    rounding = 4.0 * rounding_of_velocity(v0, early, late)
+    rounding = 2.0 * rounding_of_velocity(v0, early, late)
     low, high = min(v0, V) - rounding, max(v0, V) + rounding
     assert low <= early <= high
     assert low <= late <= high
