@@ -158,6 +158,7 @@ def _pose_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Contex
     positions, orientations = poses(values)
     forces = {t.name: values[f"F_{t.name}"] for t in vehicle.layout.thrusters if f"F_{t.name}" in values}
     strongest = max((float(np.nanmax(np.abs(force))) for force in forces.values()), default=0.0)
+    size = hull_size(vehicle)
     due = -1
 
     def write(n: int, stamp: int) -> None:
@@ -179,20 +180,19 @@ def _pose_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Contex
         )
         if stamp >= due:
             shares = {name: float(force[n]) / strongest if strongest else 0.0 for name, force in forces.items()}
-            scene.log(SceneUpdate(entities=[_picture(vehicle, shares)]), log_time=stamp)
+            scene.log(SceneUpdate(entities=[_picture(vehicle, size, shares)]), log_time=stamp)
             due = stamp + round(1e9 * _SCENE_INTERVAL)
 
     return write
 
 
-def _picture(vehicle: Vehicle, shares: Mapping[str, float]) -> "SceneEntity":
-    """Return a picture of the vehicle: a hull, and for each thruster its jet, which leaves against the force.
+def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "SceneEntity":
+    """Return a picture of the vehicle: a hull of some size, and for each thruster its jet against the force.
 
     `shares` are the forces relative to the strongest one.
     """
     from foxglove.messages import CubePrimitive, Pose, SceneEntity
 
-    size = hull_size(vehicle)
     middle = Pose(position=_vector(np.zeros(3)), orientation=_quaternion(Rotation.identity()))
     return SceneEntity(
         frame_id=BODY,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.result import Identification
-from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
+from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written, is_mcap
 from rov_fmu.io.messages import InputError, Progress
 from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
 from rov_fmu.vehicle.writer import check_report, vehicle_output
@@ -33,7 +33,7 @@ def identify_folder(
     replaced: list[str] = []
     if vehicle and report:
         check_report(vehicle, report)
-    if mcap and mcap.suffix.lower() != ".mcap":
+    if mcap and not is_mcap(mcap):
         raise InputError(f"--mcap {mcap}: the name must end with .mcap")
 
     def check_outputs(inputs: Sequence[Path]) -> None:

@@ -1,4 +1,4 @@
-"""One axis alone: V_ss and Tau in closed form, from the forces of forces.py (standard library only).
+"""One axis alone: V_ss and Tau in closed form, from the forces of forces.py.
 
 While the other axes are at rest, the vehicle is level and the thrust is steady, (18) is a scalar Riccati equation,
 
@@ -55,9 +55,10 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """
     equation = equation_of(layout)
     gain = equation.names("gain", velocity)
-    constant = (
-        [()] if layout.by_velocity[velocity].axis.is_rotation else [(), (entry(3, 3),)]
-    )  # a turn does not stay level
+    constant: list[tuple[str, ...]] = [()]
+    """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
+    if not layout.by_velocity[velocity].axis.is_rotation:
+        constant.append((entry(3, 3),))
     loads: list[Expression] = []
     drag: dict[str, list[Expression]] = {"A": [], "B": [], "A_reverse": [], "B_reverse": []}
     for force in forces_of(layout, equation.names):
