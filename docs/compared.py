@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
-from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE
-from rov_fmu.model.layout import Layout, VehicleAxis
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE
+from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -13,13 +13,13 @@ from typing import Any
 import click
 
 from docs import compared
+from rov_fmu.c.source import generated_sources
 from rov_fmu.cli import _commands
-from rov_fmu.engine.source import generated_sources
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.io.toml_file import Strict
-from rov_fmu.model.catalogue import AXES
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Text
 from rov_fmu.report.page.pictures import diagram

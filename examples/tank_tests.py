@@ -12,8 +12,8 @@ from pathlib import Path
 import click
 import numpy as np
 
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.pool import Array, swim
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from rov_fmu.engine.compile import (
+from rov_fmu.c.compile import (
     INTERFACES,
     OTHER_NAMES,
     PLATFORMS,

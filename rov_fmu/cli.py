@@ -19,7 +19,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
-from rov_fmu.engine.compile import INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.c.compile import INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.file_kinds import PAGE, check_written
 from rov_fmu.io.messages import (
     FileError,
@@ -32,7 +33,6 @@ from rov_fmu.io.messages import (
     shown,
 )
 from rov_fmu.io.output import check_targets, write_whole
-from rov_fmu.model.catalogue import AXES
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
 

@@ -11,14 +11,14 @@ from fmpy.fmi2 import defaultCallbacks, fmi2CallbackLoggerTYPE, printLogMessage
 from hypothesis import settings
 
 from rov_fmu.build import chosen_platforms
+from rov_fmu.c.compile import compile_all
+from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import compile_all
-from rov_fmu.engine.simulation import usable_cores
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.model.steps import Step, in_fmu
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
 
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)

@@ -5,7 +5,7 @@ from math import radians
 
 import numpy as np
 
-from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

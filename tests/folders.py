@@ -4,8 +4,8 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import YAW, Axis
 from rov_fmu.identify import beginning
-from rov_fmu.model.catalogue import YAW, Axis
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from rov_fmu.engine.stepper import Stepper
+from rov_fmu.c.stepper import Stepper
 from tests.vehicles import VEHICLES, still
 from verification.references.closed_form import Axis, advance, time_to_rest
 

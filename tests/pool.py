@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.model.catalogue import AXIS, CURVE, Axis, coefficient_name
+from rov_fmu.equation.catalogue import AXIS, CURVE, Axis, coefficient_name
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import Measured
 from verification.references.pool import Array, swim

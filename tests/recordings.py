@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.closed_form import axis_of

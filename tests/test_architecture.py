@@ -11,7 +11,7 @@ import pytest
 
 from tests.commands import ROOT
 
-# From the top down. A part imports from itself and from parts below it; io/ and model/ stand side by side.
+# From the top down. A part imports from itself and from parts below it; io/ and equation/ stand side by side.
 PARTS = (
     "cli",
     "study",
@@ -22,7 +22,7 @@ PARTS = (
     "fmu",
     "identify",
     "tank",
-    "engine",
+    "c",
     "vehicle",
     "process",
     "io",
@@ -46,7 +46,7 @@ LARGER_FOLDERS = {
     "tests": 13,
     "tests/fmu": 15,
     "tests/fmu/calls": 16,
-    "tests/model": 14,
+    "tests/equation": 14,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""
 
@@ -105,8 +105,8 @@ def _part(module: str) -> str:
 def test_the_imports_are_seen(imports: dict[str, set[str]]) -> None:
     assert imports["rov_fmu.build"] >= {"rov_fmu.fmu.archive", "rov_fmu.report.page.fmu_page"}
     assert "rov_fmu.report.report" in imports["rov_fmu.interface.identify_command"], "inside a function"
-    assert "rov_fmu.model.step" in imports["rov_fmu.fmu.slave"], "from a package"
-    assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "model", "__main__"}
+    assert "rov_fmu.equation.step" in imports["rov_fmu.fmu.slave"], "from a package"
+    assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "equation", "__main__"}
 
 
 def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
@@ -118,8 +118,8 @@ def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
 
 
 def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
-    below = {part: {part, *PARTS[n:], "model", ""} for n, part in enumerate(PARTS)}
-    below |= {"model": {"model", ""}, "__main__": {"cli", "process"}, "": {"interface"}}
+    below = {part: {part, *PARTS[n:], "equation", ""} for n, part in enumerate(PARTS)}
+    below |= {"equation": {"equation", ""}, "__main__": {"cli", "process"}, "": {"interface"}}
     upward = {
         f"{module} imports {name}"
         for module in FILES
@@ -131,11 +131,11 @@ def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
 
 
 def test_the_page_shows_the_imports_that_exist(imports: dict[str, set[str]]) -> None:
-    real: dict[str, set[str]] = {part: set() for part in (*PARTS, "model")}
+    real: dict[str, set[str]] = {part: set() for part in (*PARTS, "equation")}
     for module in FILES:
         if module.startswith("rov_fmu.") and _part(module) in real:
             real[_part(module)] |= {_part(name) for name in imports[module] if name.startswith("rov_fmu.")}
-    order = (*PARTS, "model")
+    order = (*PARTS, "equation")
     rows = [
         f"| `{part}` | {', '.join(f'`{name}`' for name in order if name in real[part] - {part}) or '–'} |"
         for part in order
@@ -146,12 +146,12 @@ def test_the_page_shows_the_imports_that_exist(imports: dict[str, set[str]]) -> 
 
 
 def test_io_knows_nothing_of_the_model(imports: dict[str, set[str]]) -> None:
-    assert not [m for m in FILES if _part(m) in ("io", "process") and any(_part(n) == "model" for n in imports[m])]
+    assert not [m for m in FILES if _part(m) in ("io", "process") and any(_part(n) == "equation" for n in imports[m])]
 
 
 def test_the_step_in_python_imports_only_the_standard_library() -> None:
     """The FMU in pure Python contains it."""
-    outside = {name.split(".")[0] for name in _names("rov_fmu.model.step")}
+    outside = {name.split(".")[0] for name in _names("rov_fmu.equation.step")}
     assert outside
     assert outside <= sys.stdlib_module_names
 

@@ -8,9 +8,9 @@ from math import hypot, prod, sqrt
 from pathlib import Path
 from typing import TypeVar
 
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 

@@ -18,9 +18,9 @@ import numpy as np
 from fmpy.validation import validate_fmu
 
 from rov_fmu.build import build
-from rov_fmu.engine.simulation import Array
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import AXES, PITCH, ROLL
+from rov_fmu.c.simulation import Array
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import AXES, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.interoperability.manoeuvre import STEP, TIMES, Manoeuvre

@@ -39,7 +39,7 @@ from xml.etree import ElementTree
 
 import click
 
-from rov_fmu.engine.compile import C_FLAGS, UNITY_FILE, WARNINGS, compiler, fmi_headers
+from rov_fmu.c.compile import C_FLAGS, UNITY_FILE, WARNINGS, compiler, fmi_headers
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -59,13 +59,13 @@ _LIMIT = 150
 """The longest time (s) for the tests of a kept mutant. One that no test has noticed by then has survived."""
 TESTS = {
     "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/calls",
-    "fmu_src/c/s*.c": "model/test_c_step.py fmu/calls/test_values.py fmu/calls model/test_exactness.py engine",
+    "fmu_src/c/s*.c": "equation/test_c_step.py fmu/calls/test_values.py fmu/calls equation/test_exactness.py c",
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls",
-    "rov_fmu/model/alone.py": "model/test_alone.py model/test_rov.py vehicle/test_published.py",
-    "rov_fmu/model/layout.py": "model/table docs/test_docs.py model/test_rov.py vehicle/test_vehicle.py model",
-    "rov_fmu/model/*": "model/test_rov.py model/test_step.py model/test_symmetries.py model",
-    "rov_fmu/engine/source.py": "model/test_c_step.py fmu/test_sources.py engine model",
-    "rov_fmu/engine/*": "fmu/test_build_failures.py engine",
+    "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py vehicle/test_published.py",
+    "rov_fmu/equation/layout.py": "equation/table docs/test_docs.py equation/test_rov.py vehicle equation",
+    "rov_fmu/equation/*": "equation/test_rov.py equation/test_step.py equation/test_symmetries.py equation",
+    "rov_fmu/c/source.py": "equation/test_c_step.py fmu/test_sources.py c equation",
+    "rov_fmu/c/*": "fmu/test_build_failures.py c",
     "rov_fmu/vehicle/vehicle.py": "interface/test_model.py vehicle/test_vehicle.py vehicle",
     "rov_fmu/vehicle/*": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_writer.py vehicle",
     "rov_fmu/identify/tuning.py": "identify/test_tuning.py identify",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from examples.systems import PARAMETER_SET
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.c.simulation import simulate
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 

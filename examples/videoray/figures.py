@@ -18,9 +18,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.model.catalogue import SURGE
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, untuned

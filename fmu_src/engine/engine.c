@@ -1,4 +1,4 @@
-/* Simulation for Python (rov_fmu/engine/): many vehicles of the same layout, all at the same times. */
+/* Simulation for Python (rov_fmu/c/): many vehicles of the same layout, all at the same times. */
 #include <stddef.h>
 
 #include "model.h"

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.c.simulation import simulate
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.engine.simulation import Array
+from rov_fmu.c.simulation import Array
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rov_fmu.bridges.mcap import Number, Recording, about, nanoseconds
-from rov_fmu.engine.simulation import Array
+from rov_fmu.c.simulation import Array
 from rov_fmu.identify.result import Identification, Prediction, UnknownForce
 from rov_fmu.tank.log import Channel, Commands, Log
 from rov_fmu.vehicle.uncertainty import NORMAL

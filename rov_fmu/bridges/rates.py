@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
-from rov_fmu.model.catalogue import delayed_name
-from rov_fmu.model.equation import Equation, equation_of
-from rov_fmu.model.expression import ARRAYS, Expression, Name, compiled
-from rov_fmu.model.layout import Layout, ThrustTable
-from rov_fmu.model.step import cubic
+from rov_fmu.equation.catalogue import delayed_name
+from rov_fmu.equation.expression import ARRAYS, Expression, Name, compiled
+from rov_fmu.equation.layout import Layout, ThrustTable
+from rov_fmu.equation.step import cubic
+from rov_fmu.equation.terms import Equation, equation_of
 
 Functions = Mapping[str, Callable[..., Any]]
 """The functions of a library that formulas may call: sin, cos, sqrt, pow, where, both, either; and `interval`.

@@ -20,10 +20,8 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rov_fmu import __version__
-from rov_fmu.io.messages import InputError
-from rov_fmu.io.templates import render
-from rov_fmu.model.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
-from rov_fmu.model.forces import (
+from rov_fmu.equation.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
+from rov_fmu.equation.forces import (
     COUPLING,
     DEAD_BAND,
     LIFT,
@@ -35,7 +33,9 @@ from rov_fmu.model.forces import (
     WEIGHT,
     effects_of,
 )
-from rov_fmu.model.layout import FAINT, Thruster, VehicleAxis
+from rov_fmu.equation.layout import FAINT, Thruster, VehicleAxis
+from rov_fmu.io.messages import InputError
+from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.layout import FAINT, Layout, Thruster
 from rov_fmu.io.messages import InputError, only
-from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.model.layout import FAINT, Layout, Thruster
 
 _AXES = (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)
 _LINEAR = (HEAVE, SURGE, SWAY)

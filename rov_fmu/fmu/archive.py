@@ -9,9 +9,10 @@ from io import BytesIO
 from types import MappingProxyType
 from uuid import UUID
 
-from rov_fmu.engine.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
-from rov_fmu.engine.source import generated_sources, unused_sources
-from rov_fmu.engine.source import sources as motion_sources
+from rov_fmu.c.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
+from rov_fmu.c.source import generated_sources, unused_sources
+from rov_fmu.c.source import sources as motion_sources
+from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.fmu.python_flavour import python_files, python_sources
 from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
@@ -19,7 +20,6 @@ from rov_fmu.fmu.variables import interface_header, variables
 from rov_fmu.io.paths import LICENSE
 from rov_fmu.io.picture import read_png
 from rov_fmu.io.reading import read_bytes
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)

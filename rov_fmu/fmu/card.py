@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping
 from itertools import chain
 from textwrap import fill
 
+from rov_fmu.equation.forces import EXPECTED, effects_of
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import listed
-from rov_fmu.model.forces import EXPECTED, effects_of
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 
 from rov_fmu import __version__
-from rov_fmu.engine.compile import UNITY_FILE
+from rov_fmu.c.compile import UNITY_FILE
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.dependencies import parameters_of
+from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.card import card_text
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable, unit_of
 from rov_fmu.io.templates import render
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.dependencies import parameters_of
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
 # Attributes that are false are also written, because FMI++ stops when they are missing.

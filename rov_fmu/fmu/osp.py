@@ -6,10 +6,10 @@ libcosim and the OSP tools look for it in the folder of the FMU. It changes noth
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.templates import render
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.model.layout import Layout
 
 _ELEMENTS = {
     "1": "Generic",

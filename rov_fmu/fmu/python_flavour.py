@@ -10,15 +10,15 @@ from pathlib import Path
 
 from pythonfmu import FmuBuilder
 
-from rov_fmu.engine.compile import PYTHONFMU_LIBRARY, compile_location
+from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
+from rov_fmu.equation.catalogue import delayed_name
+from rov_fmu.equation.printed import printed
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.model.catalogue import delayed_name
-from rov_fmu.model.printed import printed
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SLAVE = Path(__file__).with_name("slave.py")
-_STEP = Path(__file__).parents[1] / "model" / "step.py"
+_STEP = Path(__file__).parents[1] / "equation" / "step.py"
 
 
 def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
@@ -35,7 +35,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
         "variables": [asdict(v) for v in variables],
     }
     return {
-        f"{vehicle.identifier}_slave.py": _text(_SLAVE).replace("rov_fmu.model", package),
+        f"{vehicle.identifier}_slave.py": _text(_SLAVE).replace("rov_fmu.equation", package),
         "variables.json": json.dumps(declaration, ensure_ascii=False, indent=1) + "\n",
         f"{package}/step.py": _text(_STEP),
         f"{package}/equation.py": printed(layout, f"{package}.step"),

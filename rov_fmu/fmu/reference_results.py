@@ -9,14 +9,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 
+from rov_fmu.equation.attitude import QUATERNION, start_formulas
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
+from rov_fmu.equation.expression import Name, compiled
+from rov_fmu.equation.forces import COUPLING, LIFT, RESTORING, Effect
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.terms import Term, equation_of
 from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
-from rov_fmu.model.attitude import QUATERNION, start_formulas
-from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
-from rov_fmu.model.equation import Term, equation_of
-from rov_fmu.model.expression import Name, compiled
-from rov_fmu.model.forces import COUPLING, LIFT, RESTORING, Effect
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 

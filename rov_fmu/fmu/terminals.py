@@ -7,8 +7,8 @@ terminalKind: the standard defines none, and our own kind would only prevent con
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.templates import render
-from rov_fmu.model.layout import Layout
 
 FOLDER = "terminalsAndIcons"
 ICON = f"{FOLDER}/icon.png"

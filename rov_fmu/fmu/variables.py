@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration
+from rov_fmu.equation.dependencies import dependencies_of
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.templates import render
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration
-from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
 

@@ -7,7 +7,9 @@ from math import inf, isfinite, log
 import numpy as np
 from scipy.stats.qmc import Sobol
 
-from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.c.filter import DivergedError, Run
+from rov_fmu.equation.alone import AxisAlone
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Shapes
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Table
@@ -24,8 +26,6 @@ from rov_fmu.identify.result import (
     Word,
     coverage_of,
 )
-from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL, NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle

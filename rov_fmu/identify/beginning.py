@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
+from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Axis, coefficient_name
+from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axis_alone
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
@@ -15,8 +17,6 @@ from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorde
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import did_you_mean, first_of, lines_on
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.catalogue import AXES, PITCH, REVERSE, ROLL, Axis, coefficient_name
-from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -26,7 +27,6 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
-from rov_fmu.model.catalogue import AXES, COUPLED_AXES
 from rov_fmu.tank import findings
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, SentenceForm

@@ -4,9 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rov_fmu.io.messages import listed
-from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.catalogue import (
+from rov_fmu.equation.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -18,7 +16,9 @@ from rov_fmu.model.catalogue import (
     CoefficientKind,
     coefficient_name,
 )
-from rov_fmu.model.layout import Curve, Layout
+from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.io.messages import listed
+from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.description import Description, Requests
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.description import Head

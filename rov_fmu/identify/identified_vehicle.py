@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from rov_fmu import __version__
+from rov_fmu.equation.catalogue import REVERSE, Axis
+from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.likelihood.curves import fitted
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
-from rov_fmu.model.catalogue import REVERSE, Axis
-from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated

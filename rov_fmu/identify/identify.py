@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
@@ -21,7 +22,6 @@ from rov_fmu.identify.unexplained.disturbances import disturbances, followed, un
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
-from rov_fmu.model.catalogue import SURGE, SWAY, Axis
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -6,13 +6,13 @@ from math import isfinite
 
 import numpy as np
 
-from rov_fmu.engine.filter import DivergedError, Record
+from rov_fmu.c.filter import DivergedError, Record
+from rov_fmu.equation.alone import AxisAlone
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import NextTest
-from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from rov_fmu.model.catalogue import Axis
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder

@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Point
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Curve
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _ROW_STEPS = 10

@@ -11,8 +11,8 @@ from math import exp, inf, log
 import numpy as np
 from scipy.optimize import least_squares
 
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.result import Interval
-from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.uncertainty import quantile

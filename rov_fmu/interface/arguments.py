@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import AXES, Declaration
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import InputError, brief, did_you_mean, only, shown
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import AXES, Declaration
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.quantity import within
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import TIME, Array
 from rov_fmu.io.csv_table import read_header, read_series
 from rov_fmu.io.messages import NO_FILE, FileError, lines_on, only, shown
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, RovFile, read_description

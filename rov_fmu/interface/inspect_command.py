@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import AXES, BODY, PITCH, ROLL
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import NO_FILE, brief, first_of, one_line
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.io.templates import render
-from rov_fmu.model.catalogue import AXES, BODY, PITCH, ROLL
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences

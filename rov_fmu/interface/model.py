@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from rov_fmu.bridges import arrays
 from rov_fmu.bridges.rates import force_names
-from rov_fmu.engine.simulation import Array, simulate, usable_cores
+from rov_fmu.c.simulation import Array, simulate, usable_cores
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
     Commands,
@@ -27,8 +29,6 @@ from rov_fmu.interface.arguments import (
 )
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError, shown
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.step import MOST_WAITING
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 

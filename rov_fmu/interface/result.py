@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.messages import InputError, UnknownNameError, only
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import AXES
 from rov_fmu.tank.columns import in_degrees
 
 if TYPE_CHECKING:

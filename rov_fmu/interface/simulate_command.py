@@ -7,6 +7,7 @@ from math import ceil, floor, isfinite, log10, nan
 from pathlib import Path
 from typing import Any
 
+from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import STEP, TIME, Array, result_times
 from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
@@ -14,7 +15,6 @@ from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, one_line, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, write_whole
-from rov_fmu.model.layout import Layout
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
 
 _STOP = 10.0

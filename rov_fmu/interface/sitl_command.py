@@ -11,6 +11,7 @@ import numpy as np
 
 from rov_fmu.bridges.sitl import Connection, Setup
 from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
+from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings
@@ -18,7 +19,6 @@ from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
-from rov_fmu.model.layout import Layout
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
 _MOST_CHANNELS = 16

@@ -5,12 +5,12 @@ from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import TUNING, Axis
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, impossible, tune
 from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import check_targets
-from rov_fmu.model.catalogue import TUNING, Axis
 from rov_fmu.tank.columns import columns_of, refuse_slips
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned

@@ -13,8 +13,8 @@ from functools import cache
 from math import nan, pi
 from typing import Any
 
+from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.io.csv_table import Column
-from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 ANGLES = {"rad": 1.0, "deg": 180.0 / pi}

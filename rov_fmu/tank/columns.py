@@ -11,6 +11,8 @@ from datetime import datetime, timezone
 import numpy as np
 from pydantic import TypeAdapter
 
+from rov_fmu.equation.catalogue import SURGE, YAW, Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
     FORCE_UNITS,
     NEUTRAL,
@@ -26,8 +28,6 @@ from rov_fmu.io.csv_table import (
 )
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.catalogue import SURGE, YAW, Axis
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ANGLES, QUANTITIES, TIMES, Quantity
 from rov_fmu.tank.commands import NO_KEYS, LogKeys

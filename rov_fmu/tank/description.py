@@ -14,6 +14,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
+from rov_fmu.equation.catalogue import AXES, AXIS, CURVE, PITCH, REVERSE, ROLL, Declaration, coefficient_name
+from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
@@ -27,8 +29,6 @@ from rov_fmu.io.toml_file import (
     read_toml,
     validate,
 )
-from rov_fmu.model.catalogue import AXES, AXIS, CURVE, PITCH, REVERSE, ROLL, Declaration, coefficient_name
-from rov_fmu.model.layout import Layout, VehicleAxis
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity

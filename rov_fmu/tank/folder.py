@@ -19,12 +19,12 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.catalogue import AXES
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
 from rov_fmu.tank.description import ROV_FILE, Dive, Requests, RovFile, read_description

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.model.catalogue import Axis
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.clocks import held

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Layout
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import in_rows
 from rov_fmu.tank.columns import (

@@ -6,9 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.io.messages import did_you_mean, listed, only, shown
-from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
-from rov_fmu.model.catalogue import (
+from rov_fmu.equation.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -31,7 +29,9 @@ from rov_fmu.model.catalogue import (
     cross_name,
     cross_of,
 )
-from rov_fmu.model.layout import Curve, Layout
+from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.io.messages import did_you_mean, listed, only, shown
+from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, File, Tables, given_quantities

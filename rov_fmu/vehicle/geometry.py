@@ -8,12 +8,12 @@ from itertools import combinations, pairwise
 from math import hypot, sqrt
 from typing import Any
 
+from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
+from rov_fmu.equation.expression import compiled
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
-from rov_fmu.model.equation import equation_of
-from rov_fmu.model.expression import compiled
-from rov_fmu.model.layout import Layout
 
 _RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.io.csv_table import Column, DataFileError, read_columns
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.description import TABLES
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
+from rov_fmu.equation.catalogue import AXES, Axis, Declaration, cross_name
 from rov_fmu.io.toml_file import Strict, as_tuple, table_of
-from rov_fmu.model.catalogue import AXES, Axis, Declaration, cross_name
 
 
 def printable(text: str) -> str:

@@ -12,11 +12,8 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
 from pydantic_core import ErrorDetails
 
-from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.paths import inside_or_shipped
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, as_tuple, folder_of, table_of
-from rov_fmu.model import layout
-from rov_fmu.model.catalogue import (
+from rov_fmu.equation import layout
+from rov_fmu.equation.catalogue import (
     ARM,
     AXES,
     AXIS,
@@ -34,7 +31,10 @@ from rov_fmu.model.catalogue import (
     cross_of,
     declarations_of,
 )
-from rov_fmu.model.layout import Layout, ThrustTable, VehicleAxis
+from rov_fmu.equation.layout import Layout, ThrustTable, VehicleAxis
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.paths import inside_or_shipped
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, as_tuple, folder_of, table_of
 from rov_fmu.vehicle.description import FileHead, Provenance, Validity
 from rov_fmu.vehicle.quantity import (
     CrossSymbol,

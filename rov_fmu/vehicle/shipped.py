@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
 from rov_fmu.io.messages import NO_FILE, FileError, did_you_mean
 from rov_fmu.io.paths import MODELS
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
 """The vehicle files that ship, by name."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 
+from rov_fmu.equation.layout import ThrustTable
 from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, DataFileError, pulses, read_columns
-from rov_fmu.model.layout import ThrustTable
 
 _COMMAND = Column(
     {"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=dict.fromkeys(PULSES, pulses)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import ndtri, stdtrit
 
-from rov_fmu.model.catalogue import TUNING, Declaration
-from rov_fmu.model.layout import Layout
+from rov_fmu.equation.catalogue import TUNING, Declaration
+from rov_fmu.equation.layout import Layout
 from rov_fmu.vehicle.schema import Estimated
 
 Array = NDArray[np.float64]

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
+from rov_fmu.equation.alone import AxisAlone, alone_formulas
+from rov_fmu.equation.catalogue import ARM, YAW, Axis, delayed_name
+from rov_fmu.equation.expression import compiled
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis, arm
+from rov_fmu.equation.printed import model_of
+from rov_fmu.equation.step import DelayLine, heading, step
+from rov_fmu.equation.terms import equation_of
+from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, one_line, shown
 from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
-from rov_fmu.model.alone import AxisAlone, alone_formulas
-from rov_fmu.model.catalogue import ARM, YAW, Axis, delayed_name
-from rov_fmu.model.equation import equation_of
-from rov_fmu.model.expression import compiled
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis, arm
-from rov_fmu.model.printed import model_of
-from rov_fmu.model.step import DelayLine, heading, step
-from rov_fmu.model.thrust import curve_formulas, steady_name
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
 from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
@@ -196,7 +196,7 @@ class Vehicle:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """The numbers that follow from the coefficients, by their names in rov_fmu/model/equation.py: gain_u ..."""
+        """The numbers that follow from the coefficients, by their names in rov_fmu/equation/terms.py: gain_u ..."""
         return self._formulas.parameters(self.coefficients)
 
     # ---- Thrust ----
@@ -257,7 +257,7 @@ class Vehicle:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
         The result is exact up to rounding. It is not finite when the motion overflows or takes too many substeps
-        (rov_fmu/model/step.py).
+        (rov_fmu/equation/step.py).
         """
         after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}

@@ -9,13 +9,13 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array, InlineTable, Item
 
+from rov_fmu.equation.catalogue import Declaration
+from rov_fmu.equation.layout import Curve, Fin, Thruster
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.catalogue import Declaration
-from rov_fmu.model.layout import Curve, Fin, Thruster
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Alternative, Estimated, keys_in_file
 from rov_fmu.vehicle.thrust_table import CurrentTable

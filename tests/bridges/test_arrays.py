@@ -13,7 +13,7 @@ import pytest
 import rov_fmu
 from rov_fmu.bridges import arrays
 from rov_fmu.bridges.rates import force_names
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.c.simulation import simulate
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -22,11 +22,11 @@ from rov_fmu.bridges.sitl import Flight, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.catalogue import SURGE
 from tests.folders import small_folder
 from tests.report.results import example
 

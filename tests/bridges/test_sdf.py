@@ -22,9 +22,9 @@ from scipy.spatial.transform import Rotation
 
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
+from rov_fmu.equation.alone import RISE
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.alone import RISE
-from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT

@@ -21,11 +21,11 @@ import pytest
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, servo_packet
+from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
-from rov_fmu.engine.simulation import Array
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed

@@ -5,7 +5,7 @@ from functools import cache
 
 import pytest
 
-from rov_fmu.engine import compile as compilation
+from rov_fmu.c import compile as compilation
 
 
 @cache

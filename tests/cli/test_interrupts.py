@@ -17,7 +17,7 @@ import numpy as np
 import psutil
 import pytest
 
-from rov_fmu.model.catalogue import HEAVE
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress

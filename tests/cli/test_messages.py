@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.build import chosen_platforms
+from rov_fmu.c.compile import OptionError
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import OptionError
 from rov_fmu.io.messages import did_you_mean, only, similar
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import ALONE, BARE, TESTS

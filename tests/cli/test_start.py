@@ -18,10 +18,10 @@ from fmpy import read_model_description
 from rich.progress import Progress
 
 from rov_fmu.build import build
+from rov_fmu.c.compile import PLATFORMS
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import PLATFORMS
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.messages import FileError
-from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress

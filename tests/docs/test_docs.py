@@ -22,7 +22,7 @@ import tomlkit
 from docs import compared, reference
 from rov_fmu import __version__
 from rov_fmu.cli import _commands, main
-from rov_fmu.model.catalogue import ARM, AXIS, BODY, CURVE, TUNING
+from rov_fmu.equation.catalogue import ARM, AXIS, BODY, CURVE, TUNING
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT

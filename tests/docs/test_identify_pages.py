@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 import tomlkit
 
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify import assess
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records
 from rov_fmu.identify.likelihood.parameters import OPTIONAL
 from rov_fmu.identify.result import KEPT, MOST_UNKNOWN, Answer, Disturbance, Prediction, Verdict
 from rov_fmu.identify.unexplained import causes, slips
-from rov_fmu.model.catalogue import HEAVE
 from tests.commands import ROOT
 from tests.folders import FORCE, RATE, SPEED, TAU, read
 

@@ -27,7 +27,7 @@ from examples.station_keeping.system import (
     system_files,
 )
 from examples.systems import PARAMETER_SET
-from rov_fmu.model.layout import Curve, Layout
+from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import Made
 from verification.references.fmpy_slave import keep_loaded

@@ -14,11 +14,11 @@ import pytest
 
 from examples.dive_log import CURRENT, LAG, bluerov2, dive, write_log
 from examples.tank_tests import DELAY, OTTER, bollard_pull, write_tests
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Effect, Identification
-from rov_fmu.model.catalogue import SURGE
 from rov_fmu.report.plots.steps import tables_by_axis
 from rov_fmu.study import Results, study
 from rov_fmu.vehicle.shipped import VIDEORAY

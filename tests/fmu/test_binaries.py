@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.build import chosen_platforms
+from rov_fmu.c.compile import PLATFORMS, fmi_headers
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import PLATFORMS, fmi_headers
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from tests.conftest import Made
 from verification.references.c_programs import compile_c, run_program

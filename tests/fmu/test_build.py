@@ -11,8 +11,8 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from rov_fmu.build import build
+from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
-from rov_fmu.engine import compile as fmu_compile
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
-from rov_fmu.engine import compile as fmu_compile
 from tests.commands import BARE, ROOT, endless_compiler
 
 _SCRIPT = str(ROOT / "build_fmu.py")

@@ -21,7 +21,7 @@ from typing import Any
 import lief
 import pytest
 
-from rov_fmu.engine.compile import compiler, fmi_headers
+from rov_fmu.c.compile import compiler, fmi_headers
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests import fmi2, fmi3

@@ -7,9 +7,9 @@ import pytest
 from lxml import etree
 
 from rov_fmu.cli import main
+from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.variables import unit_of, variables
-from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.vehicles import SIX, VEHICLES

@@ -18,11 +18,11 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
 from rov_fmu.cli import main
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.fmu.archive import python_content
 from rov_fmu.fmu.python_flavour import python_sources
 from rov_fmu.fmu.slave import Rov
 from rov_fmu.fmu.variables import Variable, variables
-from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
 from tests.conftest import Made

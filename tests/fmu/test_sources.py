@@ -11,7 +11,7 @@ import fmpy
 import pytest
 from fmpy.build import build_platform_binary
 
-from rov_fmu.engine.compile import WARNINGS, compiler, fmi_headers
+from rov_fmu.c.compile import WARNINGS, compiler, fmi_headers
 
 
 @pytest.fixture

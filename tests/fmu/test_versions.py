@@ -11,8 +11,8 @@ import pytest
 from lxml import etree
 
 import rov_fmu
+from rov_fmu.c import compile as build_options
 from rov_fmu.cli import main
-from rov_fmu.engine import compile as build_options
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
 from rov_fmu.fmu.proof import prove

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.findings import (
     SENTENCES,
     SEVERITY,
@@ -23,7 +24,6 @@ from rov_fmu.identify.findings import (
     with_error,
 )
 from rov_fmu.identify.result import Coefficient, Disturbance, Effect, Identification, Logging, NextTest, Point, Slip
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.findings import Finding

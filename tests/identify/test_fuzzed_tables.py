@@ -10,10 +10,10 @@ import pytest
 from hypothesis import strategies as st
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import AXES, HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.interface.tune_command import read_points
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import AXES, HEAVE
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle

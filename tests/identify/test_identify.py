@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle

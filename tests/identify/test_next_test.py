@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import NextTest
-from rov_fmu.model.catalogue import HEAVE, YAW, Axis
 from rov_fmu.tank.description import TankLimits
 from tests.folders import ARM, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read
 from tests.pool import run

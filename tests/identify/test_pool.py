@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.model.catalogue import HEAVE
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.pool import run, with_more

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.pool import run

@@ -11,10 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.interface.tune_command import source
-from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 
 import rov_fmu
 from rov_fmu.build import build
-from rov_fmu.engine.compile import OptionError
+from rov_fmu.c.compile import OptionError
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import FileError, InputError
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.findings import told
 from rov_fmu.identify.result import (
     Answer,
@@ -26,7 +27,6 @@ from rov_fmu.identify.result import (
     Sensor,
     Verdict,
 )
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.description import NO_ROV_FILE
 from rov_fmu.tank.findings import Finding

@@ -7,8 +7,8 @@ from math import copysign, prod
 import pytest
 from lxml import html
 
-from rov_fmu.model.expression import Expression, Name, Operation, compiled, where
-from rov_fmu.model.layout import Layout
+from rov_fmu.equation.expression import Expression, Name, Operation, compiled, where
+from rov_fmu.equation.layout import Layout
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Equations, Line, MathML, Text, products
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, Axis
+from rov_fmu.equation.layout import Thruster
 from rov_fmu.fmu.archive import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import HEAVE, Axis
-from rov_fmu.model.layout import Thruster
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.tank.clocks import restart_rows
 from rov_fmu.tank.columns import Names, columns_of_log

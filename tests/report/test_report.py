@@ -17,12 +17,12 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, next_tests, size_in_words, told
 from rov_fmu.identify.result import AxisResult, Effect, Identification
 from rov_fmu.io.output import write_whole
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.report import report
 from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from rov_fmu.build import build
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.model.catalogue import SURGE
 from rov_fmu.study import Results, study
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import Names

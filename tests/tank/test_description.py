@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
-from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.identify.likelihood.records import recorded
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import PAPER

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
-from rov_fmu.model.catalogue import AXES
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 

@@ -9,8 +9,20 @@ import pytest
 import tomlkit
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import (
+    ARM,
+    AXES,
+    AXIS,
+    BODY,
+    HEAVE,
+    RESTORING,
+    SURGE,
+    SWAY,
+    TUNING,
+    YAW,
+    declarations_of,
+)
 from rov_fmu.io.messages import InputError
-from rov_fmu.model.catalogue import ARM, AXES, AXIS, BODY, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW, declarations_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS

@@ -9,10 +9,10 @@ from fmpy.model_description import ModelDescription, read_model_description
 from hypothesis import strategies as st
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import YAW
 from rov_fmu.fmu.archive import archive, native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.identify.tuning import Target, tune
-from rov_fmu.model.catalogue import YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle

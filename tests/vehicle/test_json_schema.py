@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import AXES as AXIS_KINDS
+from rov_fmu.equation.catalogue import AXIS, BODY, CURVE, RESTORING, TUNING, declarations_of
 from rov_fmu.io.paths import MODELS
-from rov_fmu.model.catalogue import AXES as AXIS_KINDS
-from rov_fmu.model.catalogue import AXIS, BODY, CURVE, RESTORING, TUNING, declarations_of
 from rov_fmu.vehicle.json_schema import json_schema
 
 KEPT = MODELS / "vehicle.schema.json"

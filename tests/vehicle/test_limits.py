@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.description import _identifier
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_mass, check_thruster_places, doubts

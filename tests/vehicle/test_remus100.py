@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.c.simulation import simulate
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import at_rest
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from rov_fmu.equation.catalogue import COMMANDS, CURVE, FIN
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import COMMANDS, CURVE, FIN
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.c.compile import BuildError
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import BuildError
 from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE

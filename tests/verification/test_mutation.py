@@ -10,10 +10,10 @@ from verification import mutation
 
 def test_every_file_has_tests() -> None:
     files = mutation.files()
-    assert {"rov_fmu/model/step.py", "rov_fmu/identify/likelihood/objective.py", "fmu_src/c/step.c"} <= {*files}
+    assert {"rov_fmu/equation/step.py", "rov_fmu/identify/likelihood/objective.py", "fmu_src/c/step.c"} <= {*files}
     assert not [test for file in files for test in mutation.tests_of(file) if not (mutation.ROOT / test).exists()]
-    tests = mutation.tests_of("rov_fmu/model/alone.py")
-    assert tests[0] == "tests/model/test_alone.py", "those that import it are the first"
+    tests = mutation.tests_of("rov_fmu/equation/alone.py")
+    assert tests[0] == "tests/equation/test_alone.py", "those that import it are the first"
     assert mutation.tests_of("rov_fmu/process.py"), "every file of the product has tests"
 
 
@@ -77,8 +77,8 @@ def test_a_mutant_of_c_compiles_to_other_code(line: str, changed: str, is_mutant
 
 @pytest.mark.long
 def test_survivors_are_those_that_no_test_notices(monkeypatch: pytest.MonkeyPatch) -> None:
-    file = "rov_fmu/model/alone.py"
-    monkeypatch.setattr(mutation, "TESTS", {file: "model/test_alone.py"})
+    file = "rov_fmu/equation/alone.py"
+    monkeypatch.setattr(mutation, "TESTS", {file: "equation/test_alone.py"})
     text = (mutation.ROOT / file).read_text(encoding="utf-8")
     same = mutation.Mutant(file, 1, "", "", f"{text}\n")
     assert mutation.survivors([same, replace(same, text=f"{text}1 / 0\n")], jobs=1) == [same]
@@ -104,8 +104,8 @@ def test_a_kept_mutant_is_found_where_its_line_is_today(tmp_path: Path, monkeypa
 
 @pytest.mark.long
 def test_verdicts_are_written_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = "rov_fmu/model/alone.py"
-    monkeypatch.setattr(mutation, "tests_of", lambda _: ["tests/model/test_alone.py"])
+    file = "rov_fmu/equation/alone.py"
+    monkeypatch.setattr(mutation, "tests_of", lambda _: ["tests/equation/test_alone.py"])
     before = "from dataclasses import dataclass"
     line = 1 + (mutation.ROOT / file).read_text(encoding="utf-8").splitlines().index(before)
     mutants = [mutation.Mutant(file, line, before, after, "") for after in (f"{before}  # same", "1 / 0")]

@@ -11,7 +11,7 @@ import fmpy
 from rich.console import Console
 
 from rov_fmu.build import build
-from rov_fmu.engine.compile import BuildError, host_platform
+from rov_fmu.c.compile import BuildError, host_platform
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rov_fmu.engine.compile import compiler
+from rov_fmu.c.compile import compiler
 
 _WIDTH = 118
 

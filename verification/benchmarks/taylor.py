@@ -1,6 +1,6 @@
 """heyoka, an integrator by Taylor series that LLVM compiles, on the equation of a vehicle.
 
-It gets the table of terms of rov_fmu/model/equation.py, so it has the same states as ours, with the cosine and sine of
+It gets the table of terms of rov_fmu/equation/terms.py, so it has the same states as ours, with the cosine and sine of
 the heading. It is compiled once. The forces of a held command and the direction of each drag are runtime parameters, so
 commands must not turn any velocity back. It computes no thrust and looks for no reversal, which favours it.
 """
@@ -12,8 +12,8 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.model.equation import ONE, Term, equation_of
-from rov_fmu.model.expression import Expression, compiled
+from rov_fmu.equation.expression import Expression, compiled
+from rov_fmu.equation.terms import ONE, Term, equation_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references import reference, rigid_vehicle
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rov_fmu.model.layout import Layout
+from rov_fmu.equation.layout import Layout
 
 VERSIONS = (2, 3)
 """The versions of FMI."""

@@ -21,7 +21,7 @@ from itertools import cycle
 from math import isfinite
 from pathlib import Path
 
-from rov_fmu.model.catalogue import AXES
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.vehicles import EVERY_OPTION

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.engine.compile import C_FLAGS, WARNINGS, BuildError, compiler, fmi_headers
+from rov_fmu.c.compile import C_FLAGS, WARNINGS, BuildError, compiler, fmi_headers
 
 _HEADERS = Path(__file__).with_name("c")
 

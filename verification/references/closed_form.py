@@ -1,6 +1,6 @@
 """The exact motion of one axis in closed form: a reference for the steps by Taylor series.
 
-The equation of an axis is v' = C - B v - A |v| v with A >= 0 and B >= 0 (rov_fmu/model/alone.py). Its solution is
+The equation of an axis is v' = C - B v - A |v| v with A >= 0 and B >= 0 (rov_fmu/equation/alone.py). Its solution is
 elementary and exact up to rounding for every step length.
 
 Notation (b, k and q are pure numbers), for a motion that keeps its sign, v >= 0:
@@ -13,7 +13,7 @@ The linear equation y'' + B y' = A C y with y(0) = 1, y'(0) = A v0 gives v = y'/
 from collections.abc import Mapping
 from math import atan, atanh, copysign, cos, exp, expm1, hypot, inf, log, log1p, sin, sqrt
 
-from rov_fmu.model.alone import AxisAlone
+from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.vehicle.vehicle import Vehicle
 
 # Below this |q| a fraction in q replaces the hyperbolic and the circular functions, and it needs no branch on the sign.

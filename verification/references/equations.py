@@ -1,6 +1,6 @@
 """The equations of motion as a reference: written out independently of the package, and calculated with mpmath.
 
-They use a vehicle's declarations (its axes, curves, thrusters, inputs) and numbers, but no formula of rov_fmu/model/.
+They use a vehicle's declarations (axes, curves, thrusters, inputs) and numbers, but no formula of rov_fmu/equation/.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from typing import Any
 from mpmath import mp
 from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.model.layout import Curve, Thruster, ThrustTable
+from rov_fmu.equation.layout import Curve, Thruster, ThrustTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # an mpmath number

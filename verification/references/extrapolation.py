@@ -1,6 +1,6 @@
 """The motion with lag and coupling to some 30 digits, by extrapolation of the midpoint rule (Gragg, Bulirsch, Stoer).
 
-It shares neither code nor method with rov_fmu/model/: it uses no series and no closed form. The equations of
+It shares neither code nor method with rov_fmu/equation/: it uses no series and no closed form. The equations of
 verification/references/equations.py are integrated while the signs of the velocities are held. A step ends where a
 velocity reverses, and Newton's method finds that time.
 """

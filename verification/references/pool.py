@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rov_fmu.model.catalogue import AXES
-from rov_fmu.model.layout import Layout, Thruster
+from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]

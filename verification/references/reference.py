@@ -1,4 +1,4 @@
-"""The exact motion to 50 digits (mpmath), from the textbook solutions of (18), not the formulas of rov_fmu/model/.
+"""The exact motion to 50 digits (mpmath), from the textbook solutions of (18), not the formulas of rov_fmu/equation/.
 
 While v keeps its sign, v' = C - B v - A v^2 has an elementary solution. With quadratic drag it depends on the
 equilibria: exponentials when they are real, a tangent when they are not, a hyperbola when they coincide. Without

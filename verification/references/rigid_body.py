@@ -5,7 +5,7 @@ The equations are those of Fossen, Handbook of Marine Craft and Hydrodynamics an
     M v' + C(v) v + D v + D_q(|v|) v + g(eta) = tau,    eta' = J(eta) v + current,
 
 with 6x6 matrices, the velocities v = (u, v, w, p, q, r) through the water, and a quaternion for the attitude. `rates`
-uses only + - * / and abs, so the numbers may be floats or numbers of mpmath. No formula of rov_fmu/model/ is used.
+uses only + - * / and abs, so the numbers may be floats or numbers of mpmath. No formula of rov_fmu/equation/ is used.
 """
 
 from collections.abc import Callable, Mapping, Sequence

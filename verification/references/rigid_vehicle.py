@@ -1,6 +1,6 @@
 """A coupled vehicle as the rigid body of rigid_body.py: its numbers, its outputs, and its motion.
 
-Like equations.py, it uses a vehicle's declarations and numbers, but no formula of rov_fmu/model/.
+Like equations.py, it uses a vehicle's declarations and numbers, but no formula of rov_fmu/equation/.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -9,7 +9,7 @@ import gmpy2
 from gmpy2 import mpfr
 from mpmath import mp
 
-from rov_fmu.model.catalogue import cross_name
+from rov_fmu.equation.catalogue import cross_name
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import equations, rigid_body

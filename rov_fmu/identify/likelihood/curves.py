@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rov_fmu.model.alone import AxisAlone
-from rov_fmu.model.catalogue import REVERSE, Axis, delayed_name
-from rov_fmu.model.layout import Curve, Layout
+from rov_fmu.equation.alone import AxisAlone
+from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
+from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.engine.filter import DivergedError
+from rov_fmu.c.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior

@@ -21,13 +21,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rov_fmu.engine.filter import Filter, Run
-from rov_fmu.engine.simulation import usable_cores
+from rov_fmu.c.filter import Filter, Run
+from rov_fmu.c.simulation import usable_cores
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.identify.likelihood.curves import Shapes
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -12,11 +12,11 @@ from math import exp, inf, log
 
 import numpy as np
 
-from rov_fmu.engine.filter import Parameters, Slow
+from rov_fmu.c.filter import Parameters, Slow
+from rov_fmu.equation.catalogue import HEAVE, REVERSE, Axis, coefficient_name
+from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.model.catalogue import HEAVE, REVERSE, Axis, coefficient_name
-from rov_fmu.model.layout import Curve, Layout
 
 
 @dataclass(frozen=True)

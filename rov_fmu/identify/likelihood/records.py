@@ -10,10 +10,10 @@ from math import cos, sin
 
 import numpy as np
 
-from rov_fmu.engine.filter import DRIFTS, MOST_SENSORS, Record, Sensor
+from rov_fmu.c.filter import DRIFTS, MOST_SENSORS, Record, Sensor
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import MOST, first_of
-from rov_fmu.model.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log

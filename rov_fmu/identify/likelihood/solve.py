@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.c.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.tank.arrays import Array
 

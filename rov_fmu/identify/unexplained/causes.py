@@ -11,9 +11,9 @@ from math import log
 
 import numpy as np
 
-from rov_fmu.engine.filter import Run
+from rov_fmu.c.filter import Run
+from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.model.catalogue import SURGE, SWAY, Axis
 from rov_fmu.tank.arrays import Array
 
 ENOUGH, AHEAD = 10.0, 6.0

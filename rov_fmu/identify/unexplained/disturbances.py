@@ -6,14 +6,14 @@ from math import inf, log
 
 import numpy as np
 
-from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.c.filter import DivergedError, Run
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum
 from rov_fmu.identify.result import Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
-from rov_fmu.model.catalogue import HEAVE
 from rov_fmu.tank.arrays import Array
 
 _LITTLE = 0.05

@@ -19,14 +19,14 @@ from math import log, pi
 
 import numpy as np
 
-from rov_fmu.engine.filter import DivergedError
+from rov_fmu.c.filter import DivergedError
+from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.beginning import Tests, begin
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
-from rov_fmu.model.catalogue import REVERSE
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 

@@ -10,9 +10,8 @@ from itertools import groupby
 
 from markupsafe import escape
 
-from rov_fmu.model.catalogue import REVERSE, YAW
-from rov_fmu.model.equation import ONE, Equation, equation_of, mass_matrix
-from rov_fmu.model.expression import (
+from rov_fmu.equation.catalogue import REVERSE, YAW
+from rov_fmu.equation.expression import (
     FUNCTIONS,
     PYTHON,
     Expression,
@@ -27,9 +26,10 @@ from rov_fmu.model.expression import (
     total,
     written,
 )
-from rov_fmu.model.forces import COUPLING, forces_of
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.model.thrust import by_direction, steady_name
+from rov_fmu.equation.forces import COUPLING, forces_of
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.terms import ONE, Equation, equation_of, mass_matrix
+from rov_fmu.equation.thrust import by_direction, steady_name
 from rov_fmu.report.templates import RAISED, number
 
 

@@ -12,14 +12,14 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 
-from rov_fmu.engine.compile import INTERFACES
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.c.compile import INTERFACES
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.catalogue import ARM, Axis
 from rov_fmu.fmu.archive import REPORT
 from rov_fmu.fmu.card import card, card_text, reversing
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
-from rov_fmu.model.catalogue import ARM, Axis
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
 from rov_fmu.report.page.pictures import pictures

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from rov_fmu.engine.compile import MODULE_SOURCES
+from rov_fmu.c.compile import MODULE_SOURCES
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Layout, Thruster
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import inline_script, number, page, pretty_unit

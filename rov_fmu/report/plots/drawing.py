@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, PathPatch, Wedge
 from matplotlib.path import Path
 
-from rov_fmu.model.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.model.layout import Thruster
+from rov_fmu.equation.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.layout import Thruster
 from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.vehicle.vehicle import Vehicle
 

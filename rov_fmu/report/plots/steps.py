@@ -9,10 +9,10 @@ from typing import Literal, TypeVar
 import numpy as np
 from matplotlib.axes import Axes
 
-from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.alone import RISE
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Curve
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.alone import RISE
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Curve
 from rov_fmu.report.plots.svg import LIGHT, with_formulas
 from rov_fmu.vehicle.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rov_fmu.equation.alone import RISE
 from rov_fmu.io.messages import brief, shown
-from rov_fmu.model.alone import RISE
 from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, Expression, Function
 
 Array = npt.NDArray[np.float64]

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import AXES, Axis
+from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns, read_header
-from rov_fmu.model.catalogue import AXES, Axis
-from rov_fmu.model.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import COMMANDS, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES
 from rov_fmu.tank.columns import columns_of, columns_of_log, known_columns

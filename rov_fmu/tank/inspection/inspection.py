@@ -10,9 +10,9 @@ from typing import TextIO
 
 import numpy as np
 
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, read_columns, read_header
 from rov_fmu.io.messages import shown
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables

@@ -14,6 +14,8 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
     NEUTRAL,
     NO_OUTPUT,
@@ -25,8 +27,6 @@ from rov_fmu.io.csv_table import (
     read_columns,
 )
 from rov_fmu.io.messages import did_you_mean, shown, similar
-from rov_fmu.model.catalogue import Axis
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic

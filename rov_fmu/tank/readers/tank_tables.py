@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.csv_table import DataFileError, KnownColumns, read_columns
-from rov_fmu.model.catalogue import Axis
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
 
 _MOST_LINES = 10

@@ -13,12 +13,12 @@ from fmpy.fmi2 import fmi2EventInfo
 from fmpy.validation import validate_model_description
 from lxml import etree
 
-from rov_fmu.engine.simulation import simulate
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.model_description import DEAD_TIME_NOTE
-from rov_fmu.model.step import MOST_WAITING
+from tests.equation.test_thrust_effects import ROV
 from tests.fmi import CONTINUOUS, ERROR, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, reals
 from tests.fmu.calls.conftest import WRAPPERS
-from tests.model.test_thrust_effects import ROV
 
 T_d = ROV["T_d"]
 ALL_ON = dict.fromkeys(ROV.layout.commands, 0.5)

@@ -15,8 +15,8 @@ from fmpy import read_model_description
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_model_description
 
+from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
-from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import python_content
 from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.osp import osp_model_description
@@ -25,10 +25,10 @@ from rov_fmu.fmu.terminals import terminals
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi2
 from tests.conftest import Made, unzipped
+from tests.equation.test_thrust_effects import immediate
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, Message
 from tests.fmi2 import recording_callbacks
 from tests.fmu.calls.conftest import WRAPPERS
-from tests.model.test_thrust_effects import immediate
 from tests.vehicles import THRUST_EFFECTS, pulsed
 from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 

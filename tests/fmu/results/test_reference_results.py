@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
-from rov_fmu.model.attitude import QUATERNION
-from rov_fmu.model.catalogue import AXES
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

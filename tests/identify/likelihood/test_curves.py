@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, fitted
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VIDEORAY

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rov_fmu.engine.filter import Run
+from rov_fmu.c.filter import Run
+from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.objective import Data, Objective, cost
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, total
-from rov_fmu.model.catalogue import HEAVE, YAW
 from rov_fmu.tank.arrays import Array
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled, responses
 from tests.recordings import clean, write_log

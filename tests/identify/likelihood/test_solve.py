@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
 
-from rov_fmu.engine.filter import DivergedError, Run
+from rov_fmu.c.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Data, Objective, cost
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.solve import Minimum, minimise

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import radians
 
-from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from tests.identify.scenarios.owners import AUV, DIVE, SMALL, Owner
 from tests.identify.scenarios.scenario import KNOWN_THRUST, VOLTAGE, Expected, Given, Scenario, sagging
 from tests.identify.scenarios.tank import TRUTHS, Logs, Sensor, Tank

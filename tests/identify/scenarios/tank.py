@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.model.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.identify.scenarios.scenario import (

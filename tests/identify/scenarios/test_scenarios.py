@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
 from rov_fmu.identify import beginning
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
@@ -22,7 +23,6 @@ from rov_fmu.identify.result import (
     Prediction,
     Verdict,
 )
-from rov_fmu.model.catalogue import HEAVE, YAW, Axis
 from rov_fmu.tank.folder import read_folder
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.identify.scenarios import outcome as of_outcome

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.result import Prediction
-from rov_fmu.model.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
 from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.tank.arrays import Array

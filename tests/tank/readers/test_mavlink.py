@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.catalogue import HEAVE
-from rov_fmu.model.layout import Layout
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
 from rov_fmu.vehicle.shipped import SHIPPED

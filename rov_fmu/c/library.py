@@ -1,0 +1,88 @@
+"""The compiled engine or filter of a vehicle, from the user's cache folder, or compiled if it is not there yet."""
+
+import ctypes
+import hashlib
+import json
+import platform
+import sys
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from threading import Lock
+
+from platformdirs import user_cache_path
+
+from rov_fmu.c.compile import ENGINE_FILE, BuildError, compile_engine, engine_flags
+from rov_fmu.c.source import sources
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.output import Output, write_whole
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_LOADED: dict[str, ctypes.CDLL] = {}
+"""The libraries that this process has loaded, by the file and the layout of the vehicle."""
+_LOADING = Lock()
+
+
+def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
+    """Return the library of a vehicle made from a file of the engine. It does not depend on the coefficients.
+
+    Raises BuildError when it cannot be compiled or loaded.
+    """
+    key = f"{file.name} {vehicle.layout!r}"
+    with _LOADING:
+        if key not in _LOADED:
+            texts = {**sources(vehicle.layout), file.name: file.read_text(encoding="utf-8")}
+            try:
+                _LOADED[key] = _load(texts)
+            except OSError as error:
+                raise BuildError(f"the engine cannot be loaded: {error}") from error
+        return _LOADED[key]
+
+
+def _load(texts: dict[str, str]) -> ctypes.CDLL:
+    """Load the library of these sources from the cache folder, or from a temporary one when that fails."""
+    key = _key(texts)
+    content = None
+    with suppress(OSError):
+        folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
+        folder.mkdir(parents=True, exist_ok=True)
+        if path := _find(folder, key):
+            return ctypes.CDLL(str(path))
+        content = compile_engine(texts)
+        return ctypes.CDLL(str(_write(folder, key, content)))
+    with temporary_folder("rov-fmu-") as temporary:
+        return ctypes.CDLL(str(_write(Path(temporary), key, content or compile_engine(texts))))
+
+
+def _key(texts: dict[str, str]) -> str:
+    """Return a digest of everything that the library depends on."""
+    try:
+        compiler = version("ziglang")
+    except PackageNotFoundError:
+        compiler = ""  # the compiler is not installed as a package
+    machine = sys.platform, platform.machine(), ctypes.sizeof(ctypes.c_void_p)
+    inputs = json.dumps([texts, engine_flags(), compiler, machine], sort_keys=True)
+    return hashlib.sha256(inputs.encode()).hexdigest()[:32]
+
+
+def _find(folder: Path, key: str) -> Path | None:
+    """Return the library with this key in a folder, or None.
+
+    The name of a library contains the digest of its content, so a damaged library is not returned.
+    """
+    for path in folder.glob(f"{key}-*"):
+        if path.name == _name(key, path.read_bytes()):
+            return path
+    return None
+
+
+def _write(folder: Path, key: str, content: bytes) -> Path:
+    """Write a library whole or not at all. Another process may write the same library at the same time."""
+    path = folder / _name(key, content)
+    write_whole(Output(path, content))
+    return path
+
+
+def _name(key: str, content: bytes) -> str:
+    """Return the name of a library, which contains a digest of its content."""
+    return f"{key}-{hashlib.sha256(content).hexdigest()[:32]}"

@@ -1,0 +1,137 @@
+"""Simulate one vehicle or many with the FMU's own C, on all cores."""
+
+import ctypes
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rov_fmu.c.library import load_library
+from rov_fmu.equation.layout import Layout
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+_POLL = 0.5
+"""The waiting thread looks for Ctrl-C after this number of seconds, because Ctrl-C does not end a wait on Windows."""
+_SHORT = 30
+"""A simulation of at most this many steps takes less time than starting a thread, and is over before anyone presses
+Ctrl-C."""
+_BRIEF = 100_000
+"""A simulation of at most this many steps takes about 0.1 s, so a single worker runs it without a thread of its own."""
+_PARTS = 8
+"""The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
+
+TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
+"""The struct `table` of engine.c. It has the address of an array of numbers by vehicle and time, and the two strides of
+this array in doubles."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """The recorded variables of one vehicle or many."""
+
+    values: Array
+    """An array of recorded variables x vehicles x times. It is NaN from the first time on that cannot be computed."""
+    failed: NDArray[np.intp]
+    """For each vehicle, the index of the first time that cannot be computed, or the number of times."""
+
+
+def places_of(layout: Layout) -> dict[str, int]:
+    """Return the index of each variable in the arrays of the C code, with the rates der(x)."""
+    places = layout.places
+    return places | {f"der({name})": places[name] + len(layout.state) for name in layout.state}
+
+
+def tables_of(numbers: Array) -> NDArray[np.void]:
+    """Return a table for each number, which is the same for all vehicles and times. The array must stay alive."""
+    tables = np.zeros(len(numbers), TABLE)
+    tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
+    return tables
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def simulate(
+    vehicle: Vehicle,
+    time: ArrayLike,
+    values: Mapping[str, Any] = MappingProxyType({}),
+    record: Sequence[str] | None = None,
+    *,
+    vehicles: int = 1,
+    workers: int | None = None,
+) -> Trajectories:
+    """Simulate vehicles over the same rising times (s), with all inputs held from each time to the next.
+
+    `values` contains inputs, states at the first time, and coefficients by name. Each broadcasts to vehicles x times.
+    Inputs that are not given have their usual values (`Layout.usual_inputs`): no command, load or current, and the
+    usual voltage. States that are not given are 0, and coefficients that are not given are those of the vehicle.
+    `record` names the variables to record, by default the states. The results do not depend on the number of workers.
+
+    The attitude of a vehicle with roll or pitch begins at the Euler angles phi_0, theta_0 and psi_0, which are 0 by
+    default, or at the quaternion among the states.
+
+    Raises BuildError when the engine cannot be compiled. The arguments are not checked.
+    """
+    layout = vehicle.layout
+    record = list(layout.state) if record is None else record
+    times = np.require(time, np.float64, ["C", "A"])
+    shape = vehicles, len(times)
+    places = places_of(layout)
+    numbers = np.zeros(len(places))
+    for name, number in {**layout.usual_inputs, **vehicle.coefficients}.items():
+        if name in places:
+            numbers[places[name]] = number
+    tables = tables_of(numbers)
+    arrays = []  # keeps the arrays alive while C uses their addresses
+    for name, value in values.items():
+        array = np.require(value, np.float64, ["C", "A"])
+        if array.ndim == 0:
+            numbers[places[name]] = array
+        else:
+            arrays.append(table := np.broadcast_to(array, shape))
+            tables[places[name]] = table.ctypes.data, *(stride // table.itemsize for stride in table.strides)
+    recorded = np.array([places[name] for name in record], np.intc)
+    result = np.empty((len(record), *shape))
+    failed = np.empty(vehicles, np.intp)
+    run = load_library(vehicle).simulate
+    run.restype = None
+    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (tables, times, recorded, result, failed)]
+    stop = ctypes.c_int(0)
+
+    def run_part(first: int) -> None:
+        sizes = len(times), vehicles, first, min(first + size, vehicles), len(record)
+        run(*pointers, *map(ctypes.c_ssize_t, sizes), ctypes.byref(stop))
+
+    workers = min(workers or usable_cores(), vehicles)
+    size = -(-vehicles // (_PARTS * workers))
+    firsts = range(0, vehicles, size)
+    if vehicles * len(times) <= (_BRIEF if workers == 1 else _SHORT):
+        for first in firsts:
+            run_part(first)
+    else:
+        _run_parts(run_part, firsts, workers, stop)
+    for one in np.flatnonzero(failed < len(times)):
+        result[:, one, failed[one] :] = np.nan
+    return Trajectories(result, failed)
+
+
+def _run_parts(run_part: Callable[[int], None], firsts: range, workers: int, stop: ctypes.c_int) -> None:
+    """Run the parts in threads. C runs without Python's lock, so they run at the same time. Ctrl-C ends them."""
+    with ThreadPoolExecutor(workers) as pool:
+        parts = [pool.submit(run_part, first) for first in firsts]
+        try:
+            while wait(parts, _POLL).not_done:
+                pass
+        except BaseException:
+            stop.value = 1  # running parts end after their current step, and the others do nothing
+            raise
+    for done in parts:
+        done.result()

@@ -1,0 +1,402 @@
+"""The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import groupby
+
+from rov_fmu.c.compile import C_SOURCES
+from rov_fmu.equation.alone import response_formulas
+from rov_fmu.equation.attitude import QUATERNION, entry, start_formulas
+from rov_fmu.equation.expression import (
+    PYTHON,
+    Expression,
+    Name,
+    Number,
+    change_of,
+    tangent,
+    to_c,
+    total,
+    written,
+)
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
+from rov_fmu.io.templates import render
+
+
+class EquationSource:
+    """The parts of model.h and equation.h in C."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        self.equation: Equation = equation_of(layout)
+        self.variables = frozenset(layout.places)
+        dynamic = self.equation.dynamic
+        assert self.equation.components[: len(dynamic)] == dynamic, "the C code knows only the number of these"
+
+    # ---- Names ----
+
+    @cached_property
+    def _in_c(self) -> dict[str, str]:
+        """The C expression for every name that a formula may contain."""
+        equation = self.equation
+        in_c = {name: f"at[REF_{name}]" for name in self.variables}
+        in_c |= {name: f"n->{name}" for name in equation.parameters}
+        in_c |= {name: f"q->{name}" for name in self.held_names()}
+        return in_c | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
+
+    def held_names(self) -> list[str]:
+        """Return the names of the numbers that are constant during a piece of a step."""
+        equation = self.equation
+        later = [*equation.forces.values(), *equation.outputs.values()]
+        later += [formula for both in equation.lagging.values() for formula in both]
+        used = frozenset(self.layout.calculated).union(*(formula.names for formula in later))
+        lasting = [name for name in equation.thrust if name in used]
+        return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
+
+    # ---- Coefficients ----
+
+    def parameters(self) -> list[str]:
+        """Return statements that compute the numbers that follow from the coefficients alone."""
+        both = {name: (d.forward, d.reverse) for name, d in self.equation.directed.items()}
+        sides = {f"{name}[{n}]": formula for name, pair in both.items() for n, formula in enumerate(pair)}
+        formulas = {**self.equation.parameters, **sides}
+        return _statements(formulas, {name: f"n->{name}" for name in formulas}, self._in_c)
+
+    def thrust(self) -> list[str]:
+        """Return statements that compute the steady thrust."""
+        held = {name: f"q->{name}" for name in self.held_names()}
+        return _statements(_needed(self.equation.thrust, map(Name, held)), held, self._in_c)
+
+    def forces(self) -> list[str]:
+        """Return statements that compute the torques and accelerations that are constant while the inputs are held."""
+        return _statements(self.equation.forces, self._in_c, self._in_c)
+
+    def starts(self) -> list[str]:
+        """Return statements that set the states of the table at the start of a step."""
+        starts, states = self.equation.starts, self.equation.states
+        local = {name: formula for name, formula in starts.items() if name not in states}
+        first = {name: starts.get(name, Number(0.0)) for name in states}
+        return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
+
+    def lagging_curves(self) -> list[tuple[str, list[str]]]:
+        """Return each curve with lag, and the names of its thrusters."""
+        layout = self.layout
+        lagging = [curve.name for curve in layout.curves if curve.has_lag]
+        return [(curve, [t.name for t in layout.thrusters if t.curve == curve]) for curve in lagging]
+
+    def coasting(self) -> list[str]:
+        """Return the integrals whose rates are constant while all velocities are steady.
+
+        These are all integrals except the x and y of a vehicle that has a heading. With an attitude there are none.
+        """
+        if self.layout.has_attitude:
+            return []
+        return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
+
+    def turning(self) -> list[str]:
+        """Return the entries of the rotation matrix that still change while all velocities are steady."""
+        kinematic = self.equation.components[len(self.equation.dynamic) :]
+        rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
+        return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
+
+    def first_rotation(self) -> str:
+        """Return the first angular velocity."""
+        return next(own.axis.velocity for own in self.layout.axes if own.axis.is_rotation)
+
+    def _turns(self, name: str) -> bool:
+        """Return True when the rate of a state depends on the heading."""
+        return "cos_psi" in self.equation.states_in_rate[name] or "sin_psi" in self.equation.states_in_rate[name]
+
+    def size_group(self, name: str) -> str:
+        """Return the first state of the group of a state. The sizes of a group are added.
+
+        Without an attitude, the groups of several states are the cosine and the sine of the heading, and the horizontal
+        position. With an attitude, they are each row of the rotation matrix, and the position.
+        """
+        if self.layout.has_attitude:
+            return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
+        return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
+
+    def finish(self) -> list[str]:
+        """Return statements that assign the states of the vehicle after a step."""
+        lines = []
+        for name in self.layout.state:
+            if name in QUATERNION:
+                end = f"state[REF_{name} - FIRST_STATE]"
+            elif name in self.equation.lagging:
+                end = f"q->{name}"
+            elif name in self.equation.used:
+                end = f"y[Y_{name}]"
+            else:
+                end = f"state[REF_{name} - FIRST_STATE] + displacement[Y_{name}]"
+            lines.append(f"next[REF_{name} - FIRST_STATE] = {end};")
+        return lines
+
+    def attitude(self) -> list[str]:
+        """Return statements that set the quaternion to that of the rotation matrix in y."""
+        places = {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
+        known = places | {entry: f"y[Y_{entry}]" for entry in self.equation.orientation}
+        after: dict[str, Expression] = {name: Name(f"next_{name}") for name in QUATERNION}
+        return _statements({**self.equation.ends, **after}, places, known)
+
+    def rotation(self) -> list[str]:
+        """Return statements that set the rotation matrix in y to that of the quaternion."""
+        entries = [name for name in self.equation.states if name in self.equation.orientation]
+        return self._results({f"y[Y_{name}]": Name(name) for name in entries})
+
+    # ---- Rates and terms ----
+
+    def rate(self, name: str) -> str:
+        """Write the rate of a state in terms of the states y of the table."""
+        return self._rate(self.equation.rows[name])
+
+    def size(self, name: str) -> str:
+        """Write the sum of the sizes of the terms in the rate of a state."""
+        return " + ".join(f"fabs({self._rate([term])})" for term in self.equation.rows[name]) or "0.0"
+
+    def _rate(self, terms: Sequence[Term]) -> str:
+        return self._by_states(rate_formula(terms))
+
+    def _by_states(self, formula: Expression) -> str:
+        """Write a formula in C in which every state is taken from y, and not from `at`."""
+        known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
+        return to_c(formula, known.__getitem__)
+
+    def alone(self, velocity: str, number: int) -> list[str]:
+        """Return statements that compute V_ss and Tau of an axis alone."""
+        places = {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}
+        return _statements(response_formulas(self.layout, velocity), places, self._in_c)
+
+    @cached_property
+    def blocks(self) -> list[tuple[str, ...]]:
+        """The blocks: groups of neighbouring states whose Taylor coefficients are computed together.
+
+        No block depends on a later one.
+        """
+        depth: dict[str, int] = {}
+        used = self.equation.used
+        for group in self.equation.components:
+            level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
+            last = 1 + len(self.equation.components)
+            depth |= dict.fromkeys(group, level if used & set(group) else last)
+        blocks = []
+        for level in sorted(set(depth.values())):
+            neighbours = groupby(self.equation.states, key=lambda name: depth[name] == level)
+            blocks += [tuple(names) for is_level, names in neighbours if is_level]
+        return blocks
+
+    @cached_property
+    def block_of(self) -> dict[str, int]:
+        """The index of the block of each state."""
+        return {name: i for i, block in enumerate(self.blocks) for name in block}
+
+    def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
+        """Return the products of a block in runs, and the C expression of each product.
+
+        A run multiplies one state by several neighbouring states. It consists of that state, the first neighbour and
+        the number of neighbours. For squares, the first item is empty.
+        """
+        states = self.equation.states
+        pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
+        wanted = {("", a) if a == b else (a, b) for a, b in pairs}
+        runs: list[tuple[str, str, int]] = []
+        places: dict[tuple[str, ...], str] = {}
+        while wanted:
+            candidates = {*wanted, *((b, a) for a, b in wanted if a)}
+            best: tuple[str, str, int] = ("", "", 0)
+            for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
+                place, length = states.index(second), 0
+                while (
+                    place + length < len(states)
+                    and (first, states[place + length]) in candidates
+                    and self.block_of[states[place + length]] == self.block_of[second]
+                ):
+                    length += 1
+                if length > best[2]:
+                    best = first, second, length
+            first, second, length = best
+            for lane in range(length):
+                other = states[states.index(second) + lane]
+                places[first or other, other] = places[other, first or other] = f"p{len(runs)}[{lane}]"
+                wanted -= {(first, other), (other, first)}
+            runs.append(best)
+        return runs, places
+
+    def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
+        """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
+        parts = []
+        for term in self.equation.rows[name]:
+            if term.factors:  # a constant occurs in coefficient 0 only
+                state = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
+                parts.append(replace(term, factors=(state,)).formula)
+        known = self._in_c
+        return to_c(total(parts), lambda name: known.get(name, name))
+
+    @cached_property
+    def component_of(self) -> dict[str, int]:
+        """The index of the component of each state."""
+        return {name: i for i, group in enumerate(self.equation.components) for name in group}
+
+    def _inputs(self, group: Sequence[str]) -> set[str]:
+        """Return the states outside a group that the rates of its states depend on."""
+        return {other for name in group for other in self.equation.states_in_rate[name]} - set(group)
+
+    def input_bits(self, group: Sequence[str]) -> int:
+        """Return one bit for each other component that a component depends on."""
+        return sum(1 << other for other in {self.component_of[name] for name in self._inputs(group)})
+
+    def needed_with(self, group: Sequence[str]) -> int:
+        """Return one bit for each state by which a component is multiplied in other rows.
+
+        While all these states are 0, the component acts on nothing. All bits are set when it may always act.
+        """
+        always, partners = 2**64 - 1, 0
+        needed = {*self.equation.monitored, *(self.equation.orientation if self.layout.has_attitude else ())}
+        if self.equation.used.isdisjoint(group) or not needed.isdisjoint(group):
+            return always
+        for name in set(self.equation.states) - set(group):
+            for factors in (term.factors for term in self.equation.rows[name] if set(term.factors) & set(group)):
+                others = set(factors) - set(group)
+                if not others:
+                    return always
+                partners |= sum(1 << self.equation.states.index(other) for other in others)
+        return partners
+
+    def lagging_ends(self) -> list[tuple[str, str]]:
+        """Return each force that lags, and its formula in C after a piece that ends at y."""
+        return [(name, self._by_states(end)) for name, (_, end) in self.equation.lagging.items()]
+
+    # ---- Derivatives of the vehicle's states ----
+
+    def derivative_lines(self) -> list[str]:
+        """Return statements that assign the derivatives. Before them, the directions must have been chosen in `q`."""
+        return self._results({f"at[REF_{name} + N_STATES]": self.equation.rates[name] for name in self.layout.state})
+
+    def output_lines(self) -> list[str]:
+        """Return statements that assign the outputs that follow from the states."""
+        return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
+
+    def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
+        """Return statements that assign results. Before them come the parts of the orientation that they contain."""
+        return _assigned(self.equation.orientation, formulas, self._in_c)
+
+    def beginning(self) -> list[str]:
+        """Return statements for the start.
+
+        They set the delayed commands to their start values, and compute the attitude from its parameters.
+        """
+        lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
+        formulas = start_formulas() if self.layout.has_attitude else {}
+        return lines + _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
+
+    def has_direction(self) -> str:
+        """Write the condition that the quaternion is not 0."""
+        parts = (f"state[REF_{name} - FIRST_STATE] != 0.0" for name in QUATERNION if name in self.layout.state)
+        return " || ".join(parts) or "true"
+
+    def beginning_tangent(self) -> list[str]:
+        """Return statements that add the changes of the attitude at the start to d."""
+        if not self.layout.has_attitude:
+            return []
+        steps, changes = _tangents(start_formulas(), self.layout.initial)
+        states = [name for name in self.layout.state if name in changes]
+        results = {f"d[REF_{name}]": Name(f"d[REF_{name}]") + changes[name] for name in states}
+        return _assigned(steps, results, {**_with_changes(self.layout.initial), **{place: place for place in results}})
+
+    def tangent_lines(self) -> list[str]:
+        """Return statements that write the changes of the calculated variables to d.
+
+        Before, d has the changes of all other variables.
+        """
+        given = self.variables - {*self.layout.calculated}
+        steps, changes = _tangents({**self.equation.program, **self.equation.outputs}, given)
+        calculated = [name for name in self.layout.calculated if name in changes]
+        results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
+        for name in self.layout.state:
+            change = tangent(self.equation.rates[name], changes.get)
+            results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
+        return _assigned(steps, results, _with_changes(given))
+
+
+def _tangents(
+    formulas: Mapping[str, Expression], given: Iterable[str]
+) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Return formulas, each with the formula of its change after it, and the changes by the names that change.
+
+    `given` are the variables whose changes are known.
+    """
+    changes: dict[str, Expression] = {name: change_of(name) for name in given}
+    steps: dict[str, Expression] = {}
+    for name, formula in formulas.items():
+        steps[name] = formula
+        if change := tangent(formula, changes.get):
+            changes[name] = change_of(name)
+            steps[change_of(name).identifier] = change
+    return steps, changes
+
+
+def _assigned(
+    steps: Mapping[str, Expression], results: Mapping[str, Expression], known: Mapping[str, str]
+) -> list[str]:
+    """Return statements that assign results to their places. Before them come the steps that they need."""
+    formulas = {**_needed(steps, results.values()), **results}
+    return _statements(formulas, {place: place for place in results}, known)
+
+
+def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], known: Mapping[str, str]) -> list[str]:
+    """Return statements in C. Formulas with a place are assigned to it, and the others are local constants.
+
+    `known` has the C expressions of the names that the formulas contain, besides the local constants.
+    """
+    in_c = {**known, **{name: name for name in formulas if name not in places}}
+    left = {name: places.get(name, f"const double {name}") for name in formulas}
+    return [f"{left[name]} = {to_c(formula, in_c.__getitem__)};" for name, formula in formulas.items()]
+
+
+def _with_changes(variables: Iterable[str]) -> dict[str, str]:
+    """Return the C expressions of variables and of their changes, by their names."""
+    places = {name: f"at[REF_{name}]" for name in variables}
+    return places | {change_of(name).identifier: f"d[REF_{name}]" for name in variables}
+
+
+def _needed(formulas: Mapping[str, Expression], wanted: Iterable[Expression]) -> dict[str, Expression]:
+    """Return the formulas that some expressions need, in their order."""
+    needed = set().union(*(formula.names for formula in wanted))
+    for name in reversed(list(formulas)):
+        if name in needed:
+            needed |= formulas[name].names
+    return {name: formula for name, formula in formulas.items() if name in needed}
+
+
+def generated_sources(layout: Layout) -> dict[str, str]:
+    """Return the generated files of a vehicle, model.h and equation.h, by their names."""
+    source = EquationSource(layout)
+    formulas = {name: written(rate_formula(terms), PYTHON) for name, terms in source.equation.rows.items()}
+    sizes = {
+        "inputs": len(layout.inputs),
+        "states": len(layout.state),
+        "others": len(layout.calculated) + len(layout.delayed),
+        "commands": len(layout.commands),
+        "parameters": len(layout.coefficients) + len(layout.initial),
+    }
+    given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
+    return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
+
+
+def unused_sources(layout: Layout) -> list[str]:
+    """Return the shared C files that a vehicle does not need."""
+    needed = {
+        "heading.c": layout.has_attitude,
+        "delay.c": layout.has_dead_time,
+        "lag.c": bool(layout.lagging),
+        "table.c": bool(equation_of(layout).tables),
+    }
+    return [name for name, is_needed in needed.items() if not is_needed]
+
+
+def sources(layout: Layout) -> dict[str, str]:
+    """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
+    names = {"series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"} - {*unused_sources(layout)}
+    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in sorted(names)}
+    return generated_sources(layout) | shared

@@ -1,0 +1,135 @@
+"""One axis alone: V_ss and Tau in closed form, from the forces of forces.py.
+
+While the other axes are at rest, the vehicle is level and the thrust is steady, (18) is a scalar Riccati equation,
+
+    v' = C - B v - A |v| v,
+
+with A in 1/m (1/rad for a rotation), B in 1/s and C in m/s2 (rad/s2). At the steady velocity V_ss, v' is 0. Tau (17) is
+the time from rest until p V_ss is reached, p = 1 - 1/e:
+
+    D^2 = B^2 + 4 A |C|,    V_ss = 2 C / (B + D),    Tau = (2 / D) artanh(p / (1 + (1 - p) B / D)).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import e, inf
+
+from .attitude import entry
+from .expression import (
+    Expression,
+    Name,
+    call,
+    compiled,
+    directed,
+    equal,
+    minus,
+    product,
+    replaced,
+    scaled,
+    total,
+    where,
+)
+from .forces import forces_of
+from .layout import Layout
+from .terms import equation_of
+
+RISE = 1.0 - 1.0 / e
+"""The fraction of V_ss that is reached after Tau, (17)."""
+
+
+def closed_form(A: Expression, B: Expression, C: Expression) -> dict[str, Expression]:
+    """Return the formulas of D, V_ss and Tau. Without drag, and where A drives the axis, V_ss and Tau are infinite."""
+    D = Name("D")
+    without_drag = where(equal(C, 0.0), 0.0, directed(C, inf, -inf))
+    return {
+        "D": where(A < 0.0, 0.0, call("hypot", B, 2.0 * call("sqrt", A) * call("sqrt", call("abs", C)))),
+        "V_ss": where(D > 0.0, 2.0 * C / (B + D), without_drag),
+        "Tau": where(D > 0.0, 2.0 * call("atanh", RISE / (1.0 + (1.0 / e) * (B / D))) / D, inf),
+    }
+
+
+def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
+    """Return the formulas of the motion of an axis alone: A, B and C, and A_reverse and B_reverse for v < 0.
+
+    They contain coefficients, inputs, `Equation.parameters` and `Equation.thrust`.
+    """
+    equation = equation_of(layout)
+    gain = equation.names("gain", velocity)
+    constant: list[tuple[str, ...]] = [()]
+    """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
+    if not layout.by_velocity[velocity].axis.is_rotation:
+        constant.append((entry(3, 3),))
+    loads: list[Expression] = []
+    drag: dict[str, list[Expression]] = {"A": [], "B": [], "A_reverse": [], "B_reverse": []}
+    for force in forces_of(layout, equation.names):
+        if force.axis != velocity:
+            continue
+        ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
+        if force.factors in constant:
+            loads.append(scaled(force.sign, product(*force.coefficient)))
+        elif force.factors == (velocity,):
+            drag["B"].append(minus(ahead))
+            drag["B_reverse"].append(minus(astern))
+        elif force.factors == (velocity, velocity):
+            drag["A"].append(minus(ahead))
+            drag["A_reverse"].append(astern)
+        elif set(force.factors) == {velocity}:
+            raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
+    forces = {force: Name(steady) for own in equation.lags.values() for force, steady in own.items()}
+    torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
+    formulas = {**{key: total(parts) for key, parts in drag.items()}, "C": gain * total(loads)}
+    return {key: replaced(formula, forces | torques) for key, formula in formulas.items()}
+
+
+def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
+    """Return the formulas of V_ss and Tau of an axis alone, after those that they contain."""
+    found = alone_formulas(layout, velocity)
+    drag = {key: directed(Name("C"), found[key], found[f"{key}_reverse"]) for key in "AB"}
+    return {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
+
+
+_closed_form = compiled(closed_form(*map(Name, "ABC")))
+
+
+def steady_velocity(A: float, B: float, C: float) -> float:
+    """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag."""
+    return float(_closed_form({"A": A, "B": B, "C": C})["V_ss"])
+
+
+def time_constant(A: float, B: float, C: float) -> float:
+    """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag."""
+    return float(_closed_form({"A": A, "B": B, "C": C})["Tau"])
+
+
+@dataclass(frozen=True)
+class AxisAlone:
+    """The motion of one axis alone under held inputs: v' = C - B v - A |v| v."""
+
+    A: float
+    B: float
+    C: float
+    reverse: tuple[float, float] | None = None
+    """A and B for v < 0, if they differ."""
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> "AxisAlone":
+        """Return the motion with the values of `alone_formulas`."""
+        drag, reverse = (values["A"], values["B"]), (values["A_reverse"], values["B_reverse"])
+        return cls(*drag, values["C"], reverse if reverse != drag else None)
+
+    def drag(self, sign: float) -> tuple[float, float]:
+        """Return A and B for velocities of this sign."""
+        return self.reverse if self.reverse and sign < 0.0 else (self.A, self.B)
+
+    def acceleration(self, v: float) -> float:
+        """Return v', (18)."""
+        A, B = self.drag(v)
+        return self.C - (B + A * abs(v)) * v
+
+    def steady_velocity(self) -> float:
+        """Return V_ss."""
+        return steady_velocity(*self.drag(self.C), self.C)
+
+    def time_constant(self) -> float:
+        """Return Tau of (17), from rest."""
+        return time_constant(*self.drag(self.C), self.C)

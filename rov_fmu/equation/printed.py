@@ -1,0 +1,192 @@
+"""The equation of motion of a vehicle, printed as a Python module for step.py.
+
+The module needs only the standard library and step.py. It is part of the FMU in pure Python.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from types import ModuleType
+from typing import Any
+
+from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
+from .expression import FUNCTIONS, PYTHON, Expression, call, total, written
+from .layout import Layout
+from .step import interpolated
+from .terms import Equation, equation_of, rate_formula
+
+_FUNCTIONS = [name for name in FUNCTIONS if name != "abs"]
+
+
+def printed(layout: Layout, step: str) -> str:
+    """Return the module. `step` is the name of the module that step.py has there."""
+    return f"""\
+\"\"\"The equation of motion of a vehicle, for {step}.py. All numbers are in SI units.\"\"\"
+
+from math import {", ".join(["expm1", *_FUNCTIONS])}
+
+from {step} import interpolated
+
+{equation_text(layout)}"""
+
+
+def equation_text(layout: Layout) -> str:
+    """Return the module without its imports: expm1, the functions of expression.py, and `interpolated`."""
+    equation = equation_of(layout)
+    quaternion = QUATERNION if layout.has_attitude else ()
+    states = [*equation.states, *quaternion]
+    offsets = [name for name in equation.states if name not in equation.starts]
+
+    def places(names: Iterable[str]) -> dict[str, int]:
+        return {name: states.index(name) for name in names}
+
+    dynamic = []
+    for group in equation.dynamic:
+        others = {name for state in group for name in equation.states_in_rate[state]}.difference(group)
+        dynamic.append(([*places(group).values()], [*places(sorted(others, key=states.index)).values()]))
+
+    def shared(names: Iterable[str]) -> list[int]:
+        return [states.index(name) for name in names if name in states]
+
+    rotation = [[states.index(entry(row, column)) for column in (1, 2, 3)] for row in (1, 2) if layout.has_attitude]
+    lags = {states.index(progress): dict(forces) for progress, forces in equation.lags.items()}
+    numbers = {**equation.program, **equation.forces}
+    rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
+    return f"""\
+STATES = {tuple(states)!r}
+MONITORED = {places(equation.monitored)!r}  # velocities on whose direction coefficients depend, and their places
+DYNAMIC = {dynamic!r}  # the groups of states that may settle, each with those on which it depends
+LAGS = {lags!r}  # for the progress of each lag, the forces that lag and the thrust that each approaches
+OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets from the start
+GROUPS = {[group for group in (shared("uvwpqr"), shared(["x", "y", "z", "psi"])) if group]!r}  # of like size
+TURNING = {shared("pqr")!r}  # the angular velocities
+QUATERNION = {places(quaternion)!r}
+ROTATION = {rotation!r}  # the first two rows of the rotation matrix
+{_tables(equation)}
+
+def numbers(values):
+    \"\"\"Return all numbers that follow from the coefficients, inputs and states, together with these.\"\"\"
+    v = dict(values)
+{_assignments(numbers)}
+    return v
+
+
+def outputs(values):
+    \"\"\"Return the rates of the vehicle's states and its calculated variables, together with all numbers.\"\"\"
+    v = numbers(values)
+{_assignments({**rates, **equation.outputs})}
+    return v
+
+
+def attitude(values):
+    \"\"\"Return the quaternion for the Euler angles at the start, together with other numbers.\"\"\"
+    v = dict(values)
+{_assignments(start_formulas() if layout.has_attitude else {})}
+    return v
+
+
+def motion(_numbers):
+    \"\"\"Return the function from the time since the start of the step and the states to the rates of the states.\"\"\"
+{_rates(equation, layout, states)}
+
+{_sizes(equation, layout, states)}
+
+def lagging(v, _time):
+    \"\"\"Return the forces that lag, at a time since the start of the step.\"\"\"
+    return {{{", ".join(_lagging(equation))}}}
+"""
+
+
+@lru_cache(maxsize=100)
+def model_of(layout: Layout) -> ModuleType:
+    """Return the module of a vehicle, with the functions of the standard library."""
+    return loaded(layout, {name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]})
+
+
+def loaded(layout: Layout, functions: Mapping[str, Callable[..., Any]]) -> ModuleType:
+    """Return the module of a vehicle with its own expm1, sin, cos, sqrt, pow, log and atan2."""
+    module = ModuleType("equation")
+    module.__dict__.update(functions, interpolated=interpolated)
+    exec(compile(equation_text(layout), "<equation>", "exec"), module.__dict__)
+    return module
+
+
+def _assignments(formulas: Mapping[str, Expression]) -> str:
+    lines = [f'    v["{name}"] = {written(x, PYTHON, _value)}' for name, x in formulas.items()]
+    return "\n".join(lines)
+
+
+def _value(name: str) -> str:
+    return f'v["{name}"]'
+
+
+def _rates(equation: Equation, layout: Layout, states: list[str]) -> str:
+    """Print the inner function of `motion`, after the coefficients that it uses."""
+    formulas = {name: rate_formula(terms) for name, terms in equation.rows.items()} | _quaternion_rates(layout, states)
+    rates = "".join(f"            {written(x, PYTHON)},  # {name}\n" for name, x in formulas.items())
+    return f"""\
+{_coefficients(formulas.values(), equation, states)}
+    def rates(_time, _state):
+{_states(equation, states, " " * 8)}
+        return [
+{rates}        ]
+
+    return rates
+"""
+
+
+def _sizes(equation: Equation, layout: Layout, states: list[str]) -> str:
+    """Print the function of the sizes of the terms in the rates."""
+    formulas = {name: total(call("abs", term.formula) for term in terms) for name, terms in equation.rows.items()} | {
+        name: call("abs", rate) for name, rate in _quaternion_rates(layout, states).items()
+    }
+    sizes = "".join(f"        {written(x, PYTHON)},  # {name}\n" for name, x in formulas.items())
+    return f"""\
+def sizes(_numbers, _time, _state):
+    \"\"\"Return the sum of the sizes of the terms in the rate of each state.\"\"\"
+{_coefficients(formulas.values(), equation, states)}{_states(equation, states, " " * 4)}
+    return [
+{sizes}    ]
+"""
+
+
+def _quaternion_rates(layout: Layout, states: list[str]) -> dict[str, Expression]:
+    return quaternion_rates(frozenset(states)) if layout.has_attitude else {}
+
+
+def _coefficients(formulas: Iterable[Expression], equation: Equation, states: list[str]) -> str:
+    """Print assignments of the numbers that formulas use besides the states."""
+    lags = [equation.rows[progress][0].coefficient for progress in equation.lags]
+    used = dict.fromkeys(name for x in [*formulas, *lags] for name in sorted(x.names) if name not in states)
+    return "".join(f'    {name} = _numbers["{name}"]\n' for name in used)
+
+
+def _states(equation: Equation, states: list[str], indent: str) -> str:
+    """Print assignments of the states. The progress of a lag follows from the time alone."""
+    lines = [f"{', '.join(states)}, = _state"]
+    for progress in equation.lags:
+        rate = written(equation.rows[progress][0].coefficient, PYTHON, least=6)
+        lines.append(f"{progress} = -expm1(-{rate} * _time)")
+    return "\n".join(indent + line for line in lines)
+
+
+def _lagging(equation: Equation) -> Iterable[str]:
+    """Print the entries of a dictionary of the forces that lag."""
+    for progress, forces in equation.lags.items():
+        rate = written(equation.rows[progress][0].coefficient, PYTHON, _value, least=6)
+        for force, steady in forces.items():
+            before, after = _value(force), _value(steady)
+            yield f'"{force}": {before} - ({after} - {before}) * expm1(-{rate} * _time)'
+
+
+def _tables(equation: Equation) -> str:
+    """Print the functions of the thrust tables."""
+    return "".join(
+        f"""
+
+def {name}(command):
+    \"\"\"Return the measured force of a thruster (N).\"\"\"
+    return interpolated(command, {(table.commands, table.forces, table.slopes)!r})
+"""
+        for name, table in equation.tables.items()
+    )

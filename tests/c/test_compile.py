@@ -1,0 +1,126 @@
+"""The platforms that binaries are compiled for (rov_fmu/c/compile.py)."""
+
+import platform
+import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.c import compile as module
+from rov_fmu.c.compile import OTHER_NAMES, PLATFORMS, engine_flags, host_platform
+
+LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
+EXPECTED = {
+    "linux64": ("x86_64-linux", ".so", ["x86_64-linux-gnu.2.17"], LINUX),
+    "linux32": ("x86-linux", ".so", ["x86-linux-gnu.2.17"], LINUX),
+    "aarch64-linux": ("aarch64-linux", ".so", ["aarch64-linux-gnu.2.17"], LINUX),
+    "win64": ("x86_64-windows", ".dll", ["x86_64-windows-gnu"], ()),
+    "win32": ("x86-windows", ".dll", ["x86-windows-gnu"], ()),
+    "darwin64": ("x86_64-darwin", ".dylib", ["x86_64-macos.11.0"], ()),
+    "aarch64-darwin": ("aarch64-darwin", ".dylib", ["aarch64-macos.11.0"], ()),
+}
+
+
+def test_every_platform_has_its_folder_suffix_target_and_flags() -> None:
+    assert {name: (p.folder, p.suffix, p.targets(3), p.flags) for name, p in PLATFORMS.items()} == EXPECTED
+
+
+def test_in_fmi_2_the_library_of_macos_is_of_both_processors() -> None:
+    found = {name: p.targets(2) for name, p in PLATFORMS.items()}
+    expected = {name: targets for name, (_, _, targets, _) in EXPECTED.items()}
+    assert found == expected | {"darwin64": ["x86_64-macos.11.0", "aarch64-macos.11.0"]}
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "in_fmi_2", "in_fmi_3"),
+    [
+        ("Linux", "x86_64", "linux64", "linux64"),
+        ("Linux", "aarch64", "aarch64-linux", "aarch64-linux"),
+        ("Windows", "AMD64", "win64", "win64"),
+        ("Darwin", "x86_64", "darwin64", "darwin64"),
+        ("Darwin", "arm64", "darwin64", "aarch64-darwin"),
+        ("Linux", "riscv64", None, None),
+        ("Windows", "ARM64", None, None),
+    ],
+)
+def test_the_platform_of_a_machine_is_the_one_that_importers_look_for(
+    system: str, machine: str, in_fmi_2: str | None, in_fmi_3: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(platform, "system", lambda: system)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    assert (host_platform(), host_platform(fmi=2), host_platform(fmi=3)) == (in_fmi_2, in_fmi_2, in_fmi_3)
+    flags = engine_flags()
+    if in_fmi_3 is None:
+        assert ("-mcpu=baseline" in flags, "-target" in flags, flags[-1]) == (True, False, "-lm")
+    else:
+        assert flags[:2] == ["-target", *EXPECTED[in_fmi_3][2]]
+        assert tuple(flags[flags.index("engine.c") + 1 :]) == EXPECTED[in_fmi_3][3]
+
+
+def test_other_names_of_platforms_are_known() -> None:
+    assert {name: OTHER_NAMES[name] for name in ("x86_64-darwin", "linux", "arm64-linux", "win", "osx")} == {
+        "x86_64-darwin": "darwin64",
+        "linux": "linux64",
+        "arm64-linux": "aarch64-linux",
+        "win": "win64",
+        "osx": "darwin64 or aarch64-darwin",
+    }
+
+
+def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(module.BuildError, match="the C compiler is missing: pip install ziglang"):
+        module.compiler()
+    with pytest.raises(module.BuildError, match="the package fmpy, which has the FMI headers, is not installed"):
+        module.fmi_headers()
+
+
+@pytest.fixture
+def compiled_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A script that replaces the compiler, with a cache folder that nobody can make."""
+    script = tmp_path / "cc"
+    monkeypatch.setattr(module, "compiler", lambda: [str(script)])
+    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", "/proc/x/zig")
+    yield script
+    module._temporary_cache.cache_clear()
+
+
+def _write(script: Path, text: str) -> None:
+    script.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    script.chmod(script.stat().st_mode | stat.S_IXUSR)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")
+def test_without_a_place_for_its_cache_the_compiler_gets_a_temporary_one(compiled_by: Path) -> None:
+    _write(compiled_by, 'test -w "$ZIG_GLOBAL_CACHE_DIR" && echo "$ZIG_GLOBAL_CACHE_DIR" > module.wasm')
+    with pytest.warns(UserWarning, match=r"^/proc/x/zig: the compiler's cache cannot be written there: .* can name"):
+        cache = module.compile_module({}).decode().strip()
+    assert Path(cache).is_dir()
+    with pytest.warns(UserWarning, match="/proc/x/zig"):
+        assert module.compile_module({}).decode().strip() == cache, "one for the whole process"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")
+@pytest.mark.filterwarnings("ignore:/proc/x/zig")
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("sleep 60", "it did not end within 0.3 s. Its cache is in .*; ZIG_GLOBAL_CACHE_DIR can name another folder$"),
+        ("kill -XFSZ $$", "it ended with SIGXFSZ; perhaps because the shell limits the size of files .ulimit -f.$"),
+        ("exit 3", "it ended with exit code 3; perhaps because the shell limits the size of files .ulimit -f.$"),
+        ("echo warning; echo IO: No space left on device; exit 1", "could not be written completely, because the disk"),
+    ],
+)
+def test_why_a_compiler_failed(compiled_by: Path, script: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    import resource
+
+    _write(compiled_by, script)
+    monkeypatch.setattr(module, "_TIME_LIMIT", 0.3, raising=False)
+    limits = {resource.RLIMIT_FSIZE: (1000, 1000)}
+    none = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: limits.get(kind, none))
+    with pytest.raises(module.BuildError, match="^the compiler failed for the page's module: .*" + said) as error:
+        module.compile_module({})
+    assert len(str(error.value).splitlines()) == 1

@@ -1,0 +1,423 @@
+"""The filter in C agrees with a textbook filter in NumPy, with exact results for linear motion, and with the engine."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import cos, inf, pi, sin
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from rov_fmu.c.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.identify.given import with_axis_alone
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import VIDEORAY
+from verification.references.kalman import Belief, Sample, run
+
+Array = NDArray[np.float64]
+DEPTH, VELOCITY = Sensor(HEAVE, is_velocity=False), Sensor(HEAVE, is_velocity=True)
+NONE = Slow()
+START = {"w": 0.05, "z": 1.0, "F_t": 0.1}
+ERRORS = {"w": 0.1, "z": 0.02, "F_t": 0.05}
+
+
+def heave(**more: float) -> Vehicle:
+    """Return the heave of the VideoRay alone, with other or more coefficients."""
+    k = VIDEORAY.extended(more)
+    layout = with_axis_alone(k.layout, HEAVE)
+    return Vehicle(layout, {name: k[name] for name in layout.coefficients})
+
+
+LAGGING = heave(T_top=0.2, F_0_w=0.1)
+LINEAR = LAGGING.replaced({"a_d_w": 0.0, "b_d_w": 6.0})
+SWITCHES = np.array([0.0, 0.83, 2.47, 4.1])
+COMMANDS = np.array([0.0, 0.6, -0.4, 0.3])
+
+
+def record(
+    sensors: Sequence[Sensor],
+    samples: Sequence[tuple[float, int]],
+    values: Array | None = None,
+    *,
+    rows: tuple[Array, Array] = (SWITCHES, COMMANDS),
+    between: float = 0.1,
+    start: dict[str, float] = START,
+    errors: dict[str, float] = ERRORS,
+    inputs: Sequence[str] = ("u_t", "Z_ext"),
+) -> Record:
+    """Return a log with samples of a time and a sensor, whose commands are those of the first input."""
+    time, sensor = (np.array(column) for column in zip(*sorted(samples), strict=True))
+    told, commands = rows
+    numbers = np.zeros((len(told), len(inputs)))
+    numbers[:, 0] = commands
+    value = np.zeros(len(time)) if values is None else values
+    return Record(tuple(sensors), time, value, sensor.astype(np.intc), told - between, told, numbers, start, errors)
+
+
+def parameters(k: Vehicle, sensors: int, **changes: Any) -> Parameters:
+    """Return the parameters of a filter without any slow process, and with white noise of 0.01, with some changes."""
+    known = Parameters(
+        coefficients=dict(k.coefficients),
+        forces=(NONE,) * len(k.layout.axes),
+        gain=NONE,
+        drifts=(NONE, NONE, NONE),
+        white=(0.01,) * sensors,
+        noise=(NONE,) * sensors,
+    )
+    return replace(known, **changes)
+
+
+# ---- The textbook ----------------------------------------------------------------------------------------------------
+
+WHITE = (0.004, 0.02)
+PROCESSES = (Slow(0.3, 2.0), Slow(0.2, 5.0), Slow(0.02, 3.0), Slow(0.006, 0.7), Slow(0.03, 0.4))
+"""The slow force, gain and velocity, and the coloured noise of a depth and of a velocity."""
+SIZES, TIME_CONSTANTS = (np.array([getattr(one, key) for one in PROCESSES]) for key in ("size", "time_constant"))
+
+
+def with_all(k: Vehicle) -> Parameters:
+    """Return the parameters of a filter for a depth and a velocity with all slow processes and noises."""
+    force, gain, drift, *noise = PROCESSES
+    drifts = NONE, NONE, drift
+    return parameters(k, 2, forces=(force,), gain=gain, drifts=drifts, noise=tuple(noise), white=WHITE)
+
+
+@dataclass(frozen=True)
+class Diver:
+    """The heave of one axis with everything that is slow, by hand: w, z, F, force, gain, drift, and two noises."""
+
+    k: Vehicle
+    switches: Array
+    commands: Array
+
+    def rates(self, time: float, x: Array) -> Array:
+        k, (w, _, F, force, gain, drift, *_) = self.k, x.tolist()
+        c = float(self.commands[np.searchsorted(self.switches, time) - 1])
+        steady = (k["a_t_top"] * abs(c) + k["b_t_top"]) * c * (1.0 + gain)
+        drag = (k["a_d_w"] * abs(w) + k["b_d_w"]) * w
+        load = k["alpha_w"] * F + k["F_0_w"] + force - drag
+        moved = [load * k["beta_w"] / k["m_rov"], w + drift, (steady - F) / k["T_top"]]
+        return np.concatenate([moved, -x[3:] / TIME_CONSTANTS])
+
+
+def textbook(k: Vehicle, log: Record) -> tuple[Array, Array]:
+    """Return the innovations and variances of a log of depth and velocity by the textbook filter."""
+    measure: list[Callable[[Array], float]] = [lambda x: float(x[1] + x[6]), lambda x: float(x[0] + x[5] + x[7])]
+    mean = np.array([*log.start.values(), *np.zeros(5)])
+    belief = Belief(float(log.time[0]), mean, np.diag(np.square([*log.errors.values(), *SIZES])))
+    samples = [
+        Sample(t, y, measure[n], WHITE[n])
+        for t, y, n in zip(log.time.tolist(), log.value.tolist(), log.sensor.tolist(), strict=True)
+    ]
+    diver = Diver(k, log.told, log.inputs[:, 0])
+    diffusion = np.diag([0.0, 0.0, 0.0, *(2.0 * SIZES**2 / TIME_CONSTANTS)])
+    return run(belief, samples, diver.rates, diffusion, log.told.tolist())
+
+
+def sampled(seed: int = 0, seconds: float = 6.0) -> list[tuple[float, int]]:
+    """Return samples of a depth at 5 Hz, and of a velocity at about 12 Hz at irregular times."""
+    random = np.random.default_rng(seed)
+    irregular = np.cumsum(random.uniform(0.02, 0.14, round(12 * seconds)))
+    return [(0.2 * n, 0) for n in range(round(5 * seconds))] + [(t, 1) for t in irregular.tolist() if t < seconds]
+
+
+def measured(k: Vehicle, log: Record, seed: int = 1) -> Record:
+    """Return the log with values near those of the model."""
+    off = Filter(k).run(log, parameters(k, 2), begin=0.0).innovations
+    random = np.random.default_rng(seed)
+    noise = np.array(WHITE)[log.sensor] * random.standard_normal(len(log.time))
+    return replace(log, value=log.value - off + noise)
+
+
+@pytest.mark.parametrize(("longest", "near"), [(0.1, 0.01), (0.00025, 2e-4)])
+def test_innovations_and_variances_are_those_of_a_textbook(longest: float, near: float) -> None:
+    """The errors of the filter are of first order in its step, and below 1 % with the usual one of 0.1 s."""
+    log = measured(LAGGING, record((DEPTH, VELOCITY), sampled()))
+    found = Filter(LAGGING, longest).run(log, with_all(LAGGING))
+    off, variances = textbook(LAGGING, log)
+    assert 1.0 < np.abs(off / np.sqrt(variances)).max() < 3.0, "outliers count less than in a textbook"
+    assert found.variances == pytest.approx(variances, rel=near)
+    assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < near
+
+
+PROBES = (Sensor(YAW, is_velocity=False), Sensor(SURGE, is_velocity=True), Sensor(SURGE, is_velocity=False))
+CURRENT = {"V_N": 0.2, "V_E": -0.1}
+
+
+def test_a_turning_vehicle_measures_its_velocity_over_ground() -> None:
+    """The textbook has u, r, x, y, psi and the slow velocity of the water to the north and to the east."""
+    k = VIDEORAY
+    start = {"u": 0.3, "r": 0.2, "x": 0.0, "y": 0.0, "psi": -1.5}
+    errors = {"u": 0.1, "r": 0.1, "x": 0.05, "y": 0.05, "psi": 0.2}
+    tau, size, white = 3.0, 0.05, (0.02, 0.03, 0.05)
+    samples = [(t, n) for n, rate in enumerate((4.0, 7.0, 1.0)) for t in np.arange(0.0, 5.0, 1.0 / rate).tolist()]
+    log = record(PROBES, samples, rows=(np.zeros(1), np.array([0.3])), start=start, errors=errors, inputs=INPUTS)
+    F = (k["a_t_rear"] * 0.3 + k["b_t_rear"]) * 0.3 / 2.0  # of the thruster to port alone
+    torque = F * k["R"] * sin(k["gamma"])
+
+    def rates(_: float, x: Array) -> Array:
+        u, r, _, _, psi, north, east = x.tolist()
+        du = (k["alpha_u"] * F - (k["a_d_u"] * abs(u) + k["b_d_u"]) * u) * k["beta_u"] / k["m_rov"]
+        dr = (k["alpha_r"] * torque - (k["a_d_r"] * abs(r) + k["b_d_r"]) * r) * k["beta_r"] / k["I_r"]
+        moved = [du, dr, u * cos(psi) + CURRENT["V_N"] + north, u * sin(psi) + CURRENT["V_E"] + east, r]
+        return np.array([*moved, -north / tau, -east / tau])
+
+    def over_ground(x: Array) -> float:
+        return float(x[0] + cos(x[4]) * (CURRENT["V_N"] + x[5]) + sin(x[4]) * (CURRENT["V_E"] + x[6]))
+
+    measure: list[Callable[[Array], float]] = [lambda x: float(x[4]), over_ground, lambda x: float(x[2])]
+    water = Slow(size, tau)
+    coefficients = {**k.coefficients, **CURRENT}
+    known = parameters(k, 3, white=white, drifts=(water, water, NONE), coefficients=coefficients)
+    fine = Filter(k, 0.001)
+    predicted = -fine.run(log, known, begin=0.0).innovations
+    noise = np.array(white)[log.sensor] * np.random.default_rng(2).standard_normal(len(log.time))
+    log = replace(log, value=predicted + noise)
+    found = fine.run(log, known)
+    belief = Belief(0.0, np.array([*start.values(), 0.0, 0.0]), np.diag(np.square([*errors.values(), size, size])))
+    told = zip(log.time.tolist(), log.value.tolist(), log.sensor.tolist(), strict=True)
+    diffusion = np.diag([*np.zeros(5), *[2.0 * size**2 / tau] * 2])
+    off, variances = run(belief, [Sample(t, y, measure[n], white[n]) for t, y, n in told], rates, diffusion)
+    assert found.variances == pytest.approx(variances, rel=5e-4)
+    assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < 5e-4
+
+
+INPUTS = [*VIDEORAY.layout.inputs]
+assert INPUTS[0] == "u_l"
+
+
+# ---- Linear motion ---------------------------------------------------------------------------------------------------
+
+
+def test_linear_motion_has_the_exact_innovations() -> None:
+    """Without quadratic drag, the discrete Kalman filter with matrix exponentials (Van Loan 1978) is exact."""
+    k, force, noise = LINEAR, Slow(0.3, 2.0), Slow(0.006, 0.7)
+    known = parameters(k, 2, forces=(force,), noise=(noise, NONE), white=WHITE)
+    log = measured(k, record((DEPTH, VELOCITY), sampled()))
+    found = Filter(k, 0.00025).run(log, known)
+    gain = k["beta_w"] / k["m_rov"]
+    A, H = np.zeros((6, 6)), np.zeros((2, 6))  # w, z, F, force, noise, 1
+    A[0, :4] = gain * np.array([-k["b_d_w"], 0.0, k["alpha_w"], 1.0])
+    A[0, 5], A[1, 0], A[2, 2] = gain * k["F_0_w"], 1.0, -1.0 / k["T_top"]
+    A[3, 3], A[4, 4] = -1.0 / force.time_constant, -1.0 / noise.time_constant
+    Q = np.diag([0.0, 0.0, 0.0, 2.0 * force.size**2 / 2.0, 2.0 * noise.size**2 / 0.7, 0.0])
+    H[0, [1, 4]], H[1, 0] = 1.0, 1.0
+    x = np.array([*log.start.values(), 0.0, 0.0, 1.0])
+    P = np.diag([*np.square([*log.errors.values(), force.size, noise.size]), 0.0])
+    now, off, variances = 0.0, [], []
+    for t, y, n in zip(log.time.tolist(), log.value.tolist(), log.sensor.tolist(), strict=True):
+        for end in [*(s for s in SWITCHES.tolist() if now < s < t), t]:
+            c = float(COMMANDS[np.searchsorted(SWITCHES, end, side="left") - 1]) if end else 0.0
+            A[2, 5] = (k["a_t_top"] * abs(c) + k["b_t_top"]) * c / k["T_top"]
+            both = expm(np.block([[-A, Q], [np.zeros((6, 6)), A.T]]) * (end - now))
+            phi = both[6:, 6:].T
+            x, P, now = phi @ x, phi @ P @ phi.T + phi @ both[:6, 6:], end
+        off.append(y - H[n] @ x)
+        variances.append(H[n] @ P @ H[n] + WHITE[n] ** 2)
+        K = P @ H[n] / variances[-1]
+        x, P = x + K * off[-1], P - np.outer(K, H[n] @ P)
+    assert found.variances == pytest.approx(np.array(variances), rel=2e-4)
+    assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < 2e-4
+
+
+# ---- The mean --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["videoray", "bluerov2", "bluerov2_heavy"])
+def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
+    """Samples that tell nothing leave the mean to itself."""
+    k, random = load_vehicle(SHIPPED[name]), np.random.default_rng(3)
+    layout = replace(k.layout, mix={}, pulse=None, has_dead_time=False)
+    k = Vehicle(layout, {name: k[name] for name in layout.coefficients})
+    inputs, time = [*layout.inputs], 0.1 * np.arange(200.0)
+    told = time[::17]
+    commands = {name: random.uniform(-0.5, 0.5, len(told)) for name in layout.commands}
+    numbers = np.zeros((len(told), len(inputs)))
+    for command, values in commands.items():
+        numbers[:, inputs.index(command)] = values
+    usual = {name: value for name, value in layout.usual_inputs.items() if name not in commands}
+    rest, exact = layout.at_rest, dict.fromkeys(layout.state, 1e-9)
+    water = usual | {"V_N": 0.2, "V_E": -0.1}
+    log = Record((VELOCITY,), time, 0.0 * time, np.zeros(len(time), np.intc), told, told, numbers, rest, exact)
+    known = parameters(k, 1, white=(1e9,), coefficients={**k.coefficients, **water})
+    found = Filter(k).run(log, known, with_states=True)
+    held = np.searchsorted(told, time, side="right") - 1
+    given = {name: values[held] for name, values in commands.items()}
+    motion = simulate(k, time, {**given, **water, **rest}).values[:, 0]
+    scale = np.maximum(np.ptp(motion, axis=1), 1e-3)
+    assert (np.abs(found.states[:, : len(motion)].T - motion).max(axis=1) < 1e-3 * scale).all()
+    assert np.ptp(motion[0]) > 0.1
+
+
+def test_diverging_motion_is_an_error() -> None:
+    log = record((DEPTH,), [(t, 0) for t in np.arange(0.0, 5.0, 0.1).tolist()])
+    known = parameters(LINEAR, 1)
+    assert np.isfinite(Filter(LINEAR).run(log, known).innovations).all()
+    wild = replace(known, coefficients={**LINEAR.coefficients, "a_d_w": -1e9})
+    with pytest.raises(DivergedError):
+        Filter(LINEAR).run(log, wild)
+
+
+# ---- Samples ---------------------------------------------------------------------------------------------------------
+
+
+def turning(values: Array, k: Vehicle = VIDEORAY) -> Run:
+    """Return the run of a vehicle that turns for 20 s, by its heading."""
+    time = 0.25 * np.arange(len(values))
+    log = record(
+        (Sensor(YAW, is_velocity=False),),
+        [(t, 0) for t in time.tolist()],
+        values,
+        rows=(np.zeros(1), np.array([0.4])),
+        start={},
+        errors={"r": 0.1, "psi": 0.1},
+        inputs=INPUTS,
+    )
+    return Filter(k).run(log, parameters(k, 1, forces=(NONE, NONE, Slow(0.1)), white=(0.02,)))
+
+
+def test_headings_are_compared_within_half_a_turn() -> None:
+    values = -turning(np.zeros(80)).innovations  # whatever they are
+    steady = 0.9 * 0.25 * np.arange(80.0) + 0.01 * np.sin(values)
+    whole, wrapped = turning(steady), turning(np.remainder(steady + pi, 2.0 * pi) - pi)
+    assert steady[-1] > 4.0 * pi
+    assert wrapped.innovations == pytest.approx(whole.innovations, abs=1e-9)
+    assert np.abs(whole.innovations).max() <= pi
+
+
+def test_an_outlier_tells_ever_less() -> None:
+    """Beyond three standard deviations of the innovation, its weight is 3 / |u|, in the mean and in the covariance."""
+
+    def after(value: float) -> Run:
+        log = record((DEPTH,), [(0.0, 0)], np.array([START["z"] + value]))
+        return Filter(LAGGING).run(log, parameters(LAGGING, 1), with_states=True)
+
+    deviation = float(np.sqrt(ERRORS["z"] ** 2 + 0.01**2))
+    z = Filter(LAGGING).vehicle_states.index("z")
+    for u, weight in ((1.0, 1.0), (2.9, 1.0), (6.0, 0.5), (60.0, 0.05)):
+        one = after(u * deviation)
+        share = weight * ERRORS["z"] ** 2 / deviation**2
+        assert float(one.states[0, z]) - START["z"] == pytest.approx(share * u * deviation)
+        assert float(one.deviations[0, z]) == pytest.approx(ERRORS["z"] * np.sqrt(1.0 - share))
+        assert one.variances == pytest.approx([deviation**2])
+
+
+# ---- Runs that repeat, and predictions -------------------------------------------------------------------------------
+
+
+def test_frozen_gains_reproduce_the_run_that_they_come_from() -> None:
+    log = measured(LAGGING, record((DEPTH, VELOCITY), sampled()))
+    known, of_heave = with_all(LAGGING), Filter(LAGGING)
+    first = of_heave.run(log, known)
+    again = of_heave.run(log, known, repeated=first)
+    frozen = of_heave.run(log, known, repeated=first, frozen=True)
+    assert again.innovations.tolist() == first.innovations.tolist()
+    assert again.variances.tolist() == first.variances.tolist()
+    assert frozen.innovations == pytest.approx(first.innovations, abs=1e-12)
+    assert frozen.variances.size == 0
+    other = replace(known, coefficients={**LAGGING.coefficients, "a_d_w": 20.0})
+    moved = of_heave.run(log, other, repeated=first, frozen=True)
+    assert np.abs(moved.innovations - first.innovations).max() > 1e-4
+
+
+def with_a_gap() -> list[tuple[float, int]]:
+    """Return samples at round times, without those between 1.75 and 3.5 s."""
+    times = [0.25 * n for n in range(20) if not 7 < n < 14]
+    return [(t, n) for t in times for n in (0, 1)]
+
+
+@pytest.mark.parametrize(
+    ("samples", "begin", "span"),
+    [(sampled(seconds=5.0), 2.0, inf), (sampled(seconds=5.0), 1.5, 2.0), (with_a_gap(), 0.5, 1.0)],
+    ids=["once", "anew", "after a gap"],
+)
+def test_a_prediction_is_a_run_without_the_samples_since_it_began(
+    samples: list[tuple[float, int]], begin: float, span: float
+) -> None:
+    """By hand, each sample is the only one after those before the last restart."""
+    log = measured(LAGGING, record((DEPTH, VELOCITY), samples))
+    known, of_heave = with_all(LAGGING), Filter(LAGGING, 0.001)
+    found, usual = (of_heave.run(log, known, begin=b, span=s) for b, s in ((begin, span), (1e9, inf)))
+    for n, t in enumerate(log.time.tolist()):
+        if t < begin:
+            assert found.innovations[n] == pytest.approx(usual.innovations[n], abs=1e-12)
+            continue
+        last = begin if span == inf else begin + span * ((t - begin) // span)
+        kept = np.append(np.flatnonzero(log.time < last), n)
+        part = replace(log, time=log.time[kept], value=log.value[kept], sensor=log.sensor[kept])
+        by_hand = of_heave.run(part, known)
+        deviation = np.sqrt(by_hand.variances[-1])
+        assert found.innovations[n] == pytest.approx(by_hand.innovations[-1], abs=2e-3 * deviation), t
+        assert found.variances[n] == pytest.approx(by_hand.variances[-1], rel=2e-3), t
+
+
+# ---- Commands --------------------------------------------------------------------------------------------------------
+
+GLIDER = heave(a_d_w=0.0, b_d_w=0.0)
+"""A vehicle without drag, whose velocity is the integral of the thrust."""
+_THRUST = (GLIDER["a_t_top"] * 0.6 + GLIDER["b_t_top"]) * 0.6
+PUSH = GLIDER["alpha_w"] * _THRUST * GLIDER["beta_w"] / GLIDER["m_rov"]
+"""Its acceleration at 60 % of full command, m/s2."""
+
+
+def glided(
+    t: float, sensor: Sensor = VELOCITY, *, end: float = 10.0, offset: float = 0.0, width: float = 0.0
+) -> tuple[float, float]:
+    """Return the mean and the variance of a sensor at a time, divided by PUSH and by its square.
+
+    The push is told at 1 s, half a second after the row before it, and its end at another time.
+    """
+    log = record(
+        (sensor,),
+        [(0.0, 0), (t, 0)],
+        rows=(np.array([0.0, 1.0, end]), np.array([0.0, 0.6, 0.0])),
+        between=0.5,
+        start={},
+        errors={"w": 1e-9, "z": 1e-9},
+    )
+    found = Filter(GLIDER, 0.005).run(log, parameters(GLIDER, 1, white=(1e-3,), offset=offset, width=width))
+    return -float(found.innovations[1]) / PUSH, (float(found.variances[1]) - 1e-6) / PUSH**2
+
+
+@pytest.mark.parametrize("t", [0.6, 0.75, 0.99, 1.3, 3.0])
+def test_a_switch_at_an_unknown_time_has_the_moments_of_a_uniform_time(t: float) -> None:
+    """The window of 0.5 s begins at 0.5 s. After it, the variance of the time is h^2 / 12."""
+    mean, variance = glided(t, offset=-0.25, width=1.0)
+    h, since = 0.5, min(t - 0.5, 0.5)
+    assert mean == pytest.approx(since**2 / (2.0 * h) + max(t - 1.0, 0.0), rel=1e-3)
+    assert variance == pytest.approx(since**3 / (3.0 * h) - since**4 / (4.0 * h**2), rel=1e-3)
+    if t > 1.0:
+        assert variance == pytest.approx(h**2 / 12.0, rel=1e-3)
+
+
+def test_a_position_long_after_a_switch_is_as_uncertain_as_its_time() -> None:
+    """Within the window, the position depends on the square of the time, which the filter takes as linear."""
+    _, variance = glided(6.0, DEPTH, offset=-0.25, width=1.0)
+    assert variance == pytest.approx((6.0 - 0.75) ** 2 * 0.5**2 / 12.0, rel=0.01)
+
+
+@pytest.mark.parametrize("offset", [-0.3, 0.0, 0.4])
+def test_an_offset_moves_the_effect_of_a_command(offset: float) -> None:
+    mean, variance = glided(2.0, offset=offset)
+    assert mean == pytest.approx(1.0 - offset, rel=1e-3)
+    assert variance == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_length_of_a_pulse_has_the_variances_of_both_its_ends() -> None:
+    mean, variance = glided(3.0, end=2.0, offset=-0.25, width=1.0)
+    assert mean == pytest.approx(1.0, rel=1e-3)
+    assert variance == pytest.approx(2.0 * 0.5**2 / 12.0, rel=1e-3)
+
+
+def test_other_inputs_replace_those_of_the_record() -> None:
+    log = record((DEPTH,), [(t, 0) for t in np.arange(0.0, 5.0, 0.5).tolist()])
+    twice = replace(log, inputs=0.5 * log.inputs)
+    of_heave, known = Filter(LAGGING), parameters(LAGGING, 1)
+    found, expected = of_heave.run(log, replace(known, inputs=0.5 * log.inputs)), of_heave.run(twice, known)
+    assert found.innovations.tolist() == expected.innovations.tolist()
+    assert found.innovations.tolist() != of_heave.run(log, known).innovations.tolist()

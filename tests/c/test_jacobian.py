@@ -1,0 +1,76 @@
+"""The Jacobians of a step against the variational equation, with CasADi's derivatives of the rates and DOP853."""
+
+import random
+from typing import Any
+
+import casadi
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rov_fmu.bridges import arrays
+from rov_fmu.c.jacobian import step_jacobian
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.vehicles import SIX, VEHICLES, random_inputs, random_state
+
+ALL = {**VEHICLES, "six_coupled": SIX}
+H = 0.5
+
+
+def _variational(rov: Vehicle, inputs: dict[str, float], state: dict[str, float]) -> Any:
+    """Return the states after H and their derivatives, by CasADi's derivatives of the rates and DOP853."""
+    names = [*inputs, *rov.coefficients]
+    n, m = len(rov.layout.state), len(names)
+    x, u = casadi.SX.sym("x", n), casadi.SX.sym("u", m)
+    symbols = {name: u[k] for k, name in enumerate(names)}
+    p = {name: symbols[name] for name in rov.coefficients}
+    rate = arrays.rates(rov, x, arrays.forces(rov, {name: symbols[name] for name in inputs}, p), p)
+    function = casadi.Function("f", [x, u], [rate, casadi.jacobian(rate, x), casadi.jacobian(rate, u)])
+    u0 = np.array([*inputs.values(), *rov.coefficients.values()])
+
+    def slope(_: float, y: Any) -> Any:
+        d = y[n:].reshape(n, n + m)
+        f, f_x, f_u = (np.asarray(part) for part in function(y[:n], u0))
+        return np.concatenate((f[:, 0], (f_x @ d + np.hstack((np.zeros((n, n)), f_u))).ravel()))
+
+    y0 = np.concatenate(([*state.values()], np.eye(n, n + m).ravel()))
+    end = solve_ivp(slope, (0.0, H), y0, "DOP853", rtol=1e-11, atol=1e-12, max_step=0.05).y[:, -1]
+    derivatives = end[n:].reshape(n, n + m)
+    if rov.layout.has_attitude:  # a step begins with the quaternion of length 1
+        places = [[*state].index(part) for part in QUATERNION]
+        q = np.array([state[part] for part in QUATERNION])
+        derivatives[:, places] = derivatives[:, places] @ (np.eye(4) - np.outer(q, q))
+    return end[:n], derivatives
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if n % 2 else pytest.mark.long) for n, name in enumerate(ALL)]
+)
+def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
+    rov = ALL[name]
+    rng = random.Random(name)
+    for has_arrived in (False, True):
+        inputs, state = random_inputs(rng, rov), random_state(rng, rov)
+        if has_arrived:
+            thrust = {f"F_{name}": force for name, force in rov.commanded(inputs).items()}
+            state |= {name: thrust[name] for name in rov.layout.lagging}
+        found = step_jacobian(rov, inputs, state, H, [*rov.coefficients])
+        after, derivatives = _variational(rov, inputs, state)
+        assert np.allclose([*found.after.values()], after, rtol=1e-8, atol=1e-8)
+        assert np.allclose(
+            np.hstack((found.states, found.inputs, found.coefficients)), derivatives, rtol=1e-6, atol=1e-6
+        )
+
+
+def test_an_unknown_coefficient_is_refused() -> None:
+    rov = VEHICLES["VideoRay"]
+    with pytest.raises(ValueError, match=r"^coefficients: the vehicle has no 'a_d_v'.*"):
+        step_jacobian(rov, rov.layout.usual_inputs, rov.layout.at_rest, H, ["a_d_v"])
+
+
+def test_a_motion_that_overflows_is_refused() -> None:
+    rov = VEHICLES["VideoRay"]
+    state = {**rov.layout.at_rest, "u": 1e200}
+    with pytest.raises(ValueError, match=r"^the derivatives of the step cannot be computed"):
+        step_jacobian(rov, rov.layout.usual_inputs, state, H)

@@ -1,0 +1,158 @@
+"""The engine's library is compiled once for each layout, kept in the cache folder, and never loaded when damaged."""
+
+import ctypes
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.c import library
+from rov_fmu.c.compile import BuildError, compile_engine
+from rov_fmu.c.library import load_library
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE, ROOT
+from tests.vehicles import VEHICLES
+
+ROV = load_vehicle(BARE)
+_MADE: dict[str, bytes] = {}
+"""The libraries that these tests have compiled, by their sources."""
+
+
+class Cache:
+    """A separate cache folder, and the number of compilations for it."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder = folder / "engine"
+        self.compiled = 0
+        self._monkeypatch = monkeypatch
+        monkeypatch.setattr(library, "user_cache_path", lambda *_, **__: folder)
+        monkeypatch.setattr(library, "compile_engine", self._compile)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the libraries that this process has loaded."""
+        self._monkeypatch.setattr(library, "_LOADED", {})
+
+    def files(self) -> list[Path]:
+        return sorted(self.folder.iterdir())
+
+    def _compile(self, texts: Mapping[str, str]) -> bytes:
+        self.compiled += 1
+        if (key := str(texts)) not in _MADE:
+            _MADE[key] = compile_engine(texts)
+        return _MADE[key]
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Cache:
+    return Cache(tmp_path / "cache", monkeypatch)
+
+
+def test_it_is_compiled_once_for_all_numbers_of_a_kind_of_vehicle(cache: Cache) -> None:
+    load_library(ROV)
+    cache.restart()
+    load_library(ROV.replaced({name: 2.0 * value for name, value in ROV.coefficients.items()}))
+    assert cache.compiled == 1
+    assert len(cache.files()) == 1
+    load_library(VEHICLES["yaw only"])
+    assert cache.compiled == 2
+    assert len(cache.files()) == 2
+
+
+@pytest.mark.parametrize("damage", [lambda content: content[:1000], lambda content: content[:-1] + b"?"])
+def test_a_damaged_library_is_compiled_again(cache: Cache, damage: Callable[[bytes], bytes]) -> None:
+    load_library(ROV)
+    (file,) = cache.files()
+    content = file.read_bytes()
+    file.unlink()  # the old file is still loaded and must not change
+    file.write_bytes(damage(content))
+    cache.restart()
+    load_library(ROV)
+    assert cache.compiled == 2
+    assert cache.files() == [file]
+    assert file.read_bytes() == content
+
+
+def test_without_a_cache_folder_it_is_compiled_for_this_process(
+    cache: Cache, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cache").write_text("a file, so no folder can be made there")
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    assert isinstance(load_library(ROV), ctypes.CDLL)
+    assert cache.compiled == 1
+    if os.name == "posix":  # Windows does not remove a library that is loaded
+        assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_without_a_compiler_one_line_says_so(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "ziglang" else found(name))
+    monkeypatch.setattr(library, "compile_engine", compile_engine)
+    with pytest.raises(BuildError, match=r"^the C compiler is missing: pip install ziglang$"):
+        load_library(ROV)
+    assert cache.files() == []
+
+
+def test_where_the_compiler_fails_one_line_says_so(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "sources", lambda _: {"model.h": "#error no model"})
+    with pytest.raises(BuildError) as error:
+        load_library(ROV)
+    assert str(error.value).startswith("the C compiler failed for the engine: ")
+    assert "\n" not in str(error.value)
+    assert cache.files() == []
+
+
+_PROGRAM = f"""
+import sys, time
+from pathlib import Path
+import rov_fmu
+from rov_fmu.c import library
+
+def compile_engine(texts):
+    time.sleep(0.5)  # so that both processes compile
+    return Path(sys.argv[1]).read_bytes()
+
+library.compile_engine = compile_engine
+print(rov_fmu.load({str(BARE)!r}).simulate([0, 1, 2], {{}}, start={{"w": 1.0}})["w"].tolist())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux uses XDG_CACHE_HOME")
+@pytest.mark.long
+def test_two_processes_at_once_do_not_clash(cache: Cache, tmp_path: Path) -> None:
+    load_library(ROV)
+    (compiled,) = cache.files()
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM, str(compiled)],
+            cwd=ROOT,
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    one, other = (process.communicate(timeout=300)[0] for process in both)
+    assert [process.returncode for process in both] == [0, 0]
+    assert one == other != ""
+    assert len(list((tmp_path / "rov-fmu" / "engine").iterdir())) == 1
+
+
+def test_a_library_is_known_by_its_sources_and_its_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    keys = [library._key({"a.c": "1"}), library._key({"a.c": "2"})]
+    for found in (lambda _: "0.0", missing):  # the compiler may be installed without being a package
+        monkeypatch.setattr(library, "version", found)
+        keys.append(library._key({"a.c": "1"}))
+    assert len({*keys}) == 4
+    assert {len(key) for key in keys} == {32}
+    assert library._name(keys[0], b"") == f"{keys[0]}-e3b0c44298fc1c149afbf4c8996fb924"  # SHA-256 of nothing

@@ -1,0 +1,197 @@
+"""The engine computes the same bits as the FMU, for any number of vehicles and threads."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from math import cos, sin
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from numpy.typing import NDArray
+
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.layout import Curve, Thruster
+from rov_fmu.vehicle.schema import MOST
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ROOT
+from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, numbered, random_inputs, random_state
+
+Array = NDArray[np.float64]
+
+
+def fmu_states(folder: Path, rov: Vehicle, times: Array, inputs: dict[str, Array], start: dict[str, float]) -> Array:
+    """Return the states and the thrust of an FMU that FMPy steps, as an array of variables x times."""
+    description = fmpy.read_model_description(str(folder))
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    outputs = [references[name] for name in (*rov.layout.state, *rov.layout.calculated)]
+    fmu = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="rov",
+    )
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=times[0])
+    fmu.setReal([references[name] for name in start], list(start.values()))
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    rows = []
+    for n in range(len(times)):
+        fmu.setReal([references[name] for name in inputs], [values[n] for values in inputs.values()])
+        rows.append(fmu.getReal(outputs))
+        if n + 1 < len(times):
+            fmu.doStep(times[n], times[n + 1] - times[n])
+    fmu.terminate()
+    fmu.freeInstance()
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize(
+    "name", ["everything", *(pytest.param(name, marks=pytest.mark.long) for name in ("videoray", "heavy", "six"))]
+)
+def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureRequest) -> None:
+    rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING), "six": SIX}[name]
+    folder = request.getfixturevalue(f"{name}_dir")
+    rng = random.Random(7)
+    lengths = [rng.choice([2.0**-10, 2.0**-6, 2.0**-3, 1.0, 16.0]) for _ in range(200)]
+    times = np.cumsum([0.0, *lengths])  # all sums are exact
+    drawn = [random_inputs(rng, rov) for _ in times]
+    inputs = {name: np.array([each[name] for each in drawn]) for name in rov.layout.inputs}
+    start = {name: x for name, x in random_state(rng, rov).items() if name not in QUATERNION}
+    start |= {name: rng.uniform(-3.0, 3.0) for name in rov.layout.initial}
+    found = simulate(rov, times, {**inputs, **start}, [*rov.layout.state, *rov.layout.calculated])
+    assert found.failed == len(times)
+    np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
+
+
+@pytest.mark.long
+def test_a_vehicle_with_the_most_curves_moves_as_in_python() -> None:
+    """Each curve with a lag is a component of its own, so there are more components than bits in an int."""
+    curves = tuple(Curve(f"c{n}", ("a_t", "b_t", "T")) for n in range(MOST))
+    thrusters = tuple(
+        Thruster(f"{n}", f"c{n}", (cos(n), sin(n), 0.1 * (n % 3)), (0.1 * (n % 4), 0.2 - 0.1 * (n % 5), 0.05))
+        for n in range(MOST)
+    )
+    layout = replace(SIX.layout, curves=curves, thrusters=thrusters, fins=(), mix={})
+    rov = numbered(layout).replaced({f"T_c{n}": 0.1 + 0.01 * n for n in range(MOST)})
+    inputs = {**layout.usual_inputs, **{f"u_{n}": 0.3 * sin(n) for n in range(MOST)}}
+    found = simulate(rov, [0.0, 0.1, 0.5, 2.0], inputs).values[:, 0, -1]
+    expected = layout.at_rest
+    for h in (0.1, 0.4, 1.5):
+        expected = rov.step(inputs, expected, h)
+    np.testing.assert_allclose(found, [expected[name] for name in layout.state], rtol=1e-11, atol=1e-12)
+
+
+def _variations(vehicles: int, times: int) -> dict[str, Array]:
+    rng = np.random.default_rng(3)
+    return {
+        "u_l": rng.uniform(-1.0, 1.0, times),  # the same for all vehicles
+        "u_r": rng.uniform(-1.0, 1.0, (vehicles, times))[:, ::-1],  # with a negative stride
+        "u_t": rng.uniform(-1.0, 1.0, (times, vehicles)).T,
+        "a_d_u": rng.uniform(5.0, 20.0, (vehicles, 1)),
+        "psi": rng.uniform(-3.0, 3.0, (vehicles, 1)),
+    }
+
+
+def test_the_number_of_threads_and_vehicles_changes_no_bit() -> None:
+    vehicles, times = 37, np.linspace(0.0, 3.0, 31)
+    values = _variations(vehicles, len(times))
+    expected = simulate(VIDEORAY, times, values, vehicles=vehicles, workers=1).values
+    for workers in (2, 3, 64, None):
+        found = simulate(VIDEORAY, times, values, vehicles=vehicles, workers=workers).values
+        np.testing.assert_array_equal(found, expected)
+    for vehicle in (0, 17, 36):
+        alone = {name: np.broadcast_to(value, (vehicles, len(times)))[vehicle] for name, value in values.items()}
+        np.testing.assert_array_equal(simulate(VIDEORAY, times, alone).values[:, 0], expected[:, vehicle])
+
+
+def test_calculated_variables_agree_with_python() -> None:
+    rng = random.Random(3)
+    for rov in (VIDEORAY, load_vehicle(EVERYTHING), SIX):
+        layout, vehicles = rov.layout, 50
+        inputs, states = ([draw(rng, rov) for _ in range(vehicles)] for draw in (random_inputs, random_state))
+        values = {name: np.array([[each[name]] for each in inputs]) for name in layout.inputs}
+        values |= {name: np.array([[each[name]] for each in states]) for name in layout.state}
+        record = [*layout.calculated, *(f"der({name})" for name in layout.state)]
+        found = simulate(rov, np.array([0.0, 1.0]), values, record, vehicles=vehicles).values[:, :, 0]
+        for n in range(vehicles):
+            rates = {f"der({name})": rate for name, rate in rov.derivatives(inputs[n], states[n]).items()}
+            expected = rov.calculated(inputs[n], states[n]) | rates
+            actual = dict(zip(record, found[:, n].tolist(), strict=True))
+            assert actual == pytest.approx(expected, rel=1e-12, abs=1e-13)
+
+
+def test_inputs_are_recorded_as_they_are_held() -> None:
+    values = {"u_l": np.linspace(0.1, 0.9, 5), "u_r": 0.4, "X_ext": -1.0}
+    found = simulate(VIDEORAY, np.linspace(0.0, 2.0, 5), values, [*values]).values[:, 0, 3]
+    assert found.tolist() == pytest.approx([0.7, 0.4, -1.0], rel=1e-15)
+
+
+def test_a_motion_that_cannot_be_computed_ends_with_nan_and_affects_no_other() -> None:
+    times = np.array([0.0, 1.0, 2.0])
+    found = simulate(VIDEORAY, times, {"u": 1.0, "r": [[0.1], [1e300], [0.1]]}, ["u", "psi"], vehicles=3)
+    assert found.failed.tolist() == [3, 1, 3]
+    assert np.isnan(found.values[:, 1]).tolist() == [[False, True, True]] * 2
+    np.testing.assert_array_equal(found.values[:, 0], found.values[:, 2])
+
+
+_ENDLESS = """
+import sys, time
+import numpy as np
+import rov_fmu
+rov = rov_fmu.load("videoray")
+rov.simulate([0, 1])
+print("begins", flush=True)
+try:
+    rov.simulate_many(np.arange(1000.0), {"u_l": 0.5}, coefficients={"a_d_u": np.full(1_000_000, 10.0)}, record="u")
+except KeyboardInterrupt:
+    print("interrupted", time.time(), flush=True)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+def test_ctrl_c_ends_it() -> None:
+    """The simulation would take minutes."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", _ENDLESS],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
+    )
+    with process:
+        assert process.stdout
+        assert process.stdout.readline() == "begins\n"
+        time.sleep(0.3)
+        sent = time.time()
+        process.send_signal(signal.SIGINT)
+        word, ended = process.stdout.read().split()
+    assert (process.returncode, word) == (0, "interrupted")
+    assert float(ended) - sent < 5.0
+
+
+@pytest.mark.long
+def test_threads_cost_no_processor_time() -> None:
+    """Two cores are therefore nearly twice as fast as one. Wall time would also depend on other programs.
+
+    Threads that waited actively or repeated each other's work would need twice the time. Cores that share their caches
+    with other programs have needed 12 % more.
+    """
+    times, vehicles = np.arange(1001.0) / 10.0, 200
+    values = {"u_l": 0.5, "u_r": 0.3, "a_d_u": np.linspace(5.0, 20.0, vehicles)[:, np.newaxis]}
+
+    def seconds(workers: int) -> float:
+        start = time.process_time()
+        simulate(VIDEORAY, times, values, vehicles=vehicles, workers=workers)
+        return time.process_time() - start
+
+    one, two = (min(seconds(workers) for _ in range(20)) for workers in (1, 2))
+    assert two < 1.4 * one

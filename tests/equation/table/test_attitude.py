@@ -1,0 +1,85 @@
+"""The attitude in formulas: angles, quaternion and rotation matrix (rov_fmu/equation/attitude.py)."""
+
+from math import cos, inf, isnan, nan, pi, sin, tau
+
+import pytest
+
+from rov_fmu.equation.attitude import (
+    QUATERNION,
+    angle_formulas,
+    quaternion_formulas,
+    quaternion_rates,
+    rotation_formulas,
+    start_angle_formulas,
+    start_formulas,
+)
+from rov_fmu.equation.expression import compiled, of
+from rov_fmu.equation.step import unwrapped
+
+ENTRIES = [f"R_{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
+ATTITUDES = {
+    "level, to the north": (0.0, 0.0, 0.0),
+    "tilted and turned": (0.4, -0.3, 1.1),
+    "on its side": (3.0, 0.2, 0.1),
+    "nose over": (0.1, 1.4, 3.0),
+    "to the south": (0.2, -0.1, 3.1),
+    "past a vertical nose": (0.3, 2.0, -0.5),
+}
+
+
+def rotation(phi: float, theta: float, psi: float) -> list[float]:
+    """Return R_z(psi) R_y(theta) R_x(phi), the product of three plane rotations, by rows."""
+    x = [[1.0, 0.0, 0.0], [0.0, cos(phi), -sin(phi)], [0.0, sin(phi), cos(phi)]]
+    y = [[cos(theta), 0.0, sin(theta)], [0.0, 1.0, 0.0], [-sin(theta), 0.0, cos(theta)]]
+    z = [[cos(psi), -sin(psi), 0.0], [sin(psi), cos(psi), 0.0], [0.0, 0.0, 1.0]]
+    for factor in (y, x):
+        z = [[sum(row[k] * factor[k][j] for k in range(3)) for j in range(3)] for row in z]
+    return [entry for row in z for entry in row]
+
+
+@pytest.mark.parametrize("angles", ATTITUDES.values(), ids=ATTITUDES)
+def test_angles_become_a_quaternion_a_matrix_and_angles_again(angles: tuple[float, float, float]) -> None:
+    start = dict(zip(("phi_0", "theta_0", "psi_0"), angles, strict=True))
+    q = compiled(start_formulas())(start)
+    expected = pytest.approx(rotation(*angles), abs=1e-15)
+    by_angles = compiled(start_angle_formulas())(start)
+    assert [by_angles[name] for name in ENTRIES] == expected
+    for length in (1.0, 2.0):  # the quaternion need not have length 1
+        R = compiled(rotation_formulas())({name: length * q[name] for name in QUATERNION})
+        assert [R[name] for name in ENTRIES] == expected
+    found = compiled(angle_formulas())(R)
+    again = rotation(*(found[name] for name in ("phi", "theta", "psi")))
+    assert again == expected
+    assert by_angles["theta"] == pytest.approx(found["theta"], abs=1e-15)
+    assert -0.5 * pi <= found["theta"] <= 0.5 * pi
+    for sign in (1.0, -1.0):  # the new quaternion has the sign of the old one
+        old = {name: sign * q[name] for name in QUATERNION}
+        back = compiled(quaternion_formulas())({**R, **old})
+        assert [back[f"next_{name}"] for name in QUATERNION] == pytest.approx([*old.values()], abs=1e-15)
+
+
+def test_the_quaternion_turns_by_half_its_product_with_the_rates() -> None:
+    q, rates = dict(zip(QUATERNION, (0.5, 0.1, -0.7, 0.3), strict=True)), {"p": 2.0, "q": 3.0, "r": 5.0}
+    found = compiled({f"der_{name}": rate for name, rate in quaternion_rates(frozenset("pqr")).items()})({**q, **rates})
+    assert [found[f"der_{name}"] for name in QUATERNION] == pytest.approx(
+        [
+            0.5 * (-0.1 * 2.0 + 0.7 * 3.0 - 0.3 * 5.0),
+            0.5 * (0.5 * 2.0 - 0.7 * 5.0 - 0.3 * 3.0),
+            0.5 * (0.5 * 3.0 + 0.3 * 2.0 - 0.1 * 5.0),
+            0.5 * (0.5 * 5.0 + 0.1 * 3.0 + 0.7 * 2.0),
+        ],
+        rel=1e-15,
+    )
+    assert quaternion_rates(frozenset("uvw")) == dict.fromkeys(QUATERNION, of(0.0))
+
+
+@pytest.mark.parametrize(
+    ("angle", "near", "expected"),
+    [(0.1, 0.0, 0.1), (0.1, 3.0, 0.1), (0.1, 3.5, 0.1 + tau), (-3.0, 3.0, -3.0 + tau), (3.0, -20.0, 3.0 - 4.0 * tau)],
+)
+def test_an_angle_is_unwrapped_to_the_nearest(angle: float, near: float, expected: float) -> None:
+    assert unwrapped(angle, near) == pytest.approx(expected, rel=1e-15)
+
+
+def test_an_angle_beyond_all_numbers_is_none() -> None:
+    assert all(isnan(unwrapped(*pair)) for pair in ((nan, 0.0), (0.0, inf), (inf, 0.0)))

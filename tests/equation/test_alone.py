@@ -1,0 +1,166 @@
+"""The motion of one axis agrees with 50 digits: the step in Python, the closed form of the tests, V_ss and Tau."""
+
+import random
+from collections.abc import Iterable
+from itertools import islice, product
+from math import e, inf, nextafter, pi
+
+import pytest
+from mpmath import mp
+from scipy.optimize import brentq
+
+from rov_fmu.equation.alone import RISE, AxisAlone, steady_velocity, time_constant
+from tests.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case, step_alone
+from verification.references.closed_form import advance, time_to_rest
+from verification.references.reference import axis
+
+
+@pytest.fixture(params=[29, pytest.param(1, marks=pytest.mark.long)], ids=["every 29th case", "every case"])
+def stride(request: pytest.FixtureRequest) -> int:
+    """The distance between the cases of a list that are tested."""
+    return int(request.param)
+
+
+def check(cases: Iterable[Case], stride: int = 1) -> None:
+    for case in islice(cases, 0, None, stride):
+        exact = axis(*case)
+        for method, (velocity, distance) in (("closed form", advance(*case)), ("step", step_alone(*case))):
+            room, least = (2.0, 1e-310) if method == "step" else (1.0, TINY)  # a step has many operations
+            assert abs(velocity - exact.velocity) <= room * VELOCITY * exact.scale + least, (method, case)
+            assert abs(distance - exact.distance) <= room * DISTANCE * exact.path + least, (method, case)
+
+
+def random_case(rng: random.Random) -> Case:
+    def zero_or(low: float, high: float, signs: tuple[int, ...] = (1,)) -> float:
+        return 0.0 if rng.random() < 0.1 else rng.choice(signs) * float(10.0 ** rng.uniform(low, high))
+
+    A, B, C, v0 = zero_or(-4, 3), zero_or(-4, 3), zero_or(-4, 4, (-1, 1)), zero_or(-4, 2, (-1, 1))
+    return A, B, C, v0, 10.0 ** rng.uniform(-5, 3)
+
+
+@pytest.mark.parametrize(
+    "cases", [100, pytest.param(3_000, marks=pytest.mark.long), pytest.param(20_000, marks=pytest.mark.weekly)]
+)
+def test_velocity_and_distance_are_exact_over_random_motions(cases: int) -> None:
+    rng = random.Random(cases)
+    check(random_case(rng) for _ in range(cases))
+
+
+# ---- Where the formulas change ----
+
+
+def decelerations_near_coinciding_equilibria() -> list[tuple[float, float, float, float]]:
+    """Motions with C at -B^2/(4 A) and on both sides of it. There D^2 = 0, and tanh becomes tan."""
+    offsets = [0.0, *(sign * 10.0**-n for n in range(2, 16) for sign in (1, -1))]
+    return [
+        (A, B, -B * B / (4.0 * A) * (1.0 + offset), v0)
+        for A, B, v0, offset in product((1e-4, 0.3, 1e3), (1e-4, 1.7, 1e3), (0.01, 30.0), offsets)
+    ]
+
+
+def test_exact_where_the_equilibria_coincide(stride: int) -> None:
+    motions = [(motion, time_to_rest(*motion)) for motion in decelerations_near_coinciding_equilibria()]
+    check(((*motion, h) for motion, rest in motions for h in (1e-3, 0.5 * rest, 3.0 * rest)), stride)
+
+
+def test_exact_at_and_around_the_reversal(stride: int) -> None:
+    cases: list[Case] = []
+    for motion in product((0.0, 1e-4, 0.3, 1e3), (0.0, 1e-4, 1.7, 1e3), (-1e-4, -0.1, -1e4), (0.001, 1.0, 100.0)):
+        rest = time_to_rest(*motion)
+        times = nextafter(rest, 0.0), rest, nextafter(rest, inf), *(rest * (1.0 + d) for d in (-1e-9, 1e-9, 1e-4))
+        cases += [(*motion, h) for h in times]
+    check(cases, stride)
+
+
+def test_exact_without_drag_force_or_motion() -> None:
+    check(product((0.0, 0.3), (0.0, 1.7), (-2.5, 0.0, 2.5), (-1.2, 0.0, 1.2), (1e-5, 1e-2, 1.0, 1e3)))
+
+
+def test_exact_on_both_sides_of_the_fractions(stride: int) -> None:
+    """The continued fractions of the closed form end at these q = (B h/2)^2 + A C h^2."""
+    motions = product((1e-3, 0.3, 50.0), (0.0, 1e-3, 1.0), (0.0, 0.1, 20.0), (-1e-3, -1e-15, 0.0, 1e-15, 1e-3))
+    cases = product(motions, (0.8, -0.8, 3.2))
+    check(((A, B, (q * (1.0 + by) - 0.25 * B * B) / A, v0, 1.0) for (A, B, v0, by), q in cases), min(stride, 4))
+
+
+def test_the_steady_velocity_stays(stride: int) -> None:
+    cases: list[Case] = []
+    for A, B, C in product((0.0, 1e-4, 0.3, 1e3), (1e-4, 1.7, 1e3), (1e-4, 0.1, 1e4)):
+        V = steady_velocity(A, B, C)
+        velocities = V, nextafter(V, inf), V * (1.0 - 1e-9)
+        cases += product((A,), (B,), (C,), velocities, (1e-5, 1.0, 1e3, 1e15))
+    check(cases, min(stride, 5))
+
+
+# ---- Far outside what an ROV does ----
+
+
+def test_huge_steps_are_exact(stride: int) -> None:
+    drags = (0.0, 1e-4, 0.3, 1e3), (0.0, 1e-4, 1.7, 1e3)
+    check(product(*drags, (-1e4, -0.1, 0.0, 0.1), (0.0, 0.01, 30.0), (1e6, 1e9, 1e15)), stride)
+
+
+def test_huge_coefficients_are_exact(stride: int) -> None:
+    """The coefficients go up to the bounds of a vehicle file."""
+    drag = 0.0, 1.0, 1e6, 1e15
+    check(product(drag, drag, (-1e18, -1.0, 0.0, 1e9, 1e18), (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3)), stride)
+
+
+def test_tiny_and_subnormal_numbers_are_exact_to_the_last_subnormal_digit(stride: int) -> None:
+    cases: list[Case] = []
+    for tiny in (1e-12, 1e-300, SMALLEST):
+        small = 0.0, tiny, 1.0
+        cases += product(small, small, (-1.0, -tiny, tiny), small, (tiny, 1.0))
+    check(cases, min(stride, 5))
+
+
+# ---- Steady velocity and time constant ----
+
+DRAGS = [
+    case for case in product((0.0, 1e-4, 0.3, 1e3, 1e15), (0.0, 1e-4, 1.7, 1e3), (1e-4, 0.1, 1e4)) if any(case[:2])
+]
+
+
+def test_drag_balances_the_force_at_the_steady_velocity() -> None:
+    for A, B, C in DRAGS:
+        V = steady_velocity(A, B, C)
+        assert steady_velocity(A, B, -C) == -V
+        with mp.workdps(50):
+            # a relative error of V is at most that of the drag (with linear drag alone), and at least half of it
+            assert abs((A * mp.mpf(V) + B) * V / C - 1) <= 1e-15, (A, B, C)
+        assert brentq(lambda v, A, B, C: C - (B + A * v) * v, 0.0, 2.0 * V, (A, B, C), rtol=1e-14) == pytest.approx(
+            V, rel=1e-12
+        )
+
+
+def test_after_the_time_constant_the_velocity_is_that_of_17() -> None:
+    for A, B, C in DRAGS:
+        Tau = time_constant(A, B, C)
+        assert time_constant(A, B, -C) == Tau
+        fraction = axis(A, B, C, 0.0, Tau).velocity / steady_velocity(A, B, C)
+        assert abs(fraction - (1.0 - 1.0 / e)) <= 1e-15, (A, B, C)
+
+
+def test_linear_drag_has_one_time_constant_and_no_drag_no_steady_velocity() -> None:
+    assert time_constant(0.0, 4.0, 1.0) == 0.25
+    assert time_constant(0.3, 4.0, 0.0) == pytest.approx(0.25, rel=1e-15)  # the limit for a small force
+    assert steady_velocity(0.3, 1.7, 0.0) == 0.0
+    assert steady_velocity(0.0, 0.0, -1.0) == -inf
+    assert time_constant(0.0, 0.0, 1.0) == time_constant(0.3, 0.0, 0.0) == inf
+
+
+def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -> None:
+    ahead, astern = AxisAlone(2.0, 3.0, 5.0, (0.5, 1.0)), AxisAlone(2.0, 3.0, -1.5, (0.5, 1.0))
+    assert [ahead.acceleration(v) for v in (-2.0, 0.0, 0.5)] == [5.0 + (1.0 + 0.5 * 2.0) * 2.0, 5.0, 5.0 - 2.0]
+    assert [ahead.drag(sign) for sign in (-1.0, 0.0, 1.0)] == [(0.5, 1.0), (2.0, 3.0), (2.0, 3.0)]
+    assert (ahead.steady_velocity(), astern.steady_velocity()) == (1.0, -1.0)
+    assert ahead.time_constant() == time_constant(2.0, 3.0, 5.0)
+    assert astern.time_constant() == time_constant(0.5, 1.0, -1.5)
+    assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
+    assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE
+
+
+def test_a_stop_from_any_velocity_takes_less_than_a_bounded_time() -> None:
+    """With quadratic drag alone, the time to rest is atan(v sqrt(A/F))/sqrt(A F)."""
+    assert time_to_rest(4.0, 0.0, -1.0, 1e300) == pytest.approx(pi / 4.0, rel=1e-15)
+    assert time_to_rest(0.0, 0.0, -2.0, 3.0) == 1.5

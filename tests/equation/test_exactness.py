@@ -1,0 +1,336 @@
+"""Steps in Python and in C are exact: compared with 50 digits, SciPy's integration of the equations, and themselves."""
+
+import random
+from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import islice, product
+from math import copysign, cos, hypot, isfinite, sin
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import pytest
+from mpmath import mp
+from scipy.integrate import solve_ivp
+
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.equation.steps import Step, errors, in_fmu, in_python
+from tests.fmi import ERROR
+from tests.fmi2 import Fmu
+from tests.motions import path_of
+from tests.vehicles import (
+    EVERYTHING,
+    HEAVY,
+    VEHICLES,
+    VIDEORAY,
+    Case,
+    State,
+    Values,
+    at_rest,
+    random_case,
+    random_vehicle,
+    still,
+)
+from verification.references import reference
+from verification.references.closed_form import Axis, axes
+
+VELOCITY, PATH = 2e-14, 1e-13
+"""The allowed errors, relative to the largest velocity and to the length of the path."""
+LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
+EVERY = pytest.mark.parametrize("stride", [4, pytest.param(1, marks=LONG)])
+"""The distance between the cases of a list that are tested."""
+
+
+@pytest.fixture
+def heavy_steps(heavy_dir: Path) -> list[Step]:
+    """The step of the Heavy in C."""
+    return [partial(in_fmu, Fmu(heavy_dir))]
+
+
+def hold(steps: Iterable[Step], cases: Iterable[Case], velocity: float = VELOCITY, path: float = PATH) -> None:
+    """Compare steps with 50 digits."""
+    for case in cases:
+        exact = reference.step(*case)
+        for step in steps:
+            found = errors(step(*case), exact.state, exact.scale, case[2])
+            assert found[0] <= velocity, (step, found, case)
+            assert found[1] <= path, (step, found, case)
+
+
+# ---- Every vehicle, random states, steps of 1 us ... 1,000 s ----
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"), [(3, 0.3), pytest.param(4, 1.0, marks=LONG), pytest.param(15, 2.0, marks=WEEKLY)]
+)
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_a_step_is_exact_for_vehicles_of_every_kind(vehicle: str, number: int, longest: float) -> None:
+    rng = random.Random(vehicle)
+    hold([in_python], [random_case(rng, VEHICLES[vehicle], longest=longest) for _ in range(number)])
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"), [(10, 0.0), pytest.param(30, 1.0, marks=LONG), pytest.param(300, 1.0, marks=WEEKLY)]
+)
+def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> None:
+    """The tolerance is larger because some forces nearly cancel, such as two opposite thrusters, or load and thrust."""
+    rng = random.Random(1)
+    hold([in_python], [random_case(rng, random_vehicle(rng), longest=longest) for _ in range(number)], 1e-12, 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"), [(5, 0.3), pytest.param(8, 2.0, marks=LONG), pytest.param(30, 2.0, marks=WEEKLY)]
+)
+@pytest.mark.parametrize(("name", "rov"), [("heavy", HEAVY), ("everything", load_vehicle(EVERYTHING))])
+def test_a_step_with_coupling_and_lag_is_exact_in_c(
+    request: pytest.FixtureRequest, name: str, rov: Vehicle, number: int, longest: float
+) -> None:
+    rng, step = random.Random(2), partial(in_fmu, Fmu(request.getfixturevalue(f"{name}_dir")))
+    hold([step], [random_case(rng, rov, longest=longest) for _ in range(number)])
+
+
+@pytest.mark.parametrize("number", [10, pytest.param(60, marks=LONG), pytest.param(400, marks=WEEKLY)])
+def test_a_step_of_any_vehicle_of_the_paper_is_exact(steps: list[Step], number: int) -> None:
+    """Random coefficients replace those of the VideoRay."""
+    rng = random.Random(3)
+    vehicles = (random_vehicle(rng, VIDEORAY.layout) for _ in range(number))
+    hold(steps, [random_case(rng, rov, longest=1.0) for rov in vehicles], 1e-12, 1e-12)
+
+
+@pytest.mark.parametrize("stride", [17, pytest.param(1, marks=LONG)])
+def test_extreme_vehicles_are_exact(steps: list[Step], stride: int) -> None:
+    """A vehicle has one gram of mass, and as much drag as a vehicle file may contain: up to 1e12/m and 1e12/s."""
+    light = VIDEORAY.replaced({"m_rov": 1e-3, "beta_w": 1e3})
+    drags, loads = (0.0, 1.0, 1e6), (-1e12, -1.0, 0.0, 1e9)
+    cases = product(drags, drags, loads, (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3))
+    for a_d, b_d, Z_ext, w, h in islice(cases, 0, None, stride):
+        rov, inputs = light.replaced({"a_d_w": a_d, "b_d_w": b_d}), {**still(light), "Z_ext": Z_ext}
+        heave = axes(rov, inputs)[1]
+        exact = reference.axis(heave.A, heave.B, heave.C, w, h)
+        for step in steps:
+            found = step(rov, inputs, {**at_rest(rov), "w": w}, h)
+            assert abs(found["w"] - exact.velocity) <= 2e-15 * exact.scale, (heave, w, h)
+            assert abs(found["z"] - exact.distance) <= 4e-15 * exact.path, (heave, w, h)
+
+
+# ---- Reversals and spins ----
+
+REVERSALS = [
+    *((Axis(1.0, 0.0, 0.01), Axis(0.0, 1.0, r), -0.01, r) for r in (20.0, 50.0, 70.0, 100.0, 150.0, 300.0)),
+    (Axis(0.144, 1e-4, 0.39), Axis(0.104, 0.0, -9173.0), -2.16, -0.87),
+    (Axis(0.122, 0.15, 0.11), Axis(0.085, 0.074, 7886.0), -1.07, 80.9),
+    (Axis(1.35, 0.3, 0.11), Axis(0.0079, 0.9, 2407.0), -5.84, 10.7),
+    (Axis(4.16, 0.09, 0.425), Axis(8.7e-4, 1.3, 9785.0), -1.11, 6.9),
+]
+"""Axes of surge and yaw, u and r. Surge reverses while the vehicle spins; its third derivative jumps there."""
+
+
+def of_axes(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> Case:
+    """Return a step of a vehicle of the paper that has these axes and is driven by loads alone."""
+    ones = dict.fromkeys(VIDEORAY.coefficients, 1.0)
+    rov = Vehicle(VIDEORAY.layout, {**ones, "a_d_u": surge.A, "b_d_u": surge.B, "a_d_r": yaw.A, "b_d_r": yaw.B})
+    return rov, {**still(rov), "X_ext": surge.C, "N_ext": yaw.C}, {**at_rest(rov), "u": u, "r": r}, h
+
+
+@pytest.mark.parametrize("stride", [13, pytest.param(1, marks=LONG)])
+def test_a_reversal_while_spinning_is_exact(steps: list[Step], stride: int) -> None:
+    for after, (surge, yaw, u, r) in islice(product((1.0, 1.3, 0.9, 2.5), REVERSALS), 0, None, stride):
+        hold(steps, [of_axes(surge, yaw, u, r, after * surge.reversal_time(u))], 3e-14, 3e-13)  # of many pieces
+
+
+@pytest.mark.parametrize("stride", [7, pytest.param(1, marks=LONG)])
+def test_a_spin_that_drag_slows_down_is_exact(steps: list[Step], stride: int) -> None:
+    """With a steady u and only A in yaw, x + iy = u ((1 + A r h)^(1 + i/A) - 1)/(r (A + i)) for any angle."""
+    for h, r, A in islice(product((0.01, 1e3), (-1.0, 1e3, 1e6), (4.9e-3, 0.01, 0.3, 3.0)), 0, None, stride):
+        case = of_axes(Axis(0.0, 2.0, 1.0), Axis(A, 0.0, 0.0), 0.5, r, h)
+        with mp.workdps(60):
+            growth = 1 + mp.mpf(A) * abs(r) * h
+            turn = mp.log(growth) / A
+            exact = (growth * mp.expj(turn) - 1) / (2 * abs(r) * mp.mpc(A, 1))
+            size = min(h, growth / abs(r)) / 2
+            for found in (step(*case) for step in steps):
+                # the direction cannot be better than the rounding of the turn
+                position = mp.mpc(found["x"], copysign(found["y"], r * found["y"]))
+                assert abs(position - exact) <= size * 2e-15 * (1 + turn)
+                assert abs(abs(found["psi"]) - turn) <= 1e-15 * turn
+
+
+def spin_up(turn: float, h: float) -> float:
+    """Return the angular acceleration that turns a vehicle by this angle in h seconds from rest."""
+    return 2.0 * turn / h**2
+
+
+@pytest.mark.parametrize("stride", [7, pytest.param(1, marks=LONG)])
+def test_a_turn_that_begins_at_rest_is_exact(steps: list[Step], stride: int) -> None:
+    cases = product((1e-3, 0.1), (0.01, 0.05, 0.12, 0.7, 2.0, 4.0), (0.0, 0.3), (0.0, 0.1))
+    for h, turn, B, share in islice(cases, 0, None, stride):
+        C = spin_up(turn, h)
+        hold(steps, [of_axes(Axis(0.1, 0.2, 0.0), Axis(0.0, B, C), 0.5, share * C * h, h)])
+
+
+@pytest.mark.parametrize("turn", [0.12, *(pytest.param(turn, marks=LONG) for turn in (0.05, 2.0))])
+def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy_steps: list[Step], turn: float) -> None:
+    """The turn begins by a load, or by thrust that fades."""
+    inputs, before, h = still(HEAVY), {**at_rest(HEAVY), "u": 0.5, "v": -0.2}, 0.01
+    load = spin_up(turn, h) * (HEAVY["I_r"] + HEAVY["m_a_r"])
+    thrust = {name: load for name in before if name.startswith("F_")}
+    hold(heavy_steps, [(HEAVY, {**inputs, "N_ext": load}, before, h), (HEAVY, inputs, {**before, **thrust}, h)])
+
+
+# Axes of surge and yaw, u, r and h. Some numbers are huge, others next to nothing.
+FAR = {
+    "a steady turn longer than the age of the universe": (
+        Axis(0.5, 1.4, 0.27),
+        Axis(0.14, 0.12, 5.2),
+        0.0,
+        1e9,
+        1e24,
+    ),
+    "no surge but the smallest number": (Axis(0.5, 1.4, 0.0), Axis(0.14, 0.12, 1e-3), -5e-324, 0.0, 1e9),
+    "a subnormal force": (Axis(0.5, 15.0, -1e-311), Axis(0.14, 0.12, -1e-12), 0.0, 0.0, 500.0),
+}
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_no_turn_goes_too_far(steps: list[Step], name: str) -> None:
+    rov, inputs, before, h = case = of_axes(*FAR[name])
+    surge, _, yaw = axes(rov, inputs)
+    expected = [surge.advance(before["u"], h)[0], yaw.advance(before["r"], h)[0]]
+    distance = path_of(surge, before["u"], h)
+    for found in (step(*case) for step in steps):
+        assert all(map(isfinite, found.values()))
+        # subnormal forces do not move it
+        assert [found["u"], found["r"]] == pytest.approx(expected, rel=1e-14, abs=1e-300)
+        assert hypot(found["x"], found["y"]) <= distance * (1.0 + 1e-14) + 1e-320
+
+
+CALM = Axis(0.5, 1.4, 0.27)
+OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e308 m
+    "turn": of_axes(CALM, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
+    "spin": of_axes(CALM, Axis(0.0055, 0.0, 0.0), 0.0, 1.7e308, 1e308),
+    "distance": of_axes(Axis(0.0, 0.0, 1e300), CALM, 0.0, 1.0, 1e8),
+    "both": of_axes(Axis(0.0, 0.0, -1.0), Axis(0.0, 0.0, 0.0), 1e10, 1e300, 1e10 + 10.0),
+}
+
+
+@pytest.mark.parametrize("name", OVERFLOWING)
+def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: Fmu, name: str) -> None:
+    rov, inputs, before, h = OVERFLOWING[name]
+    start = process_time()
+    with fmu.instance() as instance:
+        instance.start({**rov.coefficients, **inputs, **before})
+        assert instance.step(0.0, h) == ERROR
+        assert any(word in instance.log[-1].text for word in ("overflows", "MOST_PIECES"))
+    assert process_time() - start < 20.0  # a million pieces, of 2 to 5 us each, precede a refusal
+
+
+# ---- The VideoRay, against an integration of the equations as the paper prints them ----
+
+AHEAD = {"u_l": 0.5, "u_r": 0.5}
+MANOEUVRES: dict[str, tuple[Values, Values]] = {
+    "ahead": (AHEAD, {}),
+    "astern": ({"u_l": -0.7, "u_r": -0.7}, {}),
+    "reversing": ({"u_l": -0.5, "u_r": -0.5}, {"u": 1.2}),
+    "turning": ({"u_l": 0.6, "u_r": 0.3}, {"psi": 1.0}),
+    "turning back": ({"u_l": 0.3, "u_r": 0.6}, {"u": 0.8, "r": 1.5}),
+    "spinning": ({"u_l": 0.7, "u_r": -0.7}, {"u": 0.5}),
+    "diving": ({"u_t": 0.7}, {"w": -0.3, "z": 5.0}),
+    "against loads": (
+        {"u_l": 0.4, "u_r": 0.2, "u_t": -0.3, "X_ext": -3.0, "Z_ext": 1.5, "N_ext": 0.1},
+        {"u": 0.5, "w": 0.2, "r": -1.0},
+    ),
+    "in a current": ({**AHEAD, "u_r": 0.45, "V_N": 0.3, "V_E": -0.8}, {"x": 10.0, "y": -20.0, "psi": -2.0}),
+    "coasting": ({}, {"u": 1.5, "w": -0.4, "r": 3.0}),
+}
+
+
+def manoeuvre(name: str) -> tuple[State, State]:
+    inputs, state = MANOEUVRES[name]
+    return {**still(VIDEORAY), **inputs}, {**at_rest(VIDEORAY), **state}
+
+
+def integrated(k: Values, i: Values, before: Values, h: float) -> State:
+    """Return the states after h seconds: (18), (2), (4) and the kinematics, integrated by DOP853."""
+    F_l, F_r = ((k["a_t_rear"] * abs(c) * c + k["b_t_rear"] * c) / 2.0 for c in (i["u_l"], i["u_r"]))  # half of (9)
+    F_t = k["a_t_top"] * abs(i["u_t"]) * i["u_t"] + k["b_t_top"] * i["u_t"]
+    torque = F_l * k["R"] * sin(k["gamma"]) + F_r * k["R"] * sin(-k["gamma"])
+    X, Z, N = (
+        k["alpha_u"] * (F_r + F_l) + i["X_ext"],
+        k["alpha_w"] * F_t + i["Z_ext"],
+        k["alpha_r"] * torque + i["N_ext"],
+    )
+
+    def rates(_t: float, state: Any) -> list[float]:
+        u, w, r, _x, _y, _z, psi = state
+        return [
+            k["beta_u"] * (X - (k["a_d_u"] * u * abs(u) + k["b_d_u"] * u)) / k["m_rov"],
+            k["beta_w"] * (Z - (k["a_d_w"] * w * abs(w) + k["b_d_w"] * w)) / k["m_rov"],
+            k["beta_r"] * (N - (k["a_d_r"] * r * abs(r) + k["b_d_r"] * r)) / k["I_r"],
+            u * cos(psi) + i["V_N"],
+            u * sin(psi) + i["V_E"],
+            w,
+            r,
+        ]
+
+    solution = solve_ivp(rates, (0.0, h), list(before.values()), method="DOP853", rtol=1e-12, atol=1e-12)
+    return dict(zip(before, solution.y[:, -1], strict=True))
+
+
+@pytest.mark.parametrize("h", [1.0, *(pytest.param(h, marks=LONG) for h in (0.1, 20.0))])
+def test_a_step_solves_the_equations_of_the_paper(steps: list[Step], h: float) -> None:
+    for name in MANOEUVRES:
+        inputs, before = manoeuvre(name)
+        expected = integrated(VIDEORAY.coefficients, inputs, before, h)
+        for step in steps:
+            assert step(VIDEORAY, inputs, before, h) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+# ---- Many steps, long steps and far headings ----
+
+
+@EVERY
+def test_one_step_of_ten_seconds_is_a_thousand_of_ten_milliseconds(fmu: Fmu, stride: int) -> None:
+    for name in islice(MANOEUVRES, 0, None, stride):
+        inputs, before = manoeuvre(name)
+        once, often = (in_fmu(fmu, VIDEORAY, inputs, before, 10.0, steps) for steps in (1, 1000))
+        assert [often[v] for v in "uwr"] == pytest.approx([once[v] for v in "uwr"], rel=1e-13, abs=1e-15)
+        assert often == pytest.approx(once, rel=1e-12, abs=1e-12)
+
+
+@EVERY
+def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(steps: list[Step], stride: int) -> None:
+    for name in islice(MANOEUVRES, stride - 1, None, stride):
+        inputs, before = manoeuvre(name)
+        exact = reference.step(VIDEORAY, inputs, before, 1000.0)
+        for step in steps:
+            started = process_time()
+            found = step(VIDEORAY, inputs, before, 1000.0)
+            assert process_time() - started < 0.1
+            assert max(errors(found, exact.state, exact.scale, before)) <= 1e-14
+
+
+@pytest.mark.parametrize("psi", [1e3, -1e6, 1e9])
+def test_a_heading_far_from_zero_is_as_good_as_one_near_it(steps: list[Step], psi: float) -> None:
+    inputs, before = {**still(VIDEORAY), "u_l": 0.6, "u_r": 0.3}, {**at_rest(VIDEORAY), "u": 0.5}
+    for step in steps:
+        near, far = (step(VIDEORAY, inputs, {**before, "psi": start}, 10.0) for start in (0.0, psi))
+        assert (far["u"], far["r"]) == pytest.approx((near["u"], near["r"]), rel=1e-14)
+        c, d, x, y = cos(psi), sin(psi), near["x"], near["y"]
+        assert (far["x"], far["y"]) == pytest.approx((x * c - y * d, x * d + y * c), rel=1e-13, abs=1e-15)
+        assert far["psi"] == pytest.approx(psi + near["psi"], rel=1e-15)
+
+
+@pytest.mark.parametrize("number", [1, 1000])
+def test_a_steady_turn_stays_on_its_circle(fmu: Fmu, number: int) -> None:
+    inputs, h = {**still(VIDEORAY), "u_l": 0.6, "u_r": 0.3}, 1e6
+    of_both: list[Callable[..., State]] = [partial(in_fmu, fmu), in_python]
+    for step in of_both[: 2 if number == 1 else 1]:
+        start = step(VIDEORAY, inputs, at_rest(VIDEORAY), 100.0)
+        end = step(VIDEORAY, inputs, start, h, number)
+        assert (end["u"], end["r"]) == pytest.approx((start["u"], start["r"]), rel=1e-15)
+        assert end["psi"] - start["psi"] == pytest.approx(start["r"] * h, rel=1e-13)
+        radius = start["u"] / start["r"]
+        centres = [(s["x"] - radius * sin(s["psi"]), s["y"] + radius * cos(s["psi"])) for s in (start, end)]
+        # psi of 1e6 rad has 1e-10 rad of rounding; in Python, each whole turn has some of its own
+        room = (1e-8 if step is in_python else 1e-9) * radius
+        assert centres[1] == pytest.approx(centres[0], abs=room)

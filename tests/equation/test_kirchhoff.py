@@ -1,0 +1,70 @@
+"""Invariants of Kirchhoff's equations: what stays constant while a body tumbles through still water without forces."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rov_fmu.c.simulation import simulate
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.vehicles import SIX, State, at_rest, frictionless, still, with_axes
+from verification.references import rigid_vehicle
+from verification.references.rigid_body import rotation
+from verification.references.rigid_vehicle import compared, places
+
+Array = NDArray[np.float64]
+TUMBLING = {"u": 0.4, "v": -0.6, "w": 0.3, "p": 1.7, "q": -1.1, "r": 2.3, "x": 5.0, "y": -3.0, "z": 2.0}
+TUMBLING |= {"eta": 0.1, "epsilon_1": -0.7, "epsilon_2": 0.5, "epsilon_3": 0.5}  # of length 1
+LENGTHS = pytest.mark.parametrize("h", [1e-3, 0.1, 10.0])
+SECONDS = 100.0
+
+
+def tumbled(rov: Vehicle, h: float) -> tuple[Array, Array, Array]:
+    """Return the velocities, the positions and the rotation matrices of a tumbling vehicle; time is the last axis."""
+    names = [*rov.layout.velocities, *"xyz", *rigid_vehicle.QUATERNION]
+    times = np.arange(round(SECONDS / h) + 1) * h
+    y = simulate(rov, times, TUMBLING, names, workers=1).values[:, 0]
+    assert np.all(np.isfinite(y))
+    assert np.ptp(y[:6], axis=1).min() > 0.1  # it does tumble
+    return y[:6], y[6:9], np.array(rotation([*y[9:]]))
+
+
+def drift(x: Array, size: float) -> float:
+    """Return the largest change from the start, relative to a size."""
+    return float(np.abs(x - x[..., :1]).max()) / size
+
+
+@LENGTHS
+def test_a_free_body_keeps_its_energy_and_its_impulses(h: float) -> None:
+    rov = frictionless(SIX).replaced({"W": 0.0, "B": 0.0})
+    nu, x, R = tumbled(rov, h)
+    momentum = np.array(rigid_vehicle.body(rov, still(rov)).mass) @ nu
+    linear = np.einsum("ijt,jt->it", R, momentum[:3])
+    angular = np.cross(x, linear, axis=0) + np.einsum("ijt,jt->it", R, momentum[3:])
+    energy, P, L = (nu * momentum).sum(axis=0), *(np.linalg.norm(vector, axis=0).max() for vector in (linear, angular))
+    assert drift(energy, energy[0]) <= 1e-12
+    assert drift(linear, P) <= 1e-12
+    assert drift(angular, np.linalg.norm(x, axis=0).max() * P + L) <= 1e-12
+
+
+@LENGTHS
+def test_weight_and_buoyancy_keep_the_total_energy(h: float) -> None:
+    rov = frictionless(SIX).replaced({"W": SIX["B"]})  # neither sinks nor rises
+    nu, x, R = tumbled(rov, h)
+    body = rigid_vehicle.body(rov, still(rov))
+    kinetic = 0.5 * (nu * (np.array(body.mass) @ nu)).sum(axis=0)
+    heights = [np.array(centre) @ R[2] + x[2] for centre in (body.centre_of_buoyancy, body.centre_of_gravity)]
+    energy = kinetic + body.buoyancy * heights[0] - body.weight * heights[1]
+    assert drift(energy, kinetic.max() + body.weight * np.abs(x[2]).max()) <= 1e-12
+
+
+def test_pitch_alone_is_back_after_ten_turns() -> None:
+    rov = frictionless(with_axes("q"))
+    start = at_rest(rov) | {"q": 2.0}
+    seconds = 10.0 * pi
+    for steps in (1, 1000):
+        state: State = start
+        for _ in range(steps):
+            state = rov.step(still(rov), state, seconds / steps)
+        assert compared(rov, places(rov, state)) == pytest.approx(compared(rov, places(rov, start)), abs=1e-12)

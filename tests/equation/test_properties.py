@@ -1,0 +1,158 @@
+"""Laws that the step of one axis obeys for every drag, force, velocity and time, tested without a reference."""
+
+from collections.abc import Callable, Sequence
+from math import e, inf
+from typing import Any
+
+import pytest
+from hypothesis import assume
+from hypothesis import strategies as st
+
+from rov_fmu.equation.alone import steady_velocity, time_constant
+from tests.motions import (
+    BOUNDARIES,
+    CASES,
+    SMALLEST,
+    TINY,
+    Case,
+    hold,
+    memory,
+    path,
+    power,
+    rounding_of_distance,
+    rounding_of_velocity,
+    signed,
+    similar,
+    step_alone,
+)
+from verification.references.closed_form import time_to_rest
+
+
+def for_every(
+    *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
+) -> Callable[[Callable[..., None]], Callable[[int], None]]:
+    """Make a test of a law: for the cases in `at`, and for random motions, many more of them in the long tests."""
+
+    def decorate(law: Callable[..., None]) -> Callable[[int], None]:
+        @pytest.mark.parametrize(
+            "motions", [15, pytest.param(250, marks=pytest.mark.long), pytest.param(3000, marks=pytest.mark.weekly)]
+        )
+        def test(motions: int) -> None:
+            hold(law, motions, *strategies, at=at)
+
+        test.__doc__ = law.__doc__
+        return test
+
+    return decorate
+
+
+# ---- Symmetry and semigroup ----
+
+
+@for_every(CASES, at=[(case,) for case in BOUNDARIES])
+def test_left_and_right_are_mirror_images_to_the_last_bit(case: Case) -> None:
+    A, B, C, v0, h = case
+    velocity, distance = step_alone(*case)
+    assert step_alone(A, B, -C, -v0, h) == (-velocity, -distance)
+
+
+@for_every(similar(), st.integers(-20, 20), st.integers(-20, 20), at=[(case, 3, -5) for case in BOUNDARIES[:8]])
+def test_units_of_powers_of_two_change_no_bit(case: Case, metres: int, seconds: int) -> None:
+    A, B, C, v0, h = case
+    m, s = 2.0**metres, 2.0**seconds
+    velocity, distance = step_alone(*case)
+    assume(abs(velocity) > 1e-290 or C == v0 == 0.0)  # a subnormal velocity has fewer digits
+    assert step_alone(A / m, B / s, C * m / s / s, v0 * m / s, h * s) == (velocity * m / s, distance * m)
+
+
+@for_every(CASES, st.just(0.5) | st.floats(0.5, 1.0), st.booleans(), at=[(case, 0.5, True) for case in BOUNDARIES])
+def test_two_parts_of_a_step_are_the_step(case: Case, fraction: float, longer_first: bool) -> None:
+    """Many of the parts are half steps. Drag only damps the rounding error of the first part."""
+    A, B, C, v0, h = case
+    parts = [fraction * h, h - fraction * h]  # the difference is exact
+    assume(parts[1] > 0.0)
+    t1, t2 = parts if longer_first else parts[::-1]
+    velocity, distance = step_alone(*case)
+    middle, first = step_alone(A, B, C, v0, t1)
+    end, second = step_alone(A, B, C, middle, t2)
+    rounding = rounding_of_velocity(v0, velocity)
+    assert abs(end - velocity) <= 3.0 * rounding
+    # Without a braking force nothing cancels, and the rounding error is relative to the velocity itself.
+    passed_on = rounding if C < 0.0 < v0 or v0 < 0.0 < C else rounding_of_velocity(middle)
+    slowest = min(abs(middle), abs(end)) if middle * end > 0.0 else 0.0
+    allowed = 2.0 * rounding_of_distance(case) + passed_on * memory(A, B, t2, slowest)
+    assert abs(first + second - distance) <= allowed + 2.0**-52 * (abs(first) + abs(second))
+
+
+# ---- Approach to equilibrium ----
+
+
+@for_every(CASES, st.floats(1.0, 10.0), at=[(case, 2.0) for case in BOUNDARIES])
+def test_the_velocity_approaches_the_steady_one_and_never_passes_it(case: Case, longer: float) -> None:
+    A, B, C, v0, h = case
+    V = steady_velocity(A, B, C)
+    early, late = (step_alone(A, B, C, v0, time)[0] for time in (h, h * longer))
+    rounding = 2.0 * rounding_of_velocity(v0, early, late)
+    low, high = min(v0, V) - rounding, max(v0, V) + rounding
+    assert low <= early <= high
+    assert low <= late <= high
+    assert early <= late + rounding if v0 < V else late <= early + rounding
+
+
+@for_every(CASES, at=[(case,) for case in BOUNDARIES])
+def test_without_force_no_motion_gains_one_bit_of_speed_or_turns(case: Case) -> None:
+    A, B, _, v0, h = case
+    velocity, distance = step_alone(A, B, 0.0, v0, h)
+    assert 0.0 <= velocity <= v0 or v0 <= velocity <= 0.0
+    assert abs(distance) <= abs(v0) * h
+    assert distance * v0 >= 0.0
+
+
+@for_every(signed(-323.0, 18.0), power(-9.0, 9.0))
+def test_without_force_and_drag_no_bit_of_the_velocity_changes(v0: float, h: float) -> None:
+    assert step_alone(0.0, 0.0, 0.0, v0, h) == (v0, v0 * h)
+
+
+@for_every(CASES, at=[(case,) for case in [*BOUNDARIES, (0.0, 1e-280, 1e-280, 0.0, 1.0)]])
+def test_after_the_time_constant_a_start_from_rest_has_63_percent_of_the_steady_velocity(case: Case) -> None:
+    """The rounding error of Tau is multiplied by the acceleration, which is at most C, and C Tau is at most V_ss."""
+    A, B, C, _, _ = case
+    V, Tau = steady_velocity(A, B, C), time_constant(A, B, C)
+    assume(0.0 < abs(V) < inf and 0.0 < Tau < inf)
+    assume(abs(C) > 1e-290 and abs(V) < 1e150)  # no subnormal numbers, and the square of V does not overflow
+    assume(abs(V) * Tau < inf)  # the distance does not overflow: such a step is refused
+    velocity = step_alone(A, B, C, 0.0, Tau)[0]
+    assert abs(velocity - (1.0 - 1.0 / e) * V) <= 2.0 * rounding_of_velocity(V)
+
+
+@for_every(CASES, at=[((0.0, 1e-170, -1e-300, 1.0, 1.0),), ((1e-200, 0.0, -1e-200, 1.0, 1.0),)])
+def test_a_motion_against_the_force_is_at_rest_after_the_time_to_rest(case: Case) -> None:
+    """The rounding error of the time is multiplied by |C|, and |C| times the time is at most |v0| because drag brakes.
+
+    A subnormal acceleration has an error of its last digit all that time.
+    """
+    A, B, C, v0, _ = case
+    assume(C != 0.0 != v0)
+    C, v0 = -abs(C), abs(v0)
+    rest = time_to_rest(A, B, C, v0)
+    assume(0.0 < rest < inf and v0 * rest < inf)
+    assert abs(step_alone(A, B, C, v0, rest)[0]) <= 2.0 * rounding_of_velocity(v0) + SMALLEST * (rest - C)
+
+
+# ---- Energy ----
+
+
+@for_every(CASES, at=[(case,) for case in BOUNDARIES])
+def test_drag_takes_no_less_energy_than_at_an_even_speed_and_gives_none(case: Case) -> None:
+    """The lost energy is the work C s minus the gain of v^2/2. It is the integral of B v^2 + A |v|^3.
+
+    Over a given path it is least at an even speed (Jensen) and at most that at the largest speed.
+    """
+    A, B, C, v0, h = case
+    velocity, distance = step_alone(*case)
+    fastest, length = max(abs(v0), abs(velocity)), path(*case)
+    lost = C * distance - 0.5 * (velocity - v0) * (velocity + v0)
+    even, most = (B * length / h + A * (length / h) ** 2) * length, (B + A * fastest) * fastest * length
+    rounding = 2.0 * fastest * rounding_of_velocity(fastest) + abs(C) * rounding_of_distance(case)
+    rounding += 4.0 * (B * length / h + A * (length / h) ** 2) * rounding_of_distance(case) + 1e-15 * most + TINY
+    assert even - rounding <= lost <= most + rounding

@@ -1,0 +1,116 @@
+"""Commands as pulse widths: the vehicle moves as one with fractions does at the converted inputs."""
+
+import random
+
+import numpy as np
+import pytest
+
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.dependencies import dependencies_of
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, at_rest, pulsed, random_inputs, random_state
+
+PULSE = (1100.0, 1480.0, 1900.0)
+ROVS = {
+    "thrust": load_vehicle(THRUST_EFFECTS),  # with tables, a dead band, a fin and a dead time
+    "mixed": next(rov for rov in VEHICLES.values() if rov.layout.mix),
+    "six axes": SIX,
+}
+
+
+@pytest.fixture(params=ROVS)
+def rov(request: pytest.FixtureRequest) -> Vehicle:
+    """Return a vehicle whose commands are fractions."""
+    return ROVS[request.param]
+
+
+def pulses_of(rng: random.Random, rov: Vehicle) -> tuple[dict[str, float], dict[str, float]]:
+    """Return random inputs with pulse widths, some of them far beyond full thrust, and the same ones with fractions."""
+    low, neutral, high = PULSE
+    inputs = random_inputs(rng, rov)
+    pulses = {name: rng.choice((0.0, neutral, *[rng.uniform(900.0, 2100.0)] * 8)) for name in rov.layout.commands}
+
+    def fraction(pulse: float) -> float:
+        if pulse == 0.0:  # there is no signal
+            return 0.0
+        return (pulse - neutral) / (high - neutral if pulse > neutral else neutral - low)
+
+    return inputs | pulses, inputs | {name: fraction(pulse) for name, pulse in pulses.items()}
+
+
+def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
+    rng, of_pulses = random.Random(1), pulsed(rov, PULSE)
+    lines = of_pulses.delay_line(), rov.delay_line()
+    state = random_state(rng, rov)
+    for n in range(12):
+        pulses, fractions = pulses_of(rng, rov)
+        found = lines[0].step(of_pulses, pulses, state, 0.07 * n, 0.07)
+        assert found == lines[1].step(rov, fractions, state, 0.07 * n, 0.07)
+        assert of_pulses.derivatives(pulses, state) == rov.derivatives(fractions, state)
+        assert of_pulses.calculated(pulses, state) == rov.calculated(fractions, state)
+        state = {name: found[name] for name in state}
+
+
+def test_the_engine_steps_as_with_fractions_bit_for_bit(rov: Vehicle) -> None:
+    rng, times = random.Random(2), np.cumsum([0.0, *[0.04, 0.1, 0.27] * 8])
+    rows = [pulses_of(rng, rov) for _ in times]
+    pulses, fractions = ({name: np.array([row[k][name] for row in rows]) for name in rov.layout.inputs} for k in (0, 1))
+    found = simulate(pulsed(rov, PULSE), times, pulses, workers=1).values
+    assert np.isfinite(found).all()
+    assert np.abs(found).max() > 0.1
+    assert found.tolist() == simulate(rov, times, fractions, workers=1).values.tolist()
+
+
+def test_neutral_gives_no_thrust_and_is_the_start_value(rov: Vehicle) -> None:
+    of_pulses = pulsed(rov, PULSE)
+    usual = of_pulses.layout.usual_inputs
+    for name, command in of_pulses.layout.commands.items():
+        assert (command.unit, command.minimum, command.start, command.maximum) == ("us", *PULSE)
+        assert usual[name] == PULSE[1]
+    assert set(of_pulses.commanded(usual).values()) == {0.0}
+    assert of_pulses.layout.usual_inputs.keys() == rov.layout.usual_inputs.keys()
+    times = np.array([0.0, 0.3, 0.6])
+    names = [*rov.layout.state, *rov.layout.calculated]
+    assert (
+        simulate(of_pulses, times, record=names).values.tolist() == simulate(rov, times, record=names).values.tolist()
+    )
+
+
+def test_a_pulse_beyond_the_range_saturates() -> None:
+    rov = pulsed(ROVS["thrust"], PULSE)
+
+    def thrust(pulse: float) -> dict[str, float]:
+        return rov.commanded(rov.layout.usual_inputs | dict.fromkeys(rov.layout.commands, pulse))
+
+    assert thrust(1.0) == thrust(-5e3) == thrust(1100.0) != thrust(1101.0)
+    assert thrust(1e4) == thrust(1900.0) != thrust(1899.0)
+    assert thrust(1.0)["l"] < 0.0 < thrust(1e4)["l"]
+
+
+def test_v_ss_and_the_commands_of_an_axis_are_those_of_the_fractions(rov: Vehicle) -> None:
+    of_pulses = pulsed(rov, PULSE)
+    for form in rov.layout.axes:
+        for command in (-1.0, -0.4, 0.3, 1.0):
+            V_ss, Tau = rov.response(form.axis, command)
+            assert of_pulses.response(form.axis, command) == pytest.approx((V_ss, Tau), rel=1e-12, abs=1e-15)
+    heave = AXES["heave"]
+    held = pulsed(SIX, PULSE).held_inputs(heave, 1.0)
+    assert {held[name] for name in SIX.layout.signs(heave)} <= {PULSE[0], PULSE[2]}
+
+
+def test_what_depends_on_a_command_still_does(rov: Vehicle) -> None:
+    found, expected = dependencies_of(pulsed(rov, PULSE).layout), dependencies_of(rov.layout)
+    assert {name: [*known] for name, known in found.items()} == {name: [*known] for name, known in expected.items()}
+
+
+def test_a_command_acts_after_the_dead_time_and_neutral_before() -> None:
+    rov = pulsed(ROVS["thrust"], PULSE)
+    line = rov.delay_line()
+    assert set(line.delayed.values()) == {PULSE[1]}
+    inputs = rov.layout.usual_inputs | {"u_l": 1900.0}
+    state = line.step(rov, inputs, at_rest(rov), 0.0, rov["T_d"])
+    assert (state["u"], line.delayed["delayed_u_l"], line.delayed["delayed_u_r"]) == (0.0, 1900.0, 1480.0)
+    in_c = simulate(rov, np.array([0.0, 0.09, 0.11]), {"u_l": 1900.0}, ["delayed_u_l", "delayed_u_r", "u"]).values[:, 0]
+    assert in_c[:2].tolist() == [[1480.0, 1480.0, 1900.0], [1480.0] * 3]
+    assert in_c[2, 1] == 0.0 < in_c[2, 2]

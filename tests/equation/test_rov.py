@@ -1,0 +1,251 @@
+"""The mathematics of rov_fmu/vehicle/vehicle.py: thrust, signs, rates."""
+
+import random
+from math import copysign, cos, inf, pi, sin
+
+import pytest
+from mpmath import mp
+
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.vehicles import (
+    HEAVY,
+    SIX,
+    VEHICLES,
+    State,
+    Values,
+    at_rest,
+    random_case,
+    random_inputs,
+    random_vehicle,
+    still,
+)
+from verification.references.equations import equations, steady_forces
+
+COMMANDS = [-1.0, -0.7, -0.2, 0.0, 0.1, 0.27, 0.5, 1.0]
+
+
+@pytest.fixture(scope="module")
+def k(vehicle: Vehicle) -> Vehicle:
+    return vehicle
+
+
+def held(rov: Vehicle, **values: float) -> State:
+    """Return all inputs: these values, and 0 for the others."""
+    return {**still(rov), **values}
+
+
+def thrust(rov: Vehicle, **commands: float) -> Values:
+    return rov.calculated(held(rov, **commands), at_rest(rov))
+
+
+# ---- Thrust ----
+
+
+@pytest.mark.parametrize("c", COMMANDS)
+def test_thrust_is_that_of_2_9_and_10(k: Vehicle, c: float) -> None:
+    F = thrust(k, u_l=c, u_r=c, u_t=c)
+    assert pytest.approx(42.9 * abs(c) * c + 2.711 * c, rel=1e-15) == F["F_l"] + F["F_r"]
+    assert pytest.approx(6.494 * abs(c) * c + 0.0513 * c, rel=1e-15) == F["F_t"]
+    assert F["F_l"] == F["F_r"]
+    assert F["tau_rear"] == 0.0
+
+
+@pytest.mark.parametrize("c", COMMANDS)
+def test_the_unweighted_rear_thrust_is_that_of_8_negative_below_27_percent(vehicle: Vehicle, c: float) -> None:
+    unweighted = vehicle.replaced(vehicle.alternatives["unweighted_rear_thrust"].values)
+    F = thrust(unweighted, u_l=c, u_r=c)
+    assert pytest.approx(100.3 * abs(c) * c - 27.09 * c, rel=1e-14) == F["F_l"] + F["F_r"]
+    assert (F["F_l"] * c < 0.0) == (0.0 < abs(c) <= 0.27)
+
+
+def test_each_rear_thruster_has_half_the_pair_and_the_torque_of_4(k: Vehicle) -> None:
+    F = thrust(k, u_l=0.6, u_r=-0.3)
+    assert pytest.approx((42.9 * 0.36 + 2.711 * 0.6) / 2.0, rel=1e-15) == F["F_l"]
+    assert pytest.approx(-(42.9 * 0.09 + 2.711 * 0.3) / 2.0, rel=1e-15) == F["F_r"]
+    assert pytest.approx(0.22 * sin(0.423) * F["F_l"] + 0.22 * sin(-0.423) * F["F_r"], rel=1e-15) == F["tau_rear"]
+
+
+@pytest.mark.parametrize("beyond", [1.0 + 1e-15, 1.5, 1e300])
+def test_commands_beyond_full_thrust_saturate(k: Vehicle, beyond: float) -> None:
+    full, more = held(k, u_l=1.0, u_r=-1.0, u_t=1.0), held(k, u_l=beyond, u_r=-beyond, u_t=beyond)
+    assert k.calculated(more, at_rest(k)) == k.calculated(full, at_rest(k))
+    assert k.step(more, at_rest(k), 1.0) == k.step(full, at_rest(k), 1.0)
+
+
+@pytest.mark.parametrize("cases", [25, pytest.param(300, marks=pytest.mark.long)])
+def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -> None:
+    """They agree within the rounding of the largest term, also at rest and on the edges of the dead band."""
+    rng = random.Random(6)
+    for _ in range(cases):
+        rov, inputs, state, _ = random_case(rng, random_vehicle(rng))
+        with mp.workdps(50):
+            exact = steady_forces(rov, inputs)
+            assert rov.commanded(inputs) == pytest.approx({n: float(F) for n, F in exact.items()}, rel=1e-13, abs=1e-13)
+            rates = equations(rov, inputs).rates({name: mp.mpf(value) for name, value in state.items()}, inputs)
+            size = 1.0 + sum(abs(float(rate)) for rate in rates.values())
+            expected = {name: float(rate) for name, rate in rates.items()}
+        assert rov.derivatives(inputs, state) == pytest.approx(expected, rel=1e-13, abs=1e-13 * size)
+
+
+@pytest.mark.parametrize("stronger", ["forward", "reverse"])
+def test_the_strongest_thrust_is_that_of_the_better_direction(stronger: str) -> None:
+    better, worse = (29.30, 31.51), (21.76, 25.52)  # a_t and b_t of a T200
+    forward, reverse = (better, worse) if stronger == "forward" else (worse, better)
+    ends = (forward[0], forward[1], reverse[0], reverse[1], 0.0872)
+    keys = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
+    rov = HEAVY.replaced(dict(zip(keys, ends, strict=True)))
+    m = 1.0 - 0.0872
+    assert rov.strongest(HEAVE) == pytest.approx(4.0 * (better[0] * m + better[1]) * m, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_within_the_dead_band_and_on_its_edge_there_is_no_thrust(sign: float) -> None:
+    c_0 = HEAVY["c_0_t200"]
+    for command in (0.0, 0.5 * c_0, c_0):
+        assert set(HEAVY.commanded(held(HEAVY, u_1=sign * command)).values()) == {0.0}
+    assert HEAVY.commanded(held(HEAVY, u_1=sign * (c_0 + 1e-6)))["1"] * sign > 0.0
+
+
+def test_one_input_drives_several_thrusters_and_each_of_them_saturates() -> None:
+    rov = VEHICLES["with an input mix"]
+    both, ahead = (rov.commanded(held(rov, **inputs)) for inputs in ({"u_ahead": 1.0, "u_turn": 1.0}, {"u_ahead": 1.0}))
+    assert both["2"] == ahead["2"] == rov.curve_force(rov.layout.curves[0], 1.0)
+    assert both["1"] == rov.curve_force(rov.layout.curves[0], 0.5)
+
+
+# ---- Signs ----
+
+
+@pytest.mark.parametrize(
+    ("inputs", "signs"),
+    [
+        ({"u_l": 0.3, "u_r": 0.3}, {"u": 1, "x": 1}),
+        ({"u_l": -0.3, "u_r": -0.3}, {"u": -1, "x": -1}),
+        ({"u_l": 0.3, "u_r": -0.3}, {"r": 1, "psi": 1}),
+        ({"u_l": -0.3, "u_r": 0.3}, {"r": -1, "psi": -1}),
+        ({"u_l": 0.5, "u_r": 0.3}, {"u": 1, "x": 1, "y": 1, "r": 1, "psi": 1}),
+        ({"u_t": 0.3}, {"w": 1, "z": 1}),
+        ({"u_t": -0.3}, {"w": -1, "z": -1}),
+        ({"X_ext": 1.0}, {"u": 1, "x": 1}),
+        ({"Z_ext": 1.0}, {"w": 1, "z": 1}),
+        ({"N_ext": 0.1}, {"r": 1, "psi": 1}),
+        ({"V_N": 1.0}, {"x": 1}),
+        ({"V_E": 1.0}, {"y": 1}),
+    ],
+)
+def test_the_signs_are_those_of_the_body_and_earth_frames(k: Vehicle, inputs: Values, signs: dict[str, int]) -> None:
+    after = k.step({**still(k), **inputs}, at_rest(k), 0.5)
+    assert {name: copysign(1, value) for name, value in after.items() if value != 0.0} == signs
+
+
+def test_north_is_ahead_at_heading_zero_and_east_at_a_quarter_turn(k: Vehicle) -> None:
+    ahead = held(k, u_l=0.5, u_r=0.5)
+    distance = k.step(ahead, at_rest(k), 2.0)["x"]
+    for psi in (0.0, 0.5 * pi, pi, -0.5 * pi, 2.0):
+        after = k.step(ahead, {**at_rest(k), "psi": psi}, 2.0)
+        assert (after["x"], after["y"]) == pytest.approx(
+            (distance * cos(psi), distance * sin(psi)), rel=1e-15, abs=1e-15
+        )
+        assert after["psi"] == psi
+
+
+def test_a_current_displaces_and_does_nothing_else(k: Vehicle) -> None:
+    calm = held(k, u_l=0.5, u_r=0.2, u_t=-0.4)
+    before = {**at_rest(k), "u": 0.3, "w": 0.1, "r": -1.0, "psi": 0.7}
+    a, b = (k.step(inputs, before, 3.0) for inputs in (calm, {**calm, "V_N": 0.5, "V_E": -0.25}))
+    assert {**b, "x": a["x"], "y": a["y"]} == pytest.approx(a, rel=1e-13)  # the substeps depend on the current
+    assert (b["x"] - a["x"], b["y"] - a["y"]) == pytest.approx((1.5, -0.75), rel=1e-13)
+
+
+# ---- Rates and steps ----
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
+    rng = random.Random(vehicle)
+    for _ in range(3):
+        rov, inputs, before, _ = random_case(rng, VEHICLES[vehicle])
+
+        def rates(h: float, rov: Vehicle = rov, inputs: Values = inputs, before: Values = before) -> list[float]:
+            after = rov.step(inputs, before, h)
+            return [(after[name] - before[name]) / h for name in before]
+
+        # the error of first order in h cancels; the third derivative of yaw is about 1e3
+        found = [2.0 * b - a for a, b in zip(rates(1e-5), rates(0.5e-5), strict=True)]
+        expected = rov.derivatives(inputs, before)
+        assert list(expected) == list(before)
+        assert found == pytest.approx(list(expected.values()), rel=3e-7, abs=3e-7)
+
+
+def test_a_step_does_not_change_its_arguments() -> None:
+    inputs, before = random_inputs(random.Random(8), HEAVY), at_rest(HEAVY)
+    copies = dict(inputs), dict(before)
+    assert HEAVY.step(inputs, before, 0.1).keys() == before.keys()
+    assert (inputs, before) == copies
+
+
+# ---- One axis alone ----
+
+
+def test_an_axis_alone_has_the_numbers_of_18() -> None:
+    rov = VEHICLES["drag by direction, coupled, late"].replaced({"alpha_u": 0.5, "beta_u": 0.8})
+    form = rov.layout.kinds["surge"]
+    m, gain = 13.5 + 6.3567, 0.8 / (13.5 + 6.3567)
+    assert rov.effective_inertia(form) == pytest.approx(m / 0.8)
+    still = VEHICLES["VideoRay"].replaced({"beta_u": 0.0})
+    assert still.effective_inertia(still.layout.kinds["surge"]) == inf
+    assert still.response(SURGE, 0.5) == (0.0, inf)
+    motion = rov.alone(SURGE, held(rov, X_ext=2.0))
+    assert pytest.approx((gain * 141.0, gain * 13.7)) == (motion.A, motion.B)
+    assert motion.reverse == pytest.approx((gain * 190.0, gain * 4.0))
+    assert pytest.approx(gain * (2.0 + 0.1)) == motion.C
+    assert rov.motions(held(rov, X_ext=2.0))[0] == motion
+    thrust = rov.force(SURGE, 0.5)
+    assert pytest.approx(gain * (0.5 * thrust + 0.1)) == rov.held(SURGE, 0.5).C
+
+
+def test_the_net_weight_is_a_load_in_heave_alone() -> None:
+    still = SIX.motions(held(SIX))
+    loads = {form.axis.name: x.C * SIX.effective_inertia(form) for form, x in zip(SIX.layout.axes, still, strict=True)}
+    assert loads == pytest.approx(
+        {"surge": 0.1, "sway": 0.3, "heave": -1.5 + 132.6 - 131.6, "roll": 0.02, "pitch": -0.03, "yaw": 0.01}
+    )
+    assert VEHICLES["VideoRay"].held(HEAVE, 0.0).C == 0.0
+
+
+def _loss(rov: Vehicle, axis: Axis, inputs: dict[str, float]) -> float:
+    """Return what an axis alone loses of its thrust per velocity, before α, from its damping."""
+    form = rov.layout.kinds[axis.name]
+    more = rov.alone(axis, inputs).B - rov.alone(axis, held(rov)).B
+    return more * rov.effective_inertia(form) / rov[axis.coefficient("alpha")]
+
+
+def test_the_loss_of_thrust_is_that_of_the_thrusters_parts_along_the_axis() -> None:
+    inputs = held(SIX, u_a=0.5, u_b=-1.0)
+    expected: dict[Axis, float] = {
+        SURGE: 0.6**2 * 2.5,
+        SWAY: 3.0,
+        HEAVE: 0.8**2 * 2.5,
+        ROLL: (0.1 * 0.8) ** 2 * 2.5 + 0.1**2 * 3.0,
+        PITCH: (-0.05 * 0.6 - 0.2 * 0.8) ** 2 * 2.5,
+        YAW: (-0.1 * 0.6) ** 2 * 2.5 + 0.3**2 * 3.0,
+    }
+    assert {axis: _loss(SIX, axis, inputs) for axis in expected} == pytest.approx(expected, rel=1e-12)
+    assert _loss(HEAVY, SURGE, held(HEAVY, u_1=1.0)) == 0
+
+
+def test_an_arm_turns_the_force_of_a_thruster_by_4(k: Vehicle) -> None:
+    assert [k.effect(t, YAW) for t in k.layout.thrusters] == pytest.approx([0.22 * sin(0.423), -0.22 * sin(0.423), 0.0])
+    assert [k.effect(t, SURGE) for t in k.layout.thrusters] == [1.0, 1.0, 0.0]
+    both = 0.22 * sin(0.423) * (42.9 * 0.25 + 2.711 * 0.5)
+    assert (k.force(YAW, 0.5), k.strongest(YAW)) == pytest.approx((both, 0.22 * sin(0.423) * (42.9 + 2.711)))
+    assert pytest.approx(k["alpha_r"] * k["beta_r"] / k["I_r"] * both) == k.held(YAW, 0.5).C
+    assert k.response(YAW, -0.5) == (-k.response(YAW, 0.5)[0], k.response(YAW, 0.5)[1])
+
+
+@pytest.mark.parametrize("turns", [0.0, 1.0, -3.0])
+def test_the_heading_counts_turns_from_the_one_before(turns: float) -> None:
+    state = at_rest(SIX) | {"eta": cos(0.25), "epsilon_3": sin(0.25)}
+    assert SIX.calculated(still(SIX), state | {"psi": 2.0 * pi * turns})["psi"] == pytest.approx(0.5 + 2.0 * pi * turns)
+    assert SIX.calculated(still(SIX), state)["psi"] == pytest.approx(0.5)

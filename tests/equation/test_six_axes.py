@@ -1,0 +1,254 @@
+"""Vehicles with roll or pitch, and any coefficients between axes, move as rigid_body.py says."""
+
+import random
+import re
+from itertools import combinations
+from math import pi
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.attitude import QUATERNION, start_formulas
+from rov_fmu.equation.expression import compiled
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import (
+    SIX,
+    Values,
+    at_rest,
+    frictionless,
+    random_body,
+    random_case,
+    random_inputs,
+    random_state,
+    still,
+    with_axes,
+)
+from verification.references import rigid_vehicle
+from verification.references.rigid_vehicle import compared, places
+
+Array = NDArray[np.float64]
+HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
+LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
+SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n) if {"p", "q"} & {*axes}]
+"""The sets of axes with roll or pitch."""
+_SOME = ("uvwpqr",)
+
+
+def gap(a: list[float], b: list[float]) -> float:
+    """Return the largest difference of two states. A force counts in units of 10 N."""
+    return max(abs(float(x - y)) for x, y in zip(a, b, strict=True))
+
+
+@pytest.mark.parametrize("axes", [pytest.param(axes, marks=() if axes in _SOME else LONG) for axes in SUBSETS])
+def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(axes: str) -> None:
+    """Where the motion is sensitive, a change of the start by 1e-13 tells how far two exact results may differ."""
+    rng = random.Random(axes)
+    rov = random_body(rng, axes)
+    commands = [(random_inputs(rng, rov), rng.uniform(1.0, 9.0)) for _ in range(6)]
+    state = random_state(rng, rov)
+    start = places(rov, state)
+
+    def integrated(y: list[float]) -> list[float]:
+        for inputs, h in commands:
+            y = list(rigid_vehicle.integrate(rov, inputs, y, h))
+        return compared(rov, y)
+
+    for inputs, h in commands:
+        state = rov.step(inputs, state, h)
+    found, expected = compared(rov, places(rov, state)), integrated(start)
+    error = gap(found, expected)
+    assert error <= 1e-10 or error <= 100.0 * gap(expected, integrated([x + 1e-13 for x in start]))
+
+
+@pytest.mark.parametrize("axes", [pytest.param(axes, marks=() if axes in _SOME else LONG) for axes in SUBSETS])
+def test_a_step_is_exact(axes: str) -> None:
+    rng = random.Random(axes + "step")
+    rov = random_body(rng, axes)
+    inputs, state, h = random_inputs(rng, rov), random_state(rng, rov), 10.0 ** rng.uniform(-4.0, -1.3)
+    found, exact = (
+        compared(rov, y) for y in (places(rov, rov.step(inputs, state, h)), rigid_vehicle.step(rov, inputs, state, h))
+    )
+    for x, y in zip(found, exact, strict=True):
+        assert abs(x - y) <= 1e-13 * (1.0 + abs(y)), (axes, h)
+
+
+# ---- The same in C ----
+
+
+def in_c(rov: Vehicle, inputs: Values, state: Values, times: ArrayLike) -> Array:
+    """Return the states and the heading at the times; the second axis is time."""
+    return simulate(rov, times, {**inputs, **state}, [*rov.layout.state, "psi"], workers=1).values[:, 0]
+
+
+@pytest.mark.parametrize("cases", [25, pytest.param(300, marks=LONG), pytest.param(2000, marks=WEEKLY)])
+def test_a_step_in_c_agrees_with_python_and_50_digits(cases: int) -> None:
+    rng = random.Random(cases)
+    for n in range(cases):
+        rov, inputs, state, h = random_case(rng, SIX, longest=0.5)
+        expected = rov.step(inputs, state, h)
+        found = dict(zip([*rov.layout.state, "psi"], in_c(rov, inputs, state, [0.0, h])[:, 1].tolist(), strict=True))
+        assert found == pytest.approx(expected, rel=1e-13, abs=1e-13), (inputs, state, h)
+        if n % 25 == 0:
+            exact = rigid_vehicle.step(rov, inputs, state, 0.01 * h)
+            near = rov.step(inputs, state, 0.01 * h)
+            assert gap(compared(rov, places(rov, near)), compared(rov, exact)) <= 1e-13
+
+
+@pytest.mark.parametrize("axes", [pytest.param(axes, marks=LONG) for axes in ("q", "uwq", "vpr", "uvpq", "wpqr")])
+def test_a_step_in_c_agrees_with_python_for_other_axes(axes: str) -> None:
+    rng = random.Random(axes)
+    rov = random_body(rng, axes)
+    for _ in range(20):
+        _, inputs, state, h = random_case(rng, rov, longest=0.5)
+        expected = list(rov.step(inputs, state, h).values())
+        assert in_c(rov, inputs, state, [0.0, h])[:, 1].tolist() == pytest.approx(expected, rel=1e-13, abs=1e-13)
+
+
+@pytest.mark.parametrize("h", [100.0, 1000.0])
+def test_a_long_step_is_many_short_ones(h: float) -> None:
+    """The vehicle has settled to a spiral after a while, so that errors fade and only the angle adds them up."""
+    for seed in range(3):
+        rng = random.Random(seed)
+        inputs, state = random_inputs(rng, SIX), random_state(rng, SIX)
+        once, often = (in_c(SIX, inputs, state, np.linspace(0.0, h, steps + 1))[:, -1] for steps in (1, 1000))
+        after = SIX.step(inputs, state, h)
+        assert [*once] == pytest.approx([*after.values()], rel=1e-12, abs=1e-14 * abs(after["psi"]))
+        ends = (dict(zip([*SIX.layout.state, "psi"], y.tolist(), strict=True)) for y in (once, often))
+        (one, many), turned = ([*(compared(SIX, places(SIX, end))), end["psi"]] for end in ends), abs(after["psi"])
+        assert one == pytest.approx(many, rel=1e-12, abs=1e-14 * turned)
+
+
+# ---- The heading ----
+
+
+def test_the_heading_counts_turns_while_the_nose_is_not_up_or_down() -> None:
+    """It is compared with the headings of short steps, which need no count. Roll and pitch swing by up to a radian."""
+    inputs = still(SIX) | {"K_ext": 0.3, "M_ext": 1.0, "N_ext": 2.0}
+    start = {"phi_0": 0.4, "theta_0": -0.5, "psi_0": 20.0}
+    times = np.linspace(0.0, 60.0, 6001)
+    phi, theta, psi = simulate(SIX, times, {**inputs, **start}, ["phi", "theta", "psi"]).values[:, 0]
+    assert (phi[0], theta[0], psi[0]) == pytest.approx((0.4, -0.5, 20.0), abs=1e-14)
+    assert np.abs(theta).max() < 1.5
+    assert np.abs(np.diff(psi)).max() < 0.2
+    assert psi[-1] - psi[0] > 6.0 * pi
+    for step in (50, 500, 6000):
+        coarse = simulate(SIX, times[::step], {**inputs, **start}, ["psi"]).values[0, 0]
+        assert coarse == pytest.approx(psi[::step], abs=1e-11)
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0])
+def test_roll_and_heading_jump_by_half_a_turn_where_the_nose_passes_the_vertical(rate: float) -> None:
+    rov = frictionless(with_axes("q"))
+    times = [0.0, 1.57, 1.58, 4.71, 4.72]
+    record = ["phi", "theta", "psi"]
+    phi, theta, psi = simulate(rov, times, {"q": rate, "psi_0": 10.0}, record).values[:, 0]
+    assert theta == pytest.approx(rate * np.arcsin(np.sin(times)), abs=1e-13)
+    assert np.abs(phi) == pytest.approx([0.0, 0.0, pi, pi, 0.0], abs=1e-13)
+    assert psi[:2] == pytest.approx([10.0, 10.0], abs=1e-13)
+    assert psi[2:] - 10.0 == pytest.approx([pi, pi, 0.0], abs=1e-13)  # to starboard, and back
+
+
+def _starts() -> list[Values]:
+    """Return attitudes and velocities at the start.
+
+    Some pitch angles lie beyond 90 degrees. Some vehicles pitch through the vertical without any other motion.
+    """
+    rng = random.Random(8)
+    spins: list[Values] = [{}, {"q": 4.0}, {"q": -4.0}, {"r": -0.2}, {"p": 3.0}, {"q": 3.0, "r": 6.0}]
+    found: list[Values] = [
+        {"theta_0": theta, "psi_0": psi, "phi_0": phi, **spin}
+        for theta in (0.0, -1.2, 1.6, -1.6, 2.5, 3.1)
+        for psi in (0.0, 0.3)
+        for phi in (0.0, 0.7)
+        for spin in spins
+    ]
+    for _ in range(100):
+        angles = {name: rng.uniform(-3.1, 3.1) for name in ("phi_0", "theta_0", "psi_0")}
+        found.append(angles | {v: rng.gauss(0.0, 4.0) for v in "pqr"})
+    return found
+
+
+def _turned(rov: Vehicle, steps: int) -> Array:
+    """Return the quaternion and psi after 3 s of every start, and psi at the start."""
+    starts = _starts()
+    values = {n: np.array([[start.get(n, 0.0)] for start in starts]) for n in ("phi_0", "theta_0", "psi_0", *"pqr")}
+    found = simulate(
+        rov, np.linspace(0.0, 3.0, steps + 1), values, [*QUATERNION, "psi"], vehicles=len(starts), workers=1
+    )
+    return np.vstack([found.values[:, :, -1], found.values[-1:, :, 0]])
+
+
+def test_a_long_step_of_a_motion_that_never_settles_is_many_short_ones() -> None:
+    """The roll of the Heavy decays with the inverse of time, so that a long step takes thousands of pieces.
+
+    No other vehicle needs too many of them for 100 s, although a third of these have no linear drag at all.
+    """
+    once, often = (
+        in_c(HEAVY, still(HEAVY), at_rest(HEAVY) | {"v": 0.1}, np.linspace(0.0, 2700.0, n + 1)) for n in (1, 27)
+    )
+    assert once[:, -1] == pytest.approx(often[:, -1], rel=1e-12, abs=1e-14)
+    assert abs(once[[*HEAVY.layout.state].index("p"), -1]) > 1e-3
+    rng = random.Random(9)
+    scaled = [name for name in HEAVY.coefficients if re.match("(I|m_a|a_d|b_d|z_B)", name)]
+    for n in range(30):
+        rov = HEAVY.replaced({name: HEAVY[name] * 10.0 ** rng.uniform(-1.0, 1.0) for name in scaled})
+        rov = rov.replaced({name: 0.0 for name in scaled if n % 3 == 0 and name.startswith("b_d")})
+        found = in_c(rov, random_inputs(rng, rov), random_state(rng, rov), [0.0, 100.0])
+        assert np.isfinite(found).all(), n
+
+
+def test_psi_and_the_sign_of_the_quaternion_do_not_depend_on_the_steps() -> None:
+    """They follow the rotation in C and in Python, from the attitude at the start on."""
+    once = _turned(HEAVY, 1)
+    for steps in (7, 100):
+        assert np.abs(_turned(HEAVY, steps) - once).max() < 1e-6, steps
+    inputs = still(HEAVY)
+    for n in range(0, len(_starts()), 40):
+        start = _starts()[n]
+        attitude = compiled(start_formulas())(
+            {"phi_0": start["phi_0"], "theta_0": start["theta_0"], "psi_0": start["psi_0"]}
+        )
+        state = (
+            at_rest(HEAVY)
+            | {name: start.get(name, 0.0) for name in "pqr"}
+            | {name: attitude[name] for name in QUATERNION}
+        )
+        state["psi"] = start["psi_0"]
+        assert HEAVY.calculated(inputs, state)["psi"] == pytest.approx(once[5, n], abs=1e-12)
+        for _ in range(2):
+            state = HEAVY.step(inputs, state, 1.5)
+        assert [state[name] for name in (*QUATERNION, "psi")] == pytest.approx(once[:5, n].tolist(), abs=1e-9), start
+
+
+def test_psi_continues_in_the_first_step_from_a_pitch_angle_beyond_the_vertical() -> None:
+    start = {"theta_0": 1.6, "psi_0": 0.0, "r": -0.2}
+    (psi,) = simulate(HEAVY, [0.0, 0.001], start, ["psi"]).values[:, 0]
+    assert psi == pytest.approx([pi, pi], abs=0.01)  # the nose points back
+
+
+@pytest.mark.parametrize("start", [0.0, -4.0 * pi])
+def test_a_thousand_turns_are_counted_in_one_step(start: float) -> None:
+    rov = frictionless(with_axes("pr"))
+    after = rov.step(still(rov), at_rest(rov) | {"r": 2.0 * pi, "psi": start}, 1000.0)
+    (psi,) = simulate(rov, [0.0, 1000.0], {"r": 2.0 * pi, "psi_0": start}, ["psi"]).values[:, 0, 1]
+    assert [after["psi"], psi] == pytest.approx([start + 2000.0 * pi] * 2, rel=1e-14)
+
+
+def test_a_turn_that_overflows_ends_at_once() -> None:
+    rov = frictionless(with_axes("pr"))
+    after = rov.step(still(rov), at_rest(rov) | {"r": 1e10}, 1e300)
+    assert not np.isfinite([*after.values()]).all()
+    assert simulate(rov, [0.0, 1e300], {"r": 1e10}).failed.tolist() == [1]
+
+
+@pytest.mark.parametrize(("rate", "h"), [(1e-200, 1e-200), (1e-80, 1e-300), (1.0, 5e-324)])
+def test_a_turn_that_underflows_changes_nothing(rate: float, h: float) -> None:
+    rov = frictionless(with_axes("pr"))
+    before = at_rest(rov) | {"r": rate, "psi": 0.0}
+    ran = simulate(rov, [0.0, h], {"r": rate}, [*before])
+    assert ran.failed.tolist() == [2]  # no row
+    for after in (rov.step(still(rov), before, h), dict(zip(before, ran.values[:, 0, 1].tolist(), strict=True))):
+        assert after == pytest.approx(before, rel=1e-15, abs=5e-324)

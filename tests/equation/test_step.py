@@ -1,0 +1,261 @@
+"""Steps in cases that are difficult for a Runge-Kutta method: reversals, lags, stiffness, very long steps, overflow."""
+
+import random
+from collections.abc import Callable
+from itertools import product
+from math import cos, exp, isfinite, log1p, pi, sin
+from time import process_time
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from scipy.integrate import DOP853
+
+from rov_fmu.equation import step as module
+from rov_fmu.equation.catalogue import RESTORING
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.equation.steps import in_python, worst
+from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
+
+COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
+FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
+AHEAD = {"u_1": 0.5, "u_2": 0.6, "u_3": -0.4, "u_4": -0.5}
+BACK = {"F_1": -10.0, "F_2": -10.0, "F_3": 10.0, "F_4": 10.0}
+"""Forces against the commands ahead."""
+M, I_R = FREE["m_rov"], FREE["I_r"]
+
+CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
+    "from rest, with a lag": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
+    "from rest, by one lagging thruster, which turns and sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
+    "from rest, coupled": (COUPLED, {"Y_ext": 3.0, "N_ext": 0.1}, {}, (1e-5, 1e-2, 1.0)),
+    "the thrust changes its sign": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
+    "a load cancels the present thrust": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 1.0)),
+    "surge and sway turn the vehicle": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
+    "sway alone": (COUPLED, {}, {"v": 0.5}, (0.1, 2.0)),
+    "coasting": (HEAVY, {}, {"u": 1.0, "v": 0.1, "r": 0.3}, (0.1, 1.0)),
+    "a spin": (COUPLED, {}, {"u": 1.0, "r": 100.0}, (0.01, 0.05)),
+    "a lag of a minute": (LAGGING.replaced({"T_t200": 60.0}), {"u_l": 0.3}, {"u": 1.0, "r": 0.3, "F_l": 1.0}, (1.0,)),
+    "a lag of a millisecond": (LAGGING.replaced({"T_t200": 1e-3}), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 0.3)),
+    "there and back with a turn there and back": (
+        FREE,
+        {"X_ext": -M, "N_ext": -I_R},
+        {"u": 1.0, "r": 1.0},
+        (1.0, 2.0, 3.0),
+    ),
+    "there and back in a steady turn": (FREE, {"X_ext": -M}, {"u": 1.0, "r": 1.0}, (1.0, 2.0, 3.0, 100.0)),
+    "a fast axis beside slow ones": (
+        VIDEORAY.replaced({"b_d_w": 1e4}),
+        {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5},
+        {"w": 0.3},
+        (0.1, 100.0),
+    ),
+    "a fast axis that nothing drives": (VIDEORAY.replaced({"b_d_w": 1e6}), {"u_l": 0.6}, {"w": 0.3}, (1000.0,)),
+    "almost no drag": (
+        VIDEORAY.replaced({f"{key}_d_{v}": 1e-6 for key in "ab" for v in "uwr"}),
+        {},
+        {"u": 1.0, "r": 0.5},
+        (1.0, 100.0),
+    ),
+    "within the dead band": (HEAVY, {"u_1": 0.05, "u_2": -0.05}, {"u": 0.5, "r": 1.0}, (0.1, 2.0)),
+}
+
+
+def case(rov: Vehicle, inputs: Values, state: Values) -> tuple[Vehicle, State, State]:
+    return rov, {**still(rov), **inputs}, {**at_rest(rov), **state}
+
+
+def reversed_drag(rov: Vehicle, share: float) -> Vehicle:
+    """Return a vehicle whose drag in reverse is a share of that ahead."""
+    names = [f"{key}_{form.axis.velocity}" for form in rov.layout.axes for key in ("a_d", "b_d")]
+    return rov.extended({f"{name}_reverse": share * rov[name] for name in names})
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_step_in_a_special_case_is_exact(name: str) -> None:
+    rov, inputs, state, steps = CASES[name]
+    for h in steps:
+        velocity, path = worst(in_python, *case(rov, inputs, state), h)
+        assert max(velocity, path) <= 1e-13, h
+
+
+@pytest.mark.parametrize(
+    ("names", "shares", "cases"),
+    [
+        (["bluerov2_heavy"], (0.01, 30.0), 1),
+        pytest.param(sorted(SHIPPED), (0.01, 1.0 / 30.0, 30.0, 100.0), 2, marks=pytest.mark.long),
+        pytest.param(sorted(SHIPPED), (0.01, 1.0 / 30.0, 30.0, 100.0), 40, marks=pytest.mark.weekly),
+    ],
+    ids=["the Heavy", "every vehicle", "every vehicle, often"],
+)
+def test_a_step_is_exact_whatever_the_drag_in_reverse(names: list[str], shares: tuple[float, ...], cases: int) -> None:
+    """One step begins at rest, another one in motion."""
+    for name, share in product(names, shares):
+        rov = reversed_drag(HEAVY if name == "bluerov2_heavy" else load_vehicle(SHIPPED[name]), share)
+        rng = random.Random(f"{name} {share} {cases}")
+        for _ in range(cases):
+            _, inputs, state, h = random_case(rng, rov, -2.0, 0.7)
+            for start in (state, at_rest(rov)):
+                velocity, path = worst(in_python, rov, inputs, start, h)
+                assert max(velocity, path) <= 1e-13, (name, share, inputs, start, h)
+
+
+# ---- Other models ----
+
+
+def model_of(rates: Callable[[dict[str, float]], Callable[[float, list[float]], list[float]]], *states: str) -> Any:
+    """Return a model without lags whose states are all states of the vehicle. It monitors the state v."""
+    places = {name: n for n, name in enumerate(states)}
+    return SimpleNamespace(
+        STATES=states,
+        MONITORED={"v": places["v"]} if "v" in places else {},
+        DYNAMIC=[([*places.values()], [])],
+        LAGS={},
+        OFFSETS={},
+        GROUPS=[],
+        TURNING=(),
+        QUATERNION={},
+        ROTATION=[],
+        numbers=dict,
+        motion=rates,
+        sizes=lambda v, *at: [abs(x) for x in rates(v)(*at)],
+        lagging=lambda *_: {},
+    )
+
+
+def test_a_motion_whose_rates_begin_at_zero_is_exact() -> None:
+    """With t' = 1, q' = 2 t and y' = q y, the solution is y = exp(t^3/3)."""
+    model = model_of(lambda _: lambda _, y: [1.0, 2.0 * y[0], y[1] * y[2]], "t", "q", "y")
+    for h in (0.5, 1.0, 2.0, 3.0):
+        found = module.step(model, {"t": 0.0, "q": 0.0, "y": 1.0}, h)
+        assert found == pytest.approx({"t": h, "q": h * h, "y": exp(h**3 / 3.0)}, rel=2e-14)
+
+
+def test_a_pendulum_with_a_stop_that_pushes_back_harder_reverses_at_the_exact_time() -> None:
+    """With v' = -x and x' = k v, where k depends on the direction, the motion consists of half ellipses."""
+    model = model_of(lambda v: lambda _, y: [(4.0 if v["v"] > 0.0 else 1.0) * y[1], -y[0]], "x", "v")
+    found = module.step(model, {"x": 1.0, "v": 0.0}, 0.5 * pi)  # v < 0: x = cos t
+    assert found == pytest.approx({"x": 0.0, "v": -1.0}, abs=1e-14)
+    found = module.step(model, {"x": 1.0, "v": 0.0}, pi + 0.25 * pi)  # from t = pi on v > 0: x = -cos 2 (t - pi)
+    assert found == pytest.approx({"x": 0.0, "v": 0.5}, abs=1e-14)
+    found = module.step(model, {"x": 1.0, "v": 0.0}, 101 * 1.5 * pi)
+    assert found == pytest.approx({"x": 1.0, "v": 0.0}, abs=1e-12)
+
+
+# ---- Reversals ----
+
+
+@pytest.mark.parametrize(
+    "rov",
+    [HEAVY, *(pytest.param(rov, marks=pytest.mark.long) for rov in (LAGGING, COUPLED))],
+    ids=["Heavy", "lag", "coupled"],
+)
+def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Vehicle) -> None:
+    """The time at which surge reverses is found by bisection."""
+    rov, inputs, state = case(rov, {"X_ext": -20.0}, {"u": 0.4, "r": 0.5})
+    low, high = 0.0, 2.0
+    for _ in range(54):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rov.step(inputs, state, middle)["u"] > 0.0 else (low, middle)
+    assert high < 2.0
+    for h in (low, high, high * (1.0 - 1e-9), high * (1.0 + 1e-9), 2.0 * high):
+        velocity, path = worst(in_python, rov, inputs, state, h)
+        assert max(velocity, path) <= 1e-13, h
+
+
+def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
+    """The lagging thrust reverses while the vehicle slows down, so that its velocity has a minimum near zero."""
+    rov, inputs, state = case(LAGGING, {"u_l": 0.6, "u_r": 0.6}, {"F_l": -25.0, "F_r": -25.0})
+
+    def lowest(u: float) -> float:
+        return min(rov.step(inputs, {**state, "u": u}, 0.02 * n)["u"] for n in range(2, 20, 2))
+
+    low, high = 0.0, 2.0
+    for _ in range(20):
+        u = 0.5 * (low + high)
+        low, high = (u, high) if lowest(u) < 0.0 else (low, u)
+    for depth in (0.0, 1e-12, 1e-6, -1e-9):
+        velocity, path = worst(in_python, rov, inputs, {**state, "u": high - depth}, 0.4)
+        assert max(velocity, path) <= 1e-13, depth
+
+
+# ---- Overflow and very long steps ----
+
+
+@pytest.mark.parametrize(
+    ("rov", "inputs", "state", "h"),
+    [
+        (HEAVY, {}, {"u": 1e200, "v": 1e200, "r": 1e200}, 1.0),
+        (FREE, {}, {"u": 1.0, "r": 1e300}, 1e10),
+        (FREE, {"X_ext": 1e308}, {"r": 1.0}, 1e308),
+        (COUPLED, {"X_ext": 1e308, "Y_ext": -1e308}, {"r": 1e300}, 1e300),
+    ],
+    ids=["velocities", "turn", "distance", "all"],
+)
+def test_a_step_that_overflows_is_not_finite_and_takes_no_time(
+    rov: Vehicle, inputs: Values, state: Values, h: float
+) -> None:
+    start = process_time()
+    assert not all(map(isfinite, in_python(*case(rov, inputs, state), h).values()))
+    assert process_time() - start < 2.0
+
+
+def test_a_step_of_too_many_substeps_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
+    rov, inputs, state = case(COUPLED, {}, {"u": 1.0, "v": 0.2, "r": 3.0})
+    assert all(map(isfinite, rov.step(inputs, state, 5.0).values()))
+    monkeypatch.setattr(module, "MOST_SUBSTEPS", 3)
+    assert not all(map(isfinite, rov.step(inputs, state, 5.0).values()))
+
+
+@pytest.mark.parametrize("h", [1e3, 1e6, 1e30])
+def test_once_all_has_settled_a_step_of_any_length_takes_no_longer(h: float) -> None:
+    rov, inputs, state = case(HEAVY, AHEAD, {})
+    start = process_time()
+    found = rov.step(inputs, state, h)
+    assert process_time() - start < 1.0
+    assert all(map(isfinite, found.values()))
+
+
+@pytest.mark.parametrize("h", [100.0, 1e3, 1e6])
+def test_a_long_step_ends_in_straight_or_circular_motion(h: float) -> None:
+    """From a state that has settled, the motion is a circle, with its radius from the steady velocities."""
+    inputs = still(VIDEORAY) | {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5, "V_N": 0.1}
+    a = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0)
+    b = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0 + h)
+    u, r = a["u"], a["r"]
+    assert [b[v] for v in "uwr"] == pytest.approx([a[v] for v in "uwr"], rel=1e-14)
+    assert b["psi"] == pytest.approx(a["psi"] + r * h, rel=1e-13)
+    assert b["z"] == pytest.approx(a["z"] + a["w"] * h, rel=1e-13)
+    turned = 2e-13 * r * h  # the angle is known to rounding of the number of radians
+    assert b["x"] - a["x"] == pytest.approx(0.1 * h + u / r * (sin(b["psi"]) - sin(a["psi"])), rel=1e-13, abs=turned)
+    assert b["y"] - a["y"] == pytest.approx(-u / r * (cos(b["psi"]) - cos(a["psi"])), abs=turned)
+
+
+@pytest.mark.parametrize("h", [1e3, 1e6])
+def test_a_vehicle_that_coasts_to_rest_stays_there(h: float) -> None:
+    """It stops after a distance whose closed form is m/a_d ln(1 + a_d u / b_d), whatever the rest of the step."""
+    a, b, m = VIDEORAY["a_d_u"], VIDEORAY["b_d_u"], VIDEORAY.effective_inertia(VIDEORAY.layout.kinds["surge"])
+    found = VIDEORAY.step(still(VIDEORAY), {**at_rest(VIDEORAY), "u": 1.5}, h)
+    assert found["x"] == pytest.approx(m / a * log1p(a * 1.5 / b), rel=1e-12)
+    assert (found["u"], found["y"], found["psi"]) == (0.0, 0.0, 0.0)
+
+
+def test_whole_turns_of_an_attitude_are_counted() -> None:
+    """A neutral vehicle turns about its vertical axis, and its quaternion changes its sign with every turn."""
+    forces = [name for name in SIX.layout.coefficients if name.startswith(("a_d", "b_d", "F_0", "m_a", "Y_"))]
+    forces += [name for name in SIX.layout.coefficients if name in RESTORING]
+    free = SIX.replaced(dict.fromkeys(forces, 0.0))
+    for turns in (0.25, 7.25, 1000.25):
+        found = free.step(still(free), {**at_rest(free), "r": 2.0 * pi}, turns)
+        assert found["psi"] == pytest.approx(2.0 * pi * turns, rel=1e-12)
+        half = pi * turns
+        assert [found["eta"], found["epsilon_3"]] == pytest.approx([cos(half), sin(half)], abs=1e-11)
+
+
+def test_the_method_has_the_coefficients_of_dop853() -> None:
+    """SciPy has them from Hairer's code."""
+    rows = [*(row for _, row in module._STAGES), module._END, module._FIFTH, module._THIRD]
+    expected = [*DOP853.A[1:12], DOP853.B, DOP853.E5, DOP853.E3]
+    assert [node for node, _ in module._STAGES] == DOP853.C[1:12].tolist()
+    for row, of_scipy in zip(rows, expected, strict=True):
+        assert [row.get(n, 0.0) for n in range(len(of_scipy))] == pytest.approx(of_scipy.tolist(), rel=1e-15)

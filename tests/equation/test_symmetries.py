@@ -1,0 +1,189 @@
+"""Laws that steps of a whole vehicle obey, in Python and in the FMU, tested without a reference."""
+
+import random
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from math import hypot, ulp
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.equation.steps import Step, in_fmu, in_python
+from tests.fmi2 import Fmu
+from tests.vehicles import (
+    EVERYTHING,
+    HEAVY,
+    VEHICLES,
+    VIDEORAY,
+    Case,
+    State,
+    Values,
+    at_rest,
+    random_case,
+    random_vehicle,
+    still,
+)
+
+
+def negated(values: Values, *names: str) -> State:
+    return {name: -value if name in names else value for name, value in values.items()}
+
+
+def for_every(law: Callable[[Step, Case], None]) -> Callable[[list[Step], int], None]:
+    """Make a test of a law for random vehicles like the VideoRay, many more of them in the long and weekly tests."""
+
+    @pytest.mark.parametrize(
+        "cases", [15, pytest.param(100, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
+    )
+    def test(steps: list[Step], cases: int) -> None:
+        rng = random.Random(law.__name__)
+        for _ in range(cases):
+            case = random_case(rng, random_vehicle(rng, VIDEORAY.layout), longest=1.0)
+            for step in steps:
+                law(step, case)
+
+    test.__doc__ = law.__doc__
+    return test
+
+
+# ---- Mirror images, to the last bit ----
+
+
+@for_every
+def test_port_and_starboard_are_mirror_images_to_the_last_bit(step: Step, case: Case) -> None:
+    k, i, s, h = case
+    inputs = negated({**i, "u_l": i["u_r"], "u_r": i["u_l"]}, "N_ext", "V_E")
+    assert step(k, inputs, negated(s, "r", "y", "psi"), h) == negated(step(*case), "r", "y", "psi")
+
+
+@for_every
+def test_up_and_down_are_mirror_images_to_the_last_bit(step: Step, case: Case) -> None:
+    k, i, s, h = case
+    assert step(k, negated(i, "u_t", "Z_ext"), negated(s, "w", "z"), h) == negated(step(*case), "w", "z")
+
+
+@for_every
+def test_ahead_and_astern_are_mirror_images_to_the_last_bit(step: Step, case: Case) -> None:
+    """In the mirror image, each rear thruster does the opposite of the other one, so their torque is the same."""
+    k, i, s, h = case
+    inputs = negated({**i, "u_l": -i["u_r"], "u_r": -i["u_l"]}, "X_ext", "V_N", "V_E")
+    assert step(k, inputs, negated(s, "u", "x", "y"), h) == negated(step(*case), "u", "x", "y")
+
+
+_TWINS = {"1": "2", "2": "1", "3": "4", "4": "3", "5": "6", "6": "5", "7": "8", "8": "7"}
+"""The Heavy's thruster on the other side of each."""
+
+
+def test_port_and_starboard_of_the_heavy_are_mirror_images(heavy_dir: Path) -> None:
+    """This includes sway, lag and coupling. Rounding differs, because the order of the thrusters in sums differs."""
+
+    def mirrored(values: Values) -> State:
+        swapped = {}
+        for name, value in values.items():
+            head, _, thruster = name.partition("_")
+            swapped[f"{head}_{_TWINS[thruster]}" if thruster in _TWINS else name] = value
+        return negated(swapped, "v", "r", "y", "psi", "Y_ext", "N_ext", "V_E")
+
+    rng = random.Random(11)
+    for step in (in_python, partial(in_fmu, Fmu(heavy_dir))):
+        for _ in range(10):
+            rov, inputs, before, h = random_case(rng, HEAVY)
+            after = mirrored(step(rov, inputs, before, h))
+            found = step(rov, mirrored(inputs), mirrored(before), h)
+            assert found == pytest.approx(after, rel=1e-13, abs=1e-14)
+
+
+# ---- Without force ----
+
+
+@for_every
+def test_without_force_no_velocity_gains_one_bit_or_changes_its_sign(step: Step, case: Case) -> None:
+    k, i, s, h = case
+    after = step(k, {**still(k), "V_N": i["V_N"], "V_E": i["V_E"]}, s, h)
+    for name in ("u", "w", "r"):
+        assert 0.0 <= after[name] <= s[name] or s[name] <= after[name] <= 0.0
+        if k[f"a_d_{name}"] == k[f"b_d_{name}"] == 0.0:
+            assert after[name] == s[name]
+
+
+def energy(rov: Vehicle, state: Values) -> float:
+    """Return the kinetic energy with the effective inertias."""
+    return 0.5 * sum(rov.effective_inertia(form) * state[form.axis.velocity] ** 2 for form in rov.layout.axes)
+
+
+@pytest.mark.parametrize("vehicle", [name for name, rov in VEHICLES.items() if rov.layout.coupled])
+def test_without_thrust_and_load_energy_only_falls(vehicle: str) -> None:
+    rov = VEHICLES[vehicle].replaced({n: 0.0 for n in VEHICLES[vehicle].coefficients if n.startswith("F_0")})
+    rng = random.Random(vehicle)
+    for _ in range(10):
+        _, _, state, h = random_case(rng, rov, -2.0, 0.0)
+        state |= dict.fromkeys(rov.layout.lagging, 0.0)
+        after = rov.step(still(rov), state, h)
+        assert energy(rov, after) <= energy(rov, state) * (1.0 + 1e-15)
+        assert energy(rov, rov.step(still(rov), after, h)) <= energy(rov, after) * (1.0 + 1e-15)
+
+
+def test_coupling_does_no_work() -> None:
+    """Without drag, the energy is constant, and (M_u u)^2 + (M_v v)^2 is an invariant of Kirchhoff's equations."""
+    rov = HEAVY.replaced({name: 0.0 for name in HEAVY.coefficients if name.startswith(("a_d", "b_d", "F_0"))})
+    M_u, M_v = (rov.effective_inertia(rov.layout.kinds[name]) for name in ("surge", "sway"))
+    rng = random.Random(12)
+    for _ in range(10):
+        _, _, state, h = random_case(rng, rov, -2.0, 0.5)
+        state |= dict.fromkeys(rov.layout.lagging, 0.0)
+        after = rov.step(still(rov), state, h)
+        assert energy(rov, after) == pytest.approx(energy(rov, state), rel=1e-14)
+        momenta = [hypot(M_u * s["u"], M_v * s["v"]) for s in (state, after)]
+        assert momenta[1] == pytest.approx(momenta[0], rel=1e-14)
+
+
+# ---- The same anywhere, in any direction ----
+
+
+def drift(i: Values, h: float) -> float:
+    return hypot(i["V_N"], i["V_E"]) * h
+
+
+@for_every
+def test_a_step_is_the_same_wherever_it_begins(step: Step, case: Case) -> None:
+    k, i, s, h = case
+    origin = {"x": 0.0, "y": 0.0, "z": 0.0}
+    here, there = step(k, i, {**s, **origin}, h), step(*case)
+    assert {**there, **origin} == {**here, **origin}
+    for name in origin:
+        start, end, moved = (state[name] for state in (s, there, here))
+        # half a unit in the last place for each of two sums, in both steps
+        largest = max(abs(start), abs(end), abs(moved), drift(i, h))
+        assert abs(end - (start + moved)) <= 3.0 * ulp(largest)
+
+
+def test_without_quadratic_drag_a_slow_vehicle_draws_the_path_of_a_fast_one(steps: list[Step]) -> None:
+    """The paths agree to the last bit, because the scales are powers of two. Surge reverses while the vehicle turns."""
+    k = VIDEORAY.replaced({"a_d_u": 0.0, "b_d_u": 0.5})
+    motions = ((-1.0, 1.0), (1.0, -0.25), (0.5, 0.0), (0.0, 1.0))
+    for step, scale, (X_ext, u) in product(steps, (2.0**n for n in (-900, -700, -300, 300)), motions):
+        start = {**at_rest(k), "r": 1.0}
+        fast = step(k, {**still(k), "X_ext": X_ext}, {**start, "u": u}, 2.0)
+        slow = step(k, {**still(k), "X_ext": X_ext * scale}, {**start, "u": u * scale}, 2.0)
+        assert slow == {**fast, **{name: fast[name] * scale for name in ("u", "x", "y")}}
+
+
+# ---- Semigroup ----
+
+
+@pytest.mark.parametrize(
+    "cases", [5, pytest.param(30, marks=pytest.mark.long), pytest.param(200, marks=pytest.mark.weekly)]
+)
+@pytest.mark.parametrize(("name", "rov"), [("videoray", VIDEORAY), ("everything", load_vehicle(EVERYTHING))])
+def test_parts_of_a_step_are_the_step(request: pytest.FixtureRequest, name: str, rov: Vehicle, cases: int) -> None:
+    """The parts have any length. The rounding error between them fades or adds up over the time."""
+    fmu, rng = Fmu(request.getfixturevalue(f"{name}_dir")), random.Random(13)
+    for _ in range(cases):
+        _, inputs, before, h = random_case(rng, rov, -4.0, 0.5)
+        first = h * rng.uniform(0.1, 0.9)
+        for step in (in_python, partial(in_fmu, fmu)):
+            whole = step(rov, inputs, before, h)
+            parts = step(rov, inputs, step(rov, inputs, before, first), h - first)
+            assert parts == pytest.approx(whole, rel=1e-13, abs=1e-13)

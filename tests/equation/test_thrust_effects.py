@@ -1,0 +1,325 @@
+"""Thrust by tables, by the voltage, with a dead time, and fins: compared with equations written out separately."""
+
+import csv
+import random
+import re
+from dataclasses import replace
+from itertools import pairwise
+from math import isfinite
+
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+
+from rov_fmu.c.compile import C_SOURCES
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.equation.layout import Curve, Fin, ThrustTable
+from rov_fmu.equation.step import MOST_WAITING, Change
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import SIX, THRUST_EFFECTS, Values, at_rest, numbered, random_inputs, random_state
+from verification.references import rigid_vehicle
+from verification.references.equations import steady_forces
+from verification.references.rigid_vehicle import compared, places
+
+ROV = load_vehicle(THRUST_EFFECTS)
+_AFT = (-0.5, 0.05, 0.1)
+FINNED = numbered(
+    replace(SIX.layout, fins=(Fin("rudder", (0.0, 0.6, 0.8), _AFT, True), Fin("plane", (0.0, 0.0, 1.0), _AFT))),
+    lift_rudder=9.0,
+    drag_rudder=4.0,
+    angle_max_rudder=0.4,
+    lift_plane=7.0,
+    angle_max_plane=0.3,
+)
+"""A vehicle with six axes and every effect of the velocities."""
+
+
+def immediate(rov: Vehicle) -> Vehicle:
+    """Return a vehicle whose commands act at once."""
+    layout = replace(rov.layout, has_dead_time=False)
+    return Vehicle(layout, {name: rov[name] for name in layout.coefficients})
+
+
+NOW = immediate(ROV)
+
+
+def gap(a: list[float], b: list[float]) -> float:
+    """Return the largest difference of two states."""
+    return max(abs(float(x - y)) for x, y in zip(a, b, strict=True))
+
+
+def inputs_of(rng: random.Random, rov: Vehicle) -> dict[str, float]:
+    """Return random inputs. The voltage may lie beyond the tables."""
+    found = random_inputs(rng, rov)
+    return found | ({"voltage": rng.uniform(10.0, 18.0)} if "voltage" in found else {})
+
+
+# ---- Forces ----
+
+
+def test_the_forces_are_those_of_the_tables_and_of_the_voltage() -> None:
+    rng = random.Random(1)
+    for _ in range(200):
+        inputs = inputs_of(rng, NOW)
+        expected = steady_forces(NOW, inputs)
+        for name, force in NOW.commanded(inputs).items():
+            assert force == pytest.approx(float(expected[name]), rel=1e-14, abs=1e-13), (name, inputs)
+
+
+def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
+    with THRUST_EFFECTS.with_name("thrust_16_v.csv").open(encoding="utf-8") as file:
+        points = [(float(row["command [%]"]) / 100.0, float(row["thrust [N]"])) for row in csv.DictReader(file)]
+    _, bow, _ = ROV.layout.curves
+    (table,) = bow.tables
+    for command, force in points:
+        assert table.force(command) == pytest.approx(force, rel=1e-15)
+    commands = np.linspace(-1.0, 1.0, 2001)
+    forces = [table.force(c) for c in commands]
+    assert forces == pytest.approx(PchipInterpolator(*zip(*points, strict=True))(commands), rel=1e-13, abs=1e-13)
+    assert (np.diff(forces) >= 0.0).all()
+    assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
+    for c in (-0.97, -0.33, 0.2, 0.71):
+        assert table.slope(c) == pytest.approx((table.force(c + 1e-6) - table.force(c - 1e-6)) / 2e-6, rel=1e-6)
+
+
+def test_the_voltage_scales_thrust_and_stays_within_its_tables() -> None:
+    def forces(voltage: float, command: float = 0.6) -> dict[str, float]:
+        inputs = NOW.layout.usual_inputs | dict.fromkeys(("u_l", "u_bow", "u_top"), command) | {"voltage": voltage}
+        return NOW.commanded(inputs)
+
+    assert NOW.layout.usual_inputs["voltage"] == 14.8
+    assert (
+        forces(8.0)["l"]
+        == forces(12.0)["l"]
+        < forces(14.0)["l"]
+        == pytest.approx(0.5 * (forces(12.0)["l"] + forces(16.0)["l"]))
+    )
+    assert forces(18.0)["l"] == forces(16.0)["l"]
+    assert forces(12.0)["bow"] == pytest.approx(forces(16.0)["bow"] * 0.75**1.3, rel=1e-15)
+    assert forces(14.8)["top"] == pytest.approx(10.0 * 0.55**2 + 5.0 * 0.55, rel=1e-15)
+    assert forces(0.0)["bow"] == forces(-5.0)["bow"] == 0.0
+
+
+def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> None:
+    def effect(u: float, command: float) -> dict[str, float]:
+        state = at_rest(NOW) | {"u": u}
+        inputs = NOW.layout.usual_inputs
+        with_fin, without = (NOW.derivatives(inputs | {"u_rudder": c}, state) for c in (command, 0.0))
+        return {name: with_fin[name] - without[name] for name in ("u", "v", "r")}
+
+    m, I_r = (NOW.effective_inertia(NOW.layout.kinds[axis.name]) for axis in (SWAY, YAW))
+    angle = 0.4 * 0.5
+    ahead = effect(2.0, 0.5)
+    assert ahead["v"] == pytest.approx(9.0 * angle * 4.0 / m, rel=1e-13)
+    assert ahead["r"] == pytest.approx(-0.6 * 9.0 * angle * 4.0 / I_r, rel=1e-13)
+    surge = NOW.effective_inertia(NOW.layout.kinds[SURGE.name])
+    assert ahead["u"] == pytest.approx(-4.0 * angle**2 * 4.0 / surge, rel=1e-12)
+    assert effect(-2.0, 0.5) == pytest.approx({name: -x for name, x in ahead.items()}, rel=1e-12)
+    assert effect(2.0, 5.0) == effect(2.0, 1.0)
+    assert effect(0.0, 1.0) == {"u": 0.0, "v": 0.0, "r": 0.0}
+
+
+def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_balance() -> None:
+    V_ss, _ = NOW.response(SURGE, 0.6)
+    mass = NOW.effective_inertia(NOW.layout.kinds["surge"])
+    lost = mass * (NOW.held(SURGE, 0.6).B - NOW.held(SURGE, 0.0).B)
+    assert lost == pytest.approx(2.0 * 6.0 * 0.6 * NOW["alpha_u"], rel=1e-14)
+    assert NOW.step(NOW.held_inputs(SURGE, 0.6), at_rest(NOW), 100.0)["u"] == pytest.approx(V_ss, rel=1e-12)
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+    V_ss, _ = heavy.response(HEAVE, -0.3)
+    weight = heavy.held(HEAVE, 0.0).C * heavy.effective_inertia(heavy.layout.kinds["heave"])
+    assert weight == pytest.approx(heavy["W"] - heavy["B"], rel=1e-13)
+    assert weight > 0.5
+    assert heavy.step(heavy.held_inputs(HEAVE, -0.3), at_rest(heavy), 100.0)["w"] == pytest.approx(V_ss, rel=1e-9)
+
+
+def test_coefficients_of_a_vehicle_with_tables_can_be_changed() -> None:
+    vehicle = load_vehicle(THRUST_EFFECTS)
+    assert vehicle.with_(k_t_main=1.1, T_d=0.3)["k_t_main"] == 1.1
+
+
+# ---- Motion ----
+
+
+@pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
+def test_a_step_is_exact(rov: Vehicle) -> None:
+    rng = random.Random(2)
+    for h in (0.003, 0.04):
+        inputs, state = inputs_of(rng, rov), random_state(rng, rov)
+        found = compared(rov, places(rov, rov.step(inputs, state, h)))
+        for x, y in zip(found, compared(rov, rigid_vehicle.step(rov, inputs, state, h)), strict=True):
+            assert abs(x - y) <= 1e-13 * (1.0 + abs(y)), h
+
+
+@pytest.mark.parametrize("rov", [NOW, pytest.param(FINNED, marks=pytest.mark.long)], ids=["four axes", "six axes"])
+def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(rov: Vehicle) -> None:
+    rng = random.Random(3)
+    state = random_state(rng, rov)
+    y = places(rov, state)
+    changed = [x + 1e-13 for x in y]
+    for _ in range(6):
+        inputs = inputs_of(rng, rov)
+        state = rov.step(inputs, state, 5.0)
+        y, changed = (list(rigid_vehicle.integrate(rov, inputs, start, 5.0)) for start in (y, changed))
+    found, expected, other = (compared(rov, of) for of in (places(rov, state), y, changed))
+    error = gap(found, expected)
+    assert error <= 1e-10 or error <= 100.0 * gap(other, expected)
+
+
+@pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
+def test_c_agrees_with_python(rov: Vehicle) -> None:
+    rng = random.Random(4)
+    for _ in range(30):
+        inputs, state, h = inputs_of(rng, rov), random_state(rng, rov), 10.0 ** rng.uniform(-3.0, 0.0)
+        expected = rov.step(inputs, state, h)
+        found = simulate(rov, np.array([0.0, h]), {**inputs, **state}, workers=1).values[:, 0, 1]
+        assert found.tolist() == pytest.approx([expected[name] for name in rov.layout.state], rel=1e-13, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("voltage", "force"),
+    [(10.0, 10.0), (12.0, 10.0), (13.0, 12.0), (14.0, 14.0), (15.0, 17.0), (16.0, 20.0), (18.0, 20.0)],
+)
+def test_thrust_is_linear_between_the_voltages_of_the_tables_and_constant_beyond(voltage: float, force: float) -> None:
+    rows = ((12.0, 10.0), (14.0, 14.0), (16.0, 20.0))
+    tables = tuple(ThrustTable(f"t_{V:g}", (-1.0, 1.0), (-F, F), (F, F), V) for V, F in rows)
+    curve = Curve("c", ("k_t",), 2, tables=tables)
+    layout = replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage)
+    for command in (1.0, -0.5, 0.0, 2.0):
+        share = max(-1.0, min(1.0, command)) * 1.5 / 2.0
+        assert Vehicle(layout, {"k_t_c": 1.5}).curve_force(curve, command) == pytest.approx(share * force, rel=1e-15)
+
+
+def test_thrust_rises_with_a_power_of_the_voltage_and_a_dead_band_comes_first() -> None:
+    curve = Curve("c", ("V_0", "n_V", "a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse"), 4)
+    numbers = {"V_0_c": 10.0, "n_V_c": 2.0, "a_t_c": 40.0, "b_t_c": 8.0, "a_t_c_reverse": 20.0, "b_t_c_reverse": 4.0}
+    numbers |= {"c_0_c": 0.25, "c_0_c_reverse": 0.5}
+    for voltage, factor in ((10.0, 1.0), (15.0, 2.25), (0.0, 0.0), (-5.0, 0.0)):
+        rov = Vehicle(replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage), numbers)
+        forces = {1.0: (40.0 * 0.75 + 8.0) * 0.75 / 4.0, 0.5: (40.0 * 0.25 + 8.0) * 0.25 / 4.0, 0.25: 0.0, 0.1: 0.0}
+        forces |= {-1.0: -(20.0 * 0.5 + 4.0) * 0.5 / 4.0, -0.5: 0.0, -0.3: 0.0}
+        found = {command: rov.curve_force(curve, command) for command in forces}
+        assert found == pytest.approx({command: factor * force for command, force in forces.items()}, rel=1e-15)
+
+
+# ---- Dead time ----
+
+
+def commands_of(rng: random.Random, rov: Vehicle, times: int) -> list[dict[str, float]]:
+    """Return random inputs, of which each holds for one or several steps."""
+    found: list[dict[str, float]] = []
+    while len(found) < times:
+        found += [inputs_of(rng, rov) | {"voltage": 14.8}] * rng.choice((1, 1, 3))
+    return found[:times]
+
+
+def shifted(
+    inputs: list[dict[str, float]], times: list[float], dead: float
+) -> tuple[list[float], list[dict[str, float]]]:
+    """Return the times and inputs of a vehicle without dead time that moves as the one with it."""
+    arrivals = {t + dead: values for t, values in zip(times, inputs, strict=True)}
+    union = sorted({*times, *(t for t in arrivals if t < times[-1])})
+    found = []
+    for t in union:
+        present = max(n for n, time in enumerate(times) if time <= t)
+        arrived = [values for arrival, values in arrivals.items() if arrival <= t]
+        commands = {name: arrived[-1][name] if arrived else 0.0 for name in ROV.layout.commands}
+        found.append({**inputs[present], **commands})
+    return union, found
+
+
+def test_commands_act_exactly_after_the_dead_time() -> None:
+    """The steps are shorter and longer than the dead time, and changes arrive within them."""
+    rng = random.Random(5)
+    times = [0.0]
+    for _ in range(60):
+        times.append(times[-1] + rng.choice((0.013, 0.04, 0.1, 0.27)))
+    inputs = commands_of(rng, ROV, len(times))
+    union, immediate_inputs = shifted(inputs, times, ROV["T_d"])
+    state = at_rest(NOW)
+    for t, following, values in zip(union, union[1:], immediate_inputs, strict=False):
+        state = NOW.step(values, state, following - t)
+    line, delayed = ROV.delay_line(), at_rest(ROV)
+    for t, following, values in zip(times, times[1:], inputs, strict=False):
+        delayed = line.step(ROV, values, delayed, t, following - t)
+    tables = {name: np.array([values[name] for values in inputs]) for name in ROV.layout.inputs}
+    in_c = simulate(ROV, np.array(times), tables, workers=1).values[:, 0, -1]
+    assert delayed == pytest.approx(state, rel=1e-12, abs=1e-13)
+    assert in_c.tolist() == pytest.approx([delayed[name] for name in ROV.layout.state], rel=1e-13, abs=1e-14)
+
+
+def test_nothing_acts_before_the_dead_time_and_nothing_changes_the_loads() -> None:
+    inputs: Values = ROV.layout.usual_inputs | {"u_l": 1.0, "u_r": 1.0, "Y_ext": 3.0}
+    line = ROV.delay_line()
+    state = line.step(ROV, inputs, at_rest(ROV), 0.0, 0.099)
+    assert state["u"] == state["F_l"] == 0.0 < state["v"]
+    (change,) = line.waiting
+    assert change.remaining == pytest.approx(0.001, rel=1e-12)
+    assert change.commands == {name: inputs[name] for name in ROV.layout.commands}
+    state = line.step(ROV, inputs, state, 0.099, 0.001)
+    assert (state["u"], line.waiting, line.delayed["delayed_u_l"]) == (0.0, [], 1.0)
+    assert line.step(ROV, inputs, state, 0.1, 0.01)["u"] > 0.0
+
+
+def test_a_change_back_at_the_same_time_replaces_the_first_one() -> None:
+    line, state = ROV.delay_line(), at_rest(ROV)
+    usual = ROV.layout.usual_inputs
+    line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 1e-20)
+    line.step(ROV, usual | {"u_l": 0.5}, state, 0.0, 1e-20)
+    assert [change.commands["u_l"] for change in line.waiting] == [0.5]
+
+
+@pytest.mark.parametrize(("units", "waits"), [(-1, False), (0, False), (8, False), (9, True)])
+def test_a_change_acts_at_its_time_to_within_the_rounding_of_the_times(units: int, waits: bool) -> None:
+    inputs = ROV.layout.usual_inputs | {"u_l": 0.5}
+    line = ROV.delay_line()
+    line.waiting = [Change(0.5 + units * 2.0**-52, {name: inputs[name] for name in ROV.layout.commands})]
+    line.step(ROV, inputs, at_rest(ROV), 0.5, 0.5)
+    assert (bool(line.waiting), line.acting["u_l"]) == (waits, 0.0 if waits else 0.5)
+
+
+def test_a_dead_time_that_ends_inside_a_step_is_as_exact_late_in_a_run() -> None:
+    """Times near a million seconds have ten digits after the point, which the motion must not feel."""
+    inputs = ROV.layout.usual_inputs | {"u_l": 0.5, "u_r": 0.5}
+    ends = []
+    for start in (0.0, 2.0**20):
+        times = start + np.array([0.0, 0.03125, 0.28125, 0.78125])  # late times of these lengths are exact
+        line, state = ROV.delay_line(), at_rest(ROV)
+        for t, following in pairwise(times.tolist()):
+            state = line.step(ROV, inputs, state, t, following - t)
+        in_c = simulate(ROV, times, inputs, [*state], workers=1).values[:, 0, -1].tolist()
+        ends.append([*state.values(), *in_c])
+    assert ends[1] == ends[0]
+    line, h = ROV.delay_line(), ROV["T_d"] / 300
+    for n in range(300):  # rounding does not add up: the change acts at the end of the last step
+        assert line.acting["u_l"] == 0.0
+        state = line.step(ROV, inputs, state, n * h, h)
+    assert (line.waiting, line.acting["u_l"]) == ([], 0.5)
+
+
+def test_as_many_changes_may_wait_as_in_c() -> None:
+    (in_c,) = re.findall(r"MOST_WAITING = (\d+)", (C_SOURCES / "delay.c").read_text(encoding="utf-8"))
+    assert int(in_c) == MOST_WAITING == 1024
+
+
+def test_too_many_changes_are_refused() -> None:
+    line, state = ROV.delay_line(), at_rest(ROV)
+    usual = ROV.layout.usual_inputs
+    for n in range(MOST_WAITING):
+        state = line.step(ROV, usual | {"u_l": float(1 - n % 2)}, state, 1e-5 * n, 1e-5)
+    with pytest.raises(ValueError, match=f"more than {MOST_WAITING} changes of commands wait for the dead time"):
+        line.step(ROV, usual | {"u_l": 0.5}, state, 1e-5 * MOST_WAITING, 1e-5)
+    assert len(line.waiting) == MOST_WAITING
+
+
+def test_a_step_that_overflows_leaves_the_changes_on_their_way() -> None:
+    line, usual, state = ROV.delay_line(), ROV.layout.usual_inputs, at_rest(ROV)
+    state = line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 0.06)
+    before = (line.acting, [*line.waiting])
+    after = line.step(ROV, usual | {"u_l": -1.0}, state | {"u": 1e200}, 0.06, 1.0)
+    assert not all(map(isfinite, after.values()))
+    assert (line.acting, line.waiting) == before
+    state = line.step(ROV, usual | {"u_l": 1.0}, state, 0.06, 0.05)
+    assert (line.waiting, line.delayed["delayed_u_l"]) == ([], 1.0)
