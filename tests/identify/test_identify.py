@@ -258,7 +258,7 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
             V_ss, Tau = TRUTH.response(HEAVE, answer.command)
             for name, (_, (low, high)), true in (("V_ss", answer.steady, V_ss), ("Tau", answer.rise, Tau)):
                 covered.setdefault(f"{name} {answer.command}", []).append(low <= true <= high)
-    assert len(covered) == 11
+    assert len(covered) == 3 + 2 * 6
     assert min(map(sum, covered.values())) >= binom.ppf(0.001, 40, 0.95), {k: sum(v) for k, v in covered.items()}
 
 
