@@ -144,33 +144,62 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
 def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
     layout = vehicle.layout
-    dependencies, derivatives = dependencies_of(layout), _derivatives(layout)
     result: list[Variable] = []
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
-        bounds = {"minimum": declaration.minimum, "maximum": declaration.maximum}
-        rest |= {end: x for end, x in bounds.items() if isfinite(x)} | {"display_unit": declaration.display_unit}
+        bounds = {
+            end: x for end, x in (("minimum", declaration.minimum), ("maximum", declaration.maximum)) if isfinite(x)
+        }
+        given = {"display_unit": declaration.display_unit, **bounds, **rest}
         result.append(
-            Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **rest)
+            Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **given)
         )
 
     for name, declaration in layout.inputs.items():
         variability = "discrete" if layout.has_dead_time and name in layout.commands else "continuous"
         add(name, declaration, "input", variability, start=declaration.start, nominal=declaration.nominal)
     for name, declaration in layout.state.items():
-        initial, start = ("approx" if name in QUATERNION else "exact"), float(name == QUATERNION[0])
-        own = {"initial": initial, "start": start, "dependencies": {name: "constant"}}
-        add(name, declaration, "output", "continuous", **own, nominal=declaration.nominal)
-    for state in layout.state:
-        own = {"initial": "calculated", "derivative_of": state, "dependencies": dependencies[f"der({state})"]}
-        add(f"der({state})", derivatives[state], "local", "continuous", **own)
+        add(
+            name,
+            declaration,
+            "output",
+            "continuous",
+            initial="approx" if name in QUATERNION else "exact",
+            start=1.0 if name == QUATERNION[0] else 0.0,
+            nominal=declaration.nominal,
+            dependencies={name: "constant"},
+        )
+    derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
+    for name in layout.state:
+        add(
+            f"der({name})",
+            derivatives[name],
+            "local",
+            "continuous",
+            initial="calculated",
+            derivative_of=name,
+            dependencies=dependencies[f"der({name})"],
+        )
     for name, declaration in layout.calculated.items():
-        add(name, declaration, "output", "continuous", initial="calculated", dependencies=dependencies[name])
+        add(
+            name,
+            declaration,
+            "output",
+            "continuous",
+            initial="calculated",
+            dependencies=dependencies[name],
+        )
     for name, declaration in layout.delayed.items():
         add(name, declaration, "local", "discrete", initial="calculated")
     for name, declaration in layout.coefficients.items():
-        variability = "tunable" if declaration.tunable else "fixed"
-        add(name, declaration, "parameter", variability, initial="exact", start=vehicle[name])
+        add(
+            name,
+            declaration,
+            "parameter",
+            "tunable" if declaration.tunable else "fixed",
+            initial="exact",
+            start=vehicle[name],
+        )
     for name, declaration in layout.initial.items():
         add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)
     places = {v.name: v.value_reference for v in result if v.derivative_of is None}
