@@ -183,7 +183,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
 
     def _may_set(self, v: dict[str, Any]) -> bool:
         if self.is_initialized:
-            return v["causality"] == "input" or v["variability"] == "tunable"
+            return bool(v["causality"] == "input" or v["variability"] == "tunable")
         return bool(v["initial"] != "calculated")
 
     def _get_fmu_state(self) -> dict[str, Any]:
