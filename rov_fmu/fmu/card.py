@@ -94,9 +94,6 @@ def _mirrored(layout: Layout) -> str:
     """Return, in words, which thrust curves and axes behave in reverse as forward."""
     curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
     axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
-    found = []
-    if curves:
-        found.append("thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}")
-    if axes:
-        found.append("drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}")
-    return " and ".join(found)
+    thrust = "thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}"
+    drag = "drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}"
+    return " and ".join([thrust] * bool(curves) + [drag] * bool(axes))

@@ -18,6 +18,7 @@ from rov_fmu.io.messages import NO_FILE, FileError, shown
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
 MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
+_SETTINGS = ("startTime", "stopTime", "stepSize", "tolerance")
 _DEFAULT_TOLERANCE = 1e-3
 """The tolerance if neither the experiment nor the FMU has one."""
 _DEFAULT_STEPS = 500
@@ -99,7 +100,7 @@ class ReferenceResults:
         """
         variables = {v.name: v for v in description.modelVariables}
         experiments: list[Experiment] = []
-        for related in _children(self._xml(self._manifest, "fmiReferences"), "Related"):
+        for related in self._xml(self._manifest, "fmiReferences").iterfind("{*}Related"):
             role, _, purpose = related.get("role", "").partition("/")
             if role == "experiment" and purpose != "uncertainty-analysis":
                 member = self._manifest.resolve(related.get("source"))
@@ -112,42 +113,41 @@ class ReferenceResults:
 
     def _read(self, member: _Member, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
         """Read a file of experiments."""
-        for element in _children(self._xml(member, "Experiments"), "Experiment"):
+        for element in self._xml(member, "Experiments").iterfind("{*}Experiment"):
             name = element.get("name", "")
             parts = {etree.QName(child).localname: child for child in element if isinstance(child.tag, str)}
-            unknown = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References", "Annotations"}
+            parts.pop("Annotations", None)
+            unknown = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References"}
             if unknown:
                 raise member.error(f"experiment {shown(name)}: {', '.join(sorted(unknown))} cannot be run")
             # drafts after 1.0.0-beta.1 have the times in a child element
-            given = dict(element.attrib) | dict(getattr(parts.get("TransientSimulation"), "attrib", {}))
-
-            def setting(key: str, fallback: float, given: Mapping[str, str] = given, name: str = name) -> float:
-                if key in given:
-                    return member.number(given[key], f"experiment {shown(name)}: {key}")
-                value: str | None = getattr(default, key, None)
-                return float(value) if value else fallback
-
-            start = setting("startTime", 0.0)
-            stop = setting("stopTime", start + 1.0)
-            step = setting("stepSize", (stop - start) / _DEFAULT_STEPS)
-            tolerance = setting("tolerance", _DEFAULT_TOLERANCE)
-            if not (stop > start and step > 0.0 and tolerance > 0.0):
-                raise member.error(f"experiment {shown(name)}: must go on from its start, in steps, with a tolerance")
-            if tolerance >= 1.0:
-                reason = f"tolerance = {tolerance:g}: must be less than 1, or nothing would be compared"
-                raise member.error(f"experiment {shown(name)}: {reason}")
-            steps = (stop - start) / step
-            if not steps <= _MOST_STEPS:
-                reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
-                raise member.error(f"experiment {shown(name)}: {reason}; at most {_MOST_STEPS} are run")
-            files = {
-                part: member.resolve(parts[part].get("source"))
-                for part in ("Parameters", "Stimuli", "References")
-                if part in parts
+            given = {**element.attrib, **getattr(parts.pop("TransientSimulation", None), "attrib", {})}
+            times = {
+                key: str(value)
+                for key in _SETTINGS
+                if (value := given.get(key, getattr(default, key, None))) is not None
             }
+            numbers = {key: member.number(text, f"experiment {shown(name)}: {key}") for key, text in times.items()}
+            start = numbers.get("startTime", 0.0)
+            stop = numbers.get("stopTime", start + 1.0)
+            step = numbers.get("stepSize", (stop - start) / _DEFAULT_STEPS)
+            tolerance = numbers.get("tolerance", _DEFAULT_TOLERANCE)
+            steps = (stop - start) / step if step > 0.0 else 0.0
+            reason = ""
+            if not (steps > 0.0 and tolerance > 0.0):
+                reason = "must go on from its start, in steps, with a tolerance"
+            elif tolerance >= 1.0:
+                reason = f"tolerance = {tolerance:g}: must be less than 1, or nothing would be compared"
+            elif steps > _MOST_STEPS:
+                reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
+                reason += f"; at most {_MOST_STEPS} are run"
+            if reason:
+                raise member.error(f"experiment {shown(name)}: {reason}")
+            files = {part: member.resolve(one.get("source")) for part, one in parts.items()}
             parameters = self._parameters(files["Parameters"], variables) if "Parameters" in files else {}
-            stimuli = self._series(files["Stimuli"], variables) if "Stimuli" in files else None
-            references = self._series(files["References"], variables) if "References" in files else None
+            stimuli, references = (
+                self._series(files[part], variables) if part in files else None for part in ("Stimuli", "References")
+            )
             yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references)
 
     def _parameters(self, member: _Member, variables: Mapping[str, Any]) -> dict[str, str]:
@@ -203,7 +203,3 @@ class ReferenceResults:
         if (name := etree.QName(element).localname) != root:
             raise member.error(f"must begin with <{root}>, and not with <{name}>")
         return element
-
-
-def _children(element: Any, name: str) -> list[Any]:
-    return element.findall(f"{{*}}{name}")  # type: ignore[no-any-return]

@@ -1,20 +1,16 @@
 """Collect the files of the FMU in pure Python, as the FmuBuilder of pythonfmu packs them."""
 
 import json
-import sys
-import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from pythonfmu import FmuBuilder
+import pythonfmu
 
 from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.equation.printed import printed
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
-from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SLAVE = Path(__file__).with_name("slave.py")
@@ -47,38 +43,15 @@ def _text(path: Path) -> str:
 
 
 def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
-    """Return the files that FmuBuilder packs, by their path, except its modelDescription.xml.
+    """Return the files that FmuBuilder of pythonfmu would pack, by their path, except its modelDescription.xml.
 
-    On Linux, another library is before that of PythonFMU.
+    FmuBuilder itself would import the slave into this process. On Linux, another library is before that of PythonFMU.
     """
-    with temporary_folder("fmu-") as folder:
-        for name, text in sources.items():
-            path = Path(folder, "sources", name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        script = Path(folder, "sources", f"{vehicle.identifier}_slave.py")
-        project = [path for path in script.parent.iterdir() if path != script and path.name != "__pycache__"]
-        with _imports_restored():
-            built = FmuBuilder.build_FMU(script, dest=Path(folder, "built.fmu"), project_files=project)
-        with zipfile.ZipFile(built) as archive:
-            files = {
-                name.replace("\\", "/"): archive.read(name)
-                for name in archive.namelist()
-                if name != "modelDescription.xml" and "__pycache__" not in name
-            }
+    package = Path(pythonfmu.__file__).parent
+    files = {f"resources/{name}": text.encode() for name, text in sources.items()}
+    files |= {f"resources/pythonfmu/{path.name}": path.read_bytes() for path in package.glob("*.py")}
+    files["resources/slavemodule.txt"] = f"{vehicle.identifier}_slave".encode()
+    for path in (package / "resources" / "binaries").glob("*/*pythonfmu-export.*"):
+        files[f"binaries/{path.parent.name}/{vehicle.identifier}{path.suffix}"] = path.read_bytes()
     library = f"binaries/linux64/{vehicle.identifier}.so"
-    pythonfmu = files[library]
-    return {**files, library: compile_location(pythonfmu), f"binaries/linux64/{PYTHONFMU_LIBRARY}": pythonfmu}
-
-
-@contextmanager
-def _imports_restored() -> Iterator[None]:
-    """Restore sys.path and sys.modules, because FmuBuilder imports the slave and leaves it in both."""
-    path, modules, bytecode = list(sys.path), set(sys.modules), sys.dont_write_bytecode
-    sys.dont_write_bytecode = True
-    try:
-        yield
-    finally:
-        sys.path[:], sys.dont_write_bytecode = path, bytecode
-        for name in set(sys.modules) - modules:
-            del sys.modules[name]
+    return {**files, library: compile_location(files[library]), f"binaries/linux64/{PYTHONFMU_LIBRARY}": files[library]}

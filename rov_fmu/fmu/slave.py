@@ -8,7 +8,7 @@ refused, a message with the status is logged, the old value is kept, and the cal
 
 import importlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -32,22 +32,18 @@ def _time_tolerance(t: float, h: float) -> float:
     return min(1e-9 * (abs(t) + h), 0.5 * h)
 
 
-class _Vehicle:
-    """A vehicle as the delay line moves it: the equation, and the values of all variables by name."""
+class _Vehicle(dict[str, float]):
+    """A vehicle as the delay line moves it: the values of all variables by name, and the equation."""
 
-    def __init__(self, equation: Any, values: Mapping[str, float]) -> None:
-        self.equation, self.values = equation, values
-
-    def __getitem__(self, name: str) -> float:
-        return self.values[name]
+    equation: Any
 
     def step(self, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> dict[str, float]:
         """Return the states after h seconds."""
-        return step.step(self.equation, {**self.values, **inputs, **state}, h)
+        return step.step(self.equation, {**self, **inputs, **state}, h)
 
 
 class Rov(Fmi2Slave):  # type: ignore[misc]
-    """The slave. Its values are ordered by value reference, as rov_fmu/fmu/variables.py declares them."""
+    """The slave. A value reference is the place of a variable in `declared`: see rov_fmu/fmu/variables.py."""
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
@@ -57,15 +53,15 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.equation = importlib.import_module(f"{self.modelName}_model.equation")
         self.voltage_ranges = declaration["voltage_ranges"]
-        self.place = {v["name"]: place for place, v in enumerate(self.declared)}
-        self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
+        self.values = _Vehicle({v["name"]: v["start"] or 0.0 for v in self.declared})
+        self.values.equation = self.equation
         self._set_attitude()
         self.time = 0.0
         self.is_initialized = False
         self.stop_time: float | None = None
         commands = declaration["commands"]
-        self.line = step.DelayLine(self._named(commands), commands)
-        self._put(self.line.delayed)
+        self.line = step.DelayLine({name: self.values[name] for name in commands}, commands)
+        self.values |= self.line.delayed
         self.warned: set[str] = set()
         for reference, v in enumerate(self.declared):
             self.register_variable(
@@ -92,38 +88,37 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
 
     def set_real(self, references: list[int], values: list[float]) -> None:
         """Set all values, or none if one is refused."""
-        for reference, value in zip(references, values, strict=True):
-            v = self.declared[reference]
-            if not self._may_set(reference) and (self._is_calculated(reference) or value != self.values[reference]):
-                words = "is calculated and must not be set" if self._is_calculated(reference) else _TOO_LATE
-                self.log(f"{v['name']} {words}; it was not.", Fmi2Status.error)
+        pairs = [(self.declared[reference], value) for reference, value in zip(references, values, strict=True)]
+        for v, value in pairs:
+            name, is_calculated = v["name"], v["initial"] == "calculated"
+            if not self._may_set(v) and (is_calculated or value != self.values[name]):
+                words = "is calculated and must not be set" if is_calculated else _TOO_LATE
+                self.log(f"{name} {words}; it was not.", Fmi2Status.error)
                 return
             if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
-                self.log(
-                    f"{v['name']} = {value!r} is refused; it stays {self.values[reference]!r}.", Fmi2Status.discard
-                )
+                self.log(f"{name} = {value!r} is refused; it stays {self.values[name]!r}.", Fmi2Status.discard)
                 return
-        for reference, value in zip(references, values, strict=True):
-            v = self.declared[reference]
-            if not self._may_set(reference):
+        for v, value in pairs:
+            if not self._may_set(v):
                 self._warn_once("again", f"{v['name']} {_TOO_LATE}, but it has this value already")
                 continue
-            self.values[reference] = value
+            self.values[v["name"]] = value
             self._warn_of_input(v, value)
         if not self.is_initialized:
             self._set_attitude()
-        for reference, value in zip(references, values, strict=True):
-            if self.declared[reference]["initial"] == "approx" and value != self.values[reference]:
-                words = f"{self.declared[reference]['name']} = {value!r} is replaced by {self.values[reference]!r}"
+        for v, value in pairs:
+            if v["initial"] == "approx" and value != self.values[v["name"]]:
+                words = f"{v['name']} = {value!r} is replaced by {self.values[v['name']]!r}"
                 self._warn_once(
                     "guess", f"{words}, because phi_0, theta_0 and psi_0 determine the attitude at the start"
                 )
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""
-        if any(map(self._is_calculated, references)):
+        variables = [self.declared[reference] for reference in references]
+        if any(v["initial"] == "calculated" for v in variables):
             self._calculate()
-        return [self.values[reference] for reference in references]
+        return [self.values[v["name"]] for v in variables]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Take one exact step. Return False when it is refused."""
@@ -134,9 +129,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if self.stop_time is not None and end > self.stop_time + _time_tolerance(self.stop_time, step_size):
             self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
             return False
-        values = dict(zip(self.place, self.values, strict=True))
         try:
-            after = self.line.step(_Vehicle(self.equation, values), values, {}, self.time, step_size)
+            after = self.line.step(self.values, self.values, {}, self.time, step_size)
         except ValueError as error:
             self.log(f"{error}.", Fmi2Status.error)
             return False
@@ -148,33 +142,26 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             return False
         if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
             self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
-        self._put({**after, **self.line.delayed})
+        self.values |= {**after, **self.line.delayed}
         self.time = end
         return True
-
-    def _put(self, values: Mapping[str, float]) -> None:
-        for name, value in values.items():
-            self.values[self.place[name]] = value
 
     def _set_attitude(self) -> None:
         """Set the quaternion and the heading to those of the Euler angles at the start."""
         if self.equation.QUATERNION:
-            found = self.equation.attitude(dict(zip(self.place, self.values, strict=True)))
-            self._put({**{name: found[name] for name in self.equation.QUATERNION}, "psi": found["psi_0"]})
+            attitude = self.equation.attitude(self.values)
+            self.values |= {**{name: attitude[name] for name in self.equation.QUATERNION}, "psi": attitude["psi_0"]}
 
     def _calculate(self) -> None:
         """Calculate the variables that follow from the inputs, states and parameters."""
-        found = self.equation.outputs(dict(zip(self.place, self.values, strict=True)))
+        outputs = self.equation.outputs(self.values)
         if self.equation.QUATERNION:
-            found["psi"] = step.heading(found, self.values[self.place["psi"]])
+            outputs["psi"] = step.heading(outputs, self.values["psi"])
         for v in self.declared:
             if v["derivative_of"]:
-                self._put({v["name"]: found[f"der_{v['derivative_of']}"]})
+                self.values[v["name"]] = outputs[f"der_{v['derivative_of']}"]
             elif v["causality"] == "output" and v["initial"] == "calculated":
-                self._put({v["name"]: found[v["name"]]})
-
-    def _named(self, names: Iterable[str]) -> dict[str, float]:
-        return {name: self.values[self.place[name]] for name in names}
+                self.values[v["name"]] = outputs[v["name"]]
 
     def _warn_of_input(self, v: dict[str, Any], value: float) -> None:
         """Warn once about a command without a signal, and about an input that saturates."""
@@ -194,21 +181,18 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             self.warned.add(what)
             self.log(f"{text}; logged once.", Fmi2Status.warning)
 
-    def _is_calculated(self, reference: int) -> bool:
-        return bool(self.declared[reference]["initial"] == "calculated")
-
-    def _may_set(self, reference: int) -> bool:
-        v = self.declared[reference]
+    def _may_set(self, v: dict[str, Any]) -> bool:
         if self.is_initialized:
             return bool(v["causality"] == "input" or v["variability"] == "tunable")
-        return not self._is_calculated(reference)
+        return bool(v["initial"] != "calculated")
 
     def _get_fmu_state(self) -> dict[str, Any]:
         line = {"acting": dict(self.line.acting), "waiting": list(self.line.waiting)}
-        own = {"values": list(self.values), "time": self.time, "stop_time": self.stop_time}
+        own = {"values": dict(self.values), "time": self.time, "stop_time": self.stop_time}
         return {**own, "is_initialized": self.is_initialized, **line}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        self.values, self.time, self.stop_time = list(state["values"]), state["time"], state["stop_time"]
+        self.time, self.stop_time = state["time"], state["stop_time"]
+        self.values |= state["values"]
         self.is_initialized = state["is_initialized"]
         self.line.acting, self.line.waiting = dict(state["acting"]), list(state["waiting"])

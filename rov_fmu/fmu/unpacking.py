@@ -7,11 +7,12 @@ import os
 import re
 import stat
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import IO, Any
-from xml.parsers import expat
+
+from lxml import etree
 
 from rov_fmu.io.messages import FileError, brief, shown
 
@@ -30,10 +31,9 @@ _MOST_BYTES = 40_000_000
 """The largest size of a file of XML that FMPy reads."""
 _MOST_PARTS = 3_000_000
 """The largest number of elements and attributes. Each takes about 0.1 kB of FMPy's memory."""
-_LONGEST = 1_000_000
-"""The largest number of characters in an attribute."""
-_INDICES = ("derivative", "index", "dependencies", "clocks")
-"""The attributes that name other variables, besides the value references in the model structure and in dimensions."""
+_MOST_REFERENCE = 2**32 - 1
+_INDICES = ("derivative", "index", "dependencies", "clocks", "valueReference")
+"""The attributes that name other variables, such as those in the model structure and in dimensions."""
 _FINITE = ("nominal", "factor", "offset", "gain", "startTime", "stopTime", "tolerance", "stepSize")
 _COUNTS = ("numberOfEventIndicators", "numberOfContinuousStates")
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -113,9 +113,8 @@ def _refusal(zipped: zipfile.ZipFile) -> str:
 
 # ---- The model description -------------------------------------------------------------------------------------------
 #
-# FMPy converts attributes without a check, and keeps the whole file in memory. Here the file is a stream of elements,
-# so the check needs no memory, and ends at the first mistake. It accepts what the schema of FMI forbids if that does
-# no harm, because many exporters take it lightly.
+# FMPy converts attributes without a check. What the schema of FMI forbids is accepted if it does no harm, because many
+# exporters take it lightly.
 
 
 def _check_description(fmu: Path, folder: Path) -> None:
@@ -128,113 +127,94 @@ def _check_description(fmu: Path, folder: Path) -> None:
             raise FileError(f"{fmu}: {name}: has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
     if not (folder / _FILE).is_file():
         return  # FMPy's message says so
-    description = _Description(lambda reason: FileError(f"{fmu}: {_FILE}: {reason}"))
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = description.begin
-    parser.EndElementHandler = description.end
-    parser.EntityDeclHandler = description.refuse_entity
+
+    def error(reason: str) -> FileError:
+        return FileError(f"{fmu}: {_FILE}: {reason}")
+
+    parts = 0
+    elements = etree.iterparse(str(folder / _FILE), events=("start",), resolve_entities=False, no_network=True)
     try:
-        with (folder / _FILE).open("rb") as file:
-            parser.ParseFile(file)
-    except (expat.ExpatError, LookupError, ValueError) as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"{fmu}: {_FILE}: not XML: {error}") from error
-    description.check_references()
+        for _, element in elements:
+            parts += 1 + len(element.attrib)
+            if parts > _MOST_PARTS:
+                raise error(f"has more than {_MOST_PARTS} elements and attributes, the most that are read")
+    except etree.XMLSyntaxError as mistake:
+        raise error(f"not XML: {mistake.msg}") from mistake
+    _Description(elements.root, error).check()
 
 
 class _Description:
-    """What is known of a model description while its elements pass by. All methods raise what `error` returns."""
+    """The checks of a model description. They raise what `error` returns."""
 
-    def __init__(self, error: Callable[[str], FileError]) -> None:
-        self._error = error
-        self._path: list[str] = []
-        self._parts = self._variables = 0
-        self._version = ""
-        self._names: set[str] = set()
+    def __init__(self, root: Any, error: Callable[[str], FileError]) -> None:
+        self._root, self._error = root, error
+        self._version = root.get("fmiVersion", "")[:1]
         self._references: set[int] = set()
         self._named: dict[int, str] = {}
         """The variables that others name by their number, each with the place where it is first named."""
-        self._of = ""
-        """The variable, type or element that attributes belong to, for messages."""
-        self._type = ""
 
-    def refuse_entity(self, name: str, *_: object) -> None:
-        """Refuse entities: a few lines of them can stand for gigabytes of text."""
-        raise self._error(f"defines the entity {shown(name)}; no model description needs one")
-
-    def begin(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Check an element and its attributes. What other tools wrote into annotations is theirs."""
-        self._parts += 1 + len(attributes)
-        if self._parts > _MOST_PARTS:
-            raise self._error(f"has more than {_MOST_PARTS} elements and attributes, the most that are read")
-        self._path.append(tag)
-        if len(self._path) == 1:
-            self._check_root(tag, attributes)
-        if any("Annotation" in name or name == "Tool" for name in self._path):
-            return
-        inside = self._path[1] if len(self._path) > 1 else ""
-        if inside == "ModelVariables" and len(self._path) == 3:
-            self._check_variable(tag, attributes)
-        elif inside not in ("ModelVariables", "TypeDefinitions") or len(self._path) == 3:
-            self._of = f"{tag} {shown(attributes['name'])}" if "name" in attributes else tag
-        if inside == "ModelVariables" and len(self._path) == 4 and tag in _TYPES and not self._type:
-            self._type = tag
-        if inside == "TypeDefinitions":
-            self._type = tag.removesuffix("Type")
-        for key, text in attributes.items():
-            if len(text) > _LONGEST:
-                raise self._error(f"{self._of}: {key}: has {len(text)} characters; at most {_LONGEST} are allowed")
-            self._check(tag, key, text)
-
-    def end(self, tag: str) -> None:
-        """Leave an element."""
-        if tag == "ScalarVariable" and len(self._path) == 3 and not self._type:
-            raise self._error(f"{self._of}: must contain one of {', '.join(_TYPES)}")
-        self._path.pop()
-
-    def check_references(self) -> None:
-        """Check that every variable that is named by its number exists."""
-        if self._version == "2":
-            rule, known = f"must be an index from 1 to {self._variables}", range(1, self._variables + 1)
-        else:
-            rule, known = "must be the value reference of a variable", self._references  # type: ignore[assignment]
-        for number, place in self._named.items():
-            if number not in known:
-                raise self._error(f"{place}: {number}: {rule}")
-
-    def _check_root(self, tag: str, attributes: Mapping[str, str]) -> None:
-        if tag != "fmiModelDescription":
-            raise self._error(f"must begin with <fmiModelDescription>, and not with <{tag}>")
-        if not attributes.get("fmiVersion"):
+    def check(self) -> None:
+        """Check all elements. A few lines of entities can stand for gigabytes of text, so these are refused."""
+        root, dtd = self._root, self._root.getroottree().docinfo.internalDTD
+        for entity in dtd.iterentities() if dtd is not None else ():
+            raise self._error(f"defines the entity {shown(entity.name)}; no model description needs one")
+        if root.tag != "fmiModelDescription":
+            raise self._error(f"must begin with <fmiModelDescription>, and not with <{root.tag}>")
+        if not self._version:
             raise self._error("fmiVersion is missing")
-        self._version = attributes["fmiVersion"][:1]
+        variables = root.findall("ModelVariables/*")
+        self._check_variables(variables)
+        for definition in root.iterfind("TypeDefinitions/*"):
+            self._check_element(definition, _label(definition), _kind(definition), "TypeDefinitions")
+        self._check_element(root, root.tag)
+        known = range(1, len(variables) + 1) if self._version == "2" else self._references
+        rule = f"an index from 1 to {len(variables)}" if self._version == "2" else "the value reference of a variable"
+        for number, place in self._named.items():
+            if number not in known and self._version != "1":
+                raise self._error(f"{place}: {number}: must be {rule}")
 
-    def _check_variable(self, tag: str, attributes: Mapping[str, str]) -> None:
-        self._variables += 1
-        if self._variables > _MOST_VARIABLES:
+    def _check_variables(self, variables: Sequence[Any]) -> None:
+        """Check the variables, their names and their value references."""
+        if len(variables) > _MOST_VARIABLES:
             raise self._error(f"has more than {_MOST_VARIABLES} variables, the most that are read")
-        self._type = "" if tag == "ScalarVariable" else tag
-        self._of = f"variable {self._variables}"
-        for key in ("name", "valueReference"):
-            if key not in attributes:
-                raise self._error(f"{self._of}: {key} is missing")
-            self._of = f"variable {shown(attributes['name'])}"
+        names: set[str] = set()
+        for number, variable in enumerate(variables, start=1):
+            of = f"variable {number}"
+            for key in ("name", "valueReference"):
+                if key not in variable.attrib:
+                    raise self._error(f"{of}: {key} is missing")
+                of = f"variable {shown(variable.get('name'))}"
+            kind = _kind(variable)
+            if kind == "ScalarVariable":
+                raise self._error(f"{of}: must contain one of {', '.join(_TYPES)}")
+            self._references.add(
+                self._whole(f"{of}: valueReference", variable.get("valueReference"), 0, _MOST_REFERENCE)
+            )
+            for name in (x.get("name", "") for x in (variable, *variable.iterchildren("Alias"))):
+                if name in names:
+                    raise self._error(f"{of}: name = {shown(name)}: another variable has this name")
+                names.add(name)
+            self._check_element(variable, of, kind, "ModelVariables")
 
-    def _check(self, tag: str, key: str, text: str) -> None:
-        """Check an attribute. The type of a variable, which comes first in FMI 3.0, determines that of its values."""
-        place = f"{self._of}: {key}"
-        is_of_variable = self._path[1:2] == ["ModelVariables"]
-        is_own = is_of_variable and len(self._path) == 3
-        if key == "name" and (is_own or (is_of_variable and tag == "Alias")):
-            if text in self._names:
-                raise self._error(f"{place} = {shown(text)}: another variable has this name")
-            self._names.add(text)
-        elif key == "valueReference":
-            self._references_of(place, text, is_own=is_own)
-        elif key in _INDICES:
-            if text.strip() or key != "dependencies":  # an output may depend on nothing
-                self._references_of(place, text, is_own=False)
+    def _check_element(self, element: Any, of: str, kind: str = "", part: str = "") -> None:
+        """Check the attributes of an element and of those inside. What other tools wrote into annotations is theirs.
+
+        `of` is what the attributes belong to, for messages. `kind` is the type of a variable or of a type definition,
+        and `part` is ModelVariables or TypeDefinitions.
+        """
+        for key, text in element.attrib.items():
+            self._check(element.tag, f"{of}: {key}", key, text, kind, part)
+        for inner in element.iterchildren("*"):
+            if inner.tag not in ("ModelVariables", "TypeDefinitions", "Tool") and "Annotation" not in inner.tag:
+                self._check_element(inner, of if part else _label(inner), kind, part)
+
+    def _check(self, tag: str, place: str, key: str, text: str, kind: str, part: str) -> None:
+        """Check an attribute of an element. The other arguments are those of `_check_element`."""
+        if key in _INDICES:
+            for word in text.split() or [text] * (key != "dependencies"):  # an output may depend on nothing
+                number = self._whole(place, word, 0, _MOST_REFERENCE)
+                if self._version != "2" or key != "valueReference":
+                    self._named.setdefault(number, place)
         elif key in _FINITE:
             self._number(place, text)
         elif key in _COUNTS:
@@ -243,29 +223,21 @@ class _Description:
             self._whole(place, text, -1000, 1000)
         elif key == "start" and tag == "Dimension":
             self._whole(place, text, 0, 2**64 - 1)
-        elif key in ("min", "max", "start") and (is_of_variable or self._path[1:2] == ["TypeDefinitions"]):
+        elif key in ("min", "max", "start") and part:
             for value in text.split() if self._version == "3" else [text]:
-                self._value(place, value, may_be_nan=key == "start")
-        elif is_of_variable and text not in (words := _WORDS.get(self._version, {}).get(key, (text,))):
+                self._value(place, value, kind, may_be_nan=key == "start")
+        elif part == "ModelVariables" and text not in (words := _WORDS.get(self._version, {}).get(key, (text,))):
             raise self._error(f"{place} = {shown(text)}: must be one of {', '.join(words)}")
 
-    def _references_of(self, place: str, text: str, *, is_own: bool) -> None:
-        for word in text.split() or [text]:
-            number = self._whole(place, word, 0, 2**32 - 1)
-            if is_own:
-                self._references.add(number)
-            elif self._version != "1":
-                self._named.setdefault(number, place)
-
-    def _value(self, place: str, text: str, *, may_be_nan: bool) -> None:
-        """Check a bound or a start value of the current type. Text, bytes and clocks have no numbers."""
-        if self._type in ("Real", "Float32", "Float64"):
+    def _value(self, place: str, text: str, kind: str, *, may_be_nan: bool) -> None:
+        """Check a bound or a start value of a type. Text, bytes and clocks have no numbers."""
+        if kind in ("Real", "Float32", "Float64"):
             if text not in (_INFINITE if may_be_nan else _INFINITE[:2]):
                 self._number(place, text)
-        elif self._type == "Boolean":
+        elif kind == "Boolean":
             if text not in ("true", "false", "1", "0"):
                 raise self._error(f"{place} = {shown(text)}: must be true or false")
-        elif size := re.fullmatch(r"(U?)Int(\d+)", _STORED_AS.get((self._version, self._type), self._type)):
+        elif size := re.fullmatch(r"(U?)Int(\d+)", _STORED_AS.get((self._version, kind), kind)):
             span = 2 ** int(size[2])
             self._whole(place, text, *((0, span - 1) if size[1] else (-span // 2, span // 2 - 1)))
 
@@ -282,3 +254,14 @@ class _Description:
         if re.fullmatch(r"[+-]?[0-9]{1,30}", text) and low <= (number := int(text)) <= high:
             return number
         raise self._error(f"{place} = {shown(text)}: must be a whole number from {low} to {high}")
+
+
+def _label(element: Any) -> str:
+    """Return an element in words: its tag, and its name if it has one."""
+    return f"{element.tag} {shown(element.get('name'))}" if "name" in element.attrib else str(element.tag)
+
+
+def _kind(element: Any) -> str:
+    """Return the type of a variable or of a type definition: that of an element inside it, or in FMI 3.0 its own."""
+    kinds = [x.tag.removesuffix("Type") for x in (*element.iterchildren("*"), element)]
+    return next((str(kind) for kind in kinds if kind in _TYPES), str(kinds[-1]))

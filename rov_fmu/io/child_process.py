@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Thread
@@ -76,12 +76,8 @@ class LimitError(ChildError):
     """A child process that exceeded a limit."""
 
     def __init__(self, limit: Literal["time", "memory", "disk"], limits: Limits) -> None:
-        amounts = {
-            "time": f"{limits.time or 0.0:.3g} s",
-            "memory": f"{(limits.memory or 0) / 1e9:.3g} GB of memory",
-            "disk": f"{(limits.disk or 0) / 1e9:.3g} GB of disk space",
-        }
-        super().__init__(f"needs more than {amounts[limit]}")
+        unit, words = {"time": (1.0, "s"), "memory": (1e9, "GB of memory"), "disk": (1e9, "GB of disk space")}[limit]
+        super().__init__(f"needs more than {getattr(limits, limit) / unit:.3g} {words}")
         self.limit = limit
 
 
@@ -180,12 +176,6 @@ class Functions:
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Return what a function returns."""
         return function(*arguments)
-
-
-def call_in_child(function: Callable[..., Any], *arguments: Any, limits: Limits) -> Any:
-    """Return what a function returns in a child process of its own. Raises its exceptions, and ChildError."""
-    with closing(ChildProcess(Functions, limits=limits)) as child:
-        return child.call("call", function, *arguments)
 
 
 def kill(process: "subprocess.Popen[bytes]") -> None:

@@ -189,14 +189,10 @@ def _fields(kind: Any) -> dict[str, FieldInfo]:
     return {field.alias or name: field for name, field in fields.items()}
 
 
-def _choices(kind: Any) -> tuple[Any, ...]:
-    """Return the values that a key may have, if they are listed."""
-    return get_args(kind) if get_origin(kind) is Literal else ()
-
-
 def _constant(kind: Any) -> Any:
     """Return the only value that a key may have, or None if it may have several."""
-    return _choices(kind)[0] if len(_choices(kind)) == 1 else None
+    choices = get_args(kind) if get_origin(kind) is Literal else ()
+    return choices[0] if len(choices) == 1 else None
 
 
 def _syntax(model: type[Strict], place: _Place) -> str:
@@ -232,28 +228,26 @@ def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Place], model: type[S
 
 def _problem_line(problem: ErrorDetails, data: Toml, model: type[Strict]) -> str:
     """Return the line for one problem."""
-    place, value, kind = problem["loc"], problem["input"], problem["type"]
-    key, is_table = brief(_key(place, data)), isinstance(value, dict)
-    if kind == "missing" and isinstance(place[-1], int):  # pydantic reports each missing entry of a list
-        place = place[:-1]
-        entries, number = shown(_value_at(place, data)), len(get_args(_declared(model, place)))
-        return f"{brief(_key(place, data))} = {entries}: must have {number} entries"
+    place, kind, value = problem["loc"], problem["type"], problem["input"]
+    *above, last = place
+    is_table = isinstance(value, dict)
+    key = brief(_key(place, data))
+    if isinstance(last, int) and (kind == "missing" or not (is_table or _is_table(_declared(model, place)))):
+        whole: Any = data  # of an entry that is no table, the whole list is shown
+        for step in above:
+            whole = whole[step]
+        entries = len(get_args(_declared(model, tuple(above))))
+        reason = f"must have {entries} entries" if kind == "missing" else f"entry {last + 1} {_reason(problem, model)}"
+        return f"{brief(_key(tuple(above), data))} = {shown(whole)}: {reason}"
     if kind == "missing":
         constant = _constant(_declared(model, place))
-        return f"{key}: this key is missing" + (f": write {place[-1]} = {json.dumps(constant)}" if constant else "")
+        return f"{key}: this key is missing" + (f": write {last} = {json.dumps(constant)}" if constant else "")
     if kind == "extra_forbidden":
-        if hint := model.hint(str(place[-1])):
-            return f"{key}: there is no such key{hint}"
-        allowed = _fields(_declared(model, place[:-1]))
-        hint = did_you_mean(str(place[-1]), allowed)
-        known = hint if hint and len(allowed) > _LISTED else only(str(place[-1]), allowed, join_names(allowed))
-        return f"{key}: there is no such key{known}"
-    reason, declared = _reason(problem, model), _declared(model, place)
-    *above, last = place
-    if isinstance(last, int) and not (is_table or _is_table(declared)):  # show the whole list
-        place, reason = tuple(above), f"entry {last + 1} {reason}"
-        value = _value_at(place, data)
-        key = brief(_key(place, data))
+        allowed = _fields(_declared(model, tuple(above)))
+        similar_key = did_you_mean(str(last), allowed) if len(allowed) > _LISTED else ""
+        hint = model.hint(str(last)) or similar_key or only(str(last), allowed, join_names(allowed))
+        return f"{key}: there is no such key{hint}"
+    reason = _reason(problem, model)
     if is_table and kind in ("value_error", "list_type"):
         return f"{key}: {reason}"
     return f"{key} = {shown([*value] if isinstance(value, tuple) else value)}: {reason}"
@@ -265,7 +259,7 @@ def _reason(problem: ErrorDetails, model: type[Strict]) -> str:
     if kind in ("model_type", "dict_type") or (kind == "list_type" and _is_table(_declared(model, (*place, 0)))):
         return f"must be {_syntax(model, place)}"
     if kind == "literal_error":
-        choices = map(str, _choices(_declared(model, place)))
+        choices = map(str, get_args(_declared(model, place)))
         return problem["msg"].replace("Input should", "must") + did_you_mean(str(problem["input"]), choices)
     if kind == "float_type" and type(problem["input"]) is int:
         return "must be a number of at most 308 digits"
@@ -273,13 +267,6 @@ def _reason(problem: ErrorDetails, model: type[Strict]) -> str:
         return _REASONS[kind]
     message = problem["msg"].removeprefix("Value error, ")
     return _PYDANTIC_START.sub("must ", message).replace(" after validation", "")
-
-
-def _value_at(place: _Place, data: Any) -> Any:
-    """Return the value at a place in the file."""
-    for step in place:
-        data = data[step]
-    return data
 
 
 def _key(place: _Place, data: Any) -> str:

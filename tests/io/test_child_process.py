@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, Limits, call_in_child
+from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, Limits
 
 
 class Counter:
@@ -115,11 +115,14 @@ def test_a_call_beyond_its_memory_or_disk_is_ended_and_leaves_no_file(
         (_swallowed, (), r"needs more than 0\.5 GB of memory"),
         (_write, (2_000_000, str(tmp_path / "large")), r"needs more than 0\.001 GB of disk space"),
     ):
-        with pytest.raises(ChildError, match=f"^{reason}$"):
-            call_in_child(function, *arguments, limits=limits)
+        with closing(ChildProcess(Functions, limits=limits)) as child, pytest.raises(ChildError, match=f"^{reason}$"):
+            child.call("call", function, *arguments)
     assert [file.name for file in tmp_path.iterdir()] == ["large"]
-    with pytest.raises(RuntimeError, match=r"^OpaqueError: the reason$"):
-        call_in_child(_opaque, limits=limits)
+    with (
+        closing(ChildProcess(Functions, limits=limits)) as child,
+        pytest.raises(RuntimeError, match=r"^OpaqueError: the reason$"),
+    ):
+        child.call("call", _opaque)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the process is killed with a signal of POSIX")
