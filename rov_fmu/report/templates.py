@@ -10,7 +10,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from rov_fmu.io.templates import render
-from rov_fmu.report.plots.svg import PALETTE
+from rov_fmu.report.palette import PALETTE
 from rov_fmu.vehicle import uncertainty
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

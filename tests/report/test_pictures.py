@@ -20,9 +20,10 @@ from matplotlib.text import Annotation
 from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
+from rov_fmu.report.palette import PALETTE
 from rov_fmu.report.plots.drawing import VIEWS, draw_icon, draw_thrusters, place, scenes
 from rov_fmu.report.plots.png import png_file
-from rov_fmu.report.plots.svg import LINES, PALETTE, inline_svg, with_formulas
+from rov_fmu.report.plots.svg import LINES, inline_svg, with_formulas
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
