@@ -24,7 +24,8 @@ from rov_fmu.io.messages import listed
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
 from rov_fmu.report.page.pictures import pictures
-from rov_fmu.report.plots.drawing import draw_thrusters, scenes
+from rov_fmu.report.plots.drawing import draw_thrusters
+from rov_fmu.report.plots.geometry import scenes
 from rov_fmu.report.plots.steps import (
     Step,
     draw_curve,
