@@ -52,6 +52,8 @@ STOPPING = (
 )
 _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""
+_ODD = 3.0
+"""A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
@@ -76,7 +78,8 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "many thrusters pulled together, and the battery"
         ),
         "unknown force": (
-            "{what} in {files}{since}. Check the tether, contact with the bottom or a wall, a current, and the payload"
+            "{what} in {files}{since}. Check the thrusters for weed and damage, the tether, contact with the bottom or "
+            "a wall, a current, and the payload"
         ),
         "change of thrust": "{what} in {files}{since}. Check the battery, and the thrusters for weed and damage",
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -276,19 +279,64 @@ def error_in_words(p: Prediction) -> str:
     )
 
 
-def next_tests(axes: Sequence[AxisResult]) -> list[str]:
-    """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
+def next_tests(identification: Identification) -> list[str]:
+    """Return what to measure next, in sentences: first which log to repair or to leave out, then the useful test of
+    each axis, the widest interval first.
 
-    If no test is useful, the sentence names the widest interval; without any test there is none.
+    If nothing is wrong and no test is useful, the sentence names the widest interval; without any test there is none.
     """
-    tests = sorted((r.next_test for r in axes if r.next_test), key=lambda test: -test.now)
+    tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
         f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
         for test in tests
         if test.is_useful
     ]
     nothing = "no test would narrow an interval by a tenth. The widest is that of {} of {}, ±{:.0%}."
-    return useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
+    repairs = [*_repairs(identification)]
+    return repairs + useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
+
+
+def _repairs(identification: Identification) -> Iterator[str]:
+    """Yield what to do about each log that does not fit the others."""
+    odd: dict[str, list[str]] = {}
+    for file, reason in _disagreements(identification):
+        odd.setdefault(file, []).append(reason)
+    others = len(identification.folder.logs) - len(odd)
+    rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
+    for file, reasons in odd.items():
+        yield f"first repair {file} or take it out of the folder{rest}. {' '.join(reasons)}"
+
+
+def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
+    """Yield each log that does not fit the others, with the reason as a sentence: a probable slip, motion that the
+    others predict worse than no change, or a slow force that is much larger than in the others.
+
+    Where half of the logs are predicted worse than no change, the model is wrong, and no log is the odd one.
+    """
+    slipped = {(slip.file, slip.quantity) for slip in identification.slips}
+    for slip in identification.slips:
+        yield slip.file, f"Check the {slip.quantity}: {slip.words}?"
+    for result in identification.axes:
+        judged = [p for p in result.predictions if p.is_judged]
+        for p in judged:
+            own = [other for other in judged if other.quantity == p.quantity]
+            is_odd = 2 * sum(other.error > other.unchanged for other in own) < len(own)
+            if p.error > p.unchanged and is_odd and (p.file, p.quantity) not in slipped:
+                error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+                yield (
+                    p.file,
+                    f"The prediction of its {p.quantity} is off by {error}, and one of no change by {unchanged}.",
+                )
+    for d in identification.disturbances:
+        forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
+        most = max((float(np.sqrt(np.mean(force**2))) for force in forces), default=inf)
+        if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
+            kind = "torque" if d.axis.is_rotation else "force"
+            size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
+            yield (
+                d.file,
+                f"An unknown {kind} of {size} acts in {d.axis.name}, and one of at most {other} in the others.",
+            )
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:

@@ -360,12 +360,12 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
         "What else acts: lag of the thrusters (top 0.12 s)",
         *(f"- {warning}" for warning in made.warnings),
         "The report has 4 more doubts and facts.",
-        *(f"To measure next: {words}" for words in next_tests(example().axes)),
+        *(f"To measure next: {words}" for words in next_tests(example())),
     ]
     places = [text.index(part) for part in parts]
     assert places == sorted(places)
     shown = unfolded(page).casefold()
-    for sentence_ in (STOPPING, *made.warnings, *next_tests(example().axes), *example().axes[2].verdict.reasons):
+    for sentence_ in (STOPPING, *made.warnings, *next_tests(example()), *example().axes[2].verdict.reasons):
         assert readable(sentence_).casefold() in shown
 
 
