@@ -279,32 +279,32 @@ def error_in_words(p: Prediction) -> str:
     )
 
 
-def next_tests(identification: Identification) -> list[str]:
-    """Return what to measure next, in sentences: first which log to repair or to leave out, then the useful test of
-    each axis, the widest interval first.
+def next_tests(axes: Sequence[AxisResult]) -> list[str]:
+    """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
 
-    If nothing is wrong and no test is useful, the sentence names the widest interval; without any test there is none.
+    If no test is useful, the sentence names the widest interval; without any test there is none.
     """
-    tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
+    tests = sorted((r.next_test for r in axes if r.next_test), key=lambda test: -test.now)
     useful = [
         f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
         for test in tests
         if test.is_useful
     ]
     nothing = "no test would narrow an interval by a tenth. The widest is that of {} of {}, ±{:.0%}."
-    repairs = [*_repairs(identification)]
-    return repairs + useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
+    return useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
 
 
-def _repairs(identification: Identification) -> Iterator[str]:
-    """Yield what to do about each log that does not fit the others."""
+def repairs(identification: Identification) -> list[str]:
+    """Return what to do about each log that does not fit the others, in sentences. It comes before any other test."""
     odd: dict[str, list[str]] = {}
     for file, reason in _disagreements(identification):
         odd.setdefault(file, []).append(reason)
     others = len(identification.folder.logs) - len(odd)
     rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
-    for file, reasons in odd.items():
-        yield f"first repair {file} or take it out of the folder{rest}. {' '.join(reasons)}"
+    return [
+        f"Repair {file} or take it out of the folder{rest}. {' '.join(reasons)} Then identify again."
+        for file, reasons in odd.items()
+    ]
 
 
 def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
@@ -327,16 +327,15 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
                     p.file,
                     f"The prediction of its {p.quantity} is off by {error}, and one of no change by {unchanged}.",
                 )
+    pushed: dict[str, list[str]] = {}
     for d in identification.disturbances:
         forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
         most = max((float(np.sqrt(np.mean(force**2))) for force in forces), default=inf)
         if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
-            kind = "torque" if d.axis.is_rotation else "force"
             size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
-            yield (
-                d.file,
-                f"An unknown {kind} of {size} acts in {d.axis.name}, and one of at most {other} in the others.",
-            )
+            pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (others at most {other})")
+    for file, forces_of in pushed.items():
+        yield file, f"An unknown slow force acts in it: {listed(forces_of)}. Check its thrusters and its tether."
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:

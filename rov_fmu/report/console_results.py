@@ -12,6 +12,7 @@ from rov_fmu.identify.findings import (
     name_of,
     next_tests,
     relative_error,
+    repairs,
     size_in_words,
     verdict_in_words,
     with_error,
@@ -30,6 +31,8 @@ def print_identification(identification: Identification) -> None:
     """
     out, vehicle = console(), identification.vehicle
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
+    for words in repairs(identification):
+        paragraph(out, f"First: {words}")
     for result in identification.axes:
         paragraph(out, f"- {verdict_in_words(result)}")
     for found in (_answers(identification.axes), _errors(identification.axes)):
@@ -81,7 +84,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     yield from (f"- {warning}" for warning in groups["Warnings"])
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")):
         yield f"The report has {rest} more doubts and facts." if rest > 1 else "The report has one more doubt or fact."
-    yield from (f"To measure next: {test}" for test in next_tests(identification))
+    yield from (f"To measure next: {test}" for test in next_tests(identification.axes))
 
 
 def _against(value: float, measured: float) -> tuple[str, str]:
