@@ -1,6 +1,7 @@
 """The console that the commands print on, its tables, and the printout of the paper's tables and of a proof."""
 
 import os
+import re
 import shlex
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
@@ -209,5 +210,9 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
 
 
 def text(value: float | Decimal | None, form: str = "") -> str:
-    """Return a number in a format, or a dash for None and NaN."""
-    return "-" if value is None or isnan(value) else format(value, form)
+    """Return a number in a format, or a dash for None and NaN. A number that is rounded to 0 has no minus sign."""
+    if value is None or isnan(value):
+        return "-"
+    written = format(value, form)
+    is_zero = not re.search("[1-9]|inf", written)
+    return written.replace("-", "+" if form.startswith("+") else "") if is_zero else written

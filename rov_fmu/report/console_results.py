@@ -89,7 +89,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
 
 def _against(value: float, measured: float) -> tuple[str, str]:
     """Return the cells for a value of a model and its deviation from the measured value."""
-    return text(value, ".4f"), text(round(value / measured - 1.0, 3) + 0.0, DEVIATION)  # + 0.0 makes 0.0 of -0.0
+    return text(value, ".4f"), text(value / measured - 1.0, DEVIATION)
 
 
 def print_tuning(tuning: Tuning) -> None:
