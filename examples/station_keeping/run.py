@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rov_fmu.report.plots.svg import LIGHT, svg_file
+from rov_fmu.report.plots.svg import LIGHT, name_axes, svg_file
 
 from .engines import ENGINES, Trajectory, plain
 from .system import DEFAULT, MISSION, STEP, STEPS, build_system, parameter_sets
@@ -94,29 +94,29 @@ def draw(results: Mapping[str, Trajectory], path: Path) -> None:
         t = TIME[::6]
         for parameters, result in results.items():
             few = {name: values[::6] for name, values in result.items()}
-            line: dict[str, Any] = {"linewidth": 1.1, "linestyle": "--", "label": "α = β = 1"}
+            line: dict[str, Any] = {"linewidth": 1.1, "linestyle": "--", "label": "model without tuning"}
             if parameters == DEFAULT:
-                line = {"linewidth": 1.6, "label": "Table 9"}
+                line = {"linewidth": 1.6, "label": "tuned model"}
             depth.plot(t, few["rov.z"], **blue, **line)
             heading.plot(t, np.degrees(few["rov.psi"]), **blue, **line)
             track.plot(few["rov.y"], few["rov.x"], **blue, **line)
             for name, role in (("u_l", "teal"), ("u_r", "violet"), ("u_t", "orange")):
                 line["label"] = name if parameters == DEFAULT else None
                 commands.plot(t, 100.0 * few[f"autopilot.{name}"], color=LIGHT[role], **line)
-        wanted: Any = {"color": LIGHT["orange"], "linewidth": 1.3, "linestyle": ":", "label": "reference model"}
+        wanted: Any = {"color": LIGHT["orange"], "linewidth": 1.3, "linestyle": ":", "label": "wanted"}
         depth.plot(t, few["autopilot.z_d"], **wanted)
         heading.plot(t, np.degrees(few["autopilot.psi_d"]), **wanted)
-        heading.set_yticks(np.arange(0.0, degrees(pi / 2) + 1.0, 15.0))
         track.plot(0.0, 0.0, "o", markersize=4.5, **blue)
         track.set_aspect("equal", adjustable="datalim")
-        for ax, title, x, y in (
-            (depth, "Depth", "time (s)", "z (m)"),
-            (heading, "Heading", "time (s)", "ψ (deg)"),
-            (track, "Track", "east y (m)", "north x (m)"),
-            (commands, "Commands", "time (s)", "%"),
+        for ax, quantity, unit, x in (
+            (depth, "depth", "m", "time (s)"),
+            (heading, "heading", "deg", "time (s)"),
+            (track, "way to the north", "m", "way to the east (m)"),
+            (commands, "commands", "%", "time (s)"),
         ):
-            ax.set_title(title, loc="left")
-            ax.set(xlabel=x, ylabel=y)
+            name_axes(ax, quantity, unit, x)
+        heading.set_yticks(np.arange(0.0, degrees(pi / 2) + 1.0, 15.0))
+        for ax in (depth, commands):
             ax.legend()
         depth.invert_yaxis()
 

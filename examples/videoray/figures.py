@@ -18,11 +18,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
-from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text, with_formulas
+from rov_fmu.report.plots.steps import draw_steps, from_zero, measured_step, tables_by_axis
+from rov_fmu.report.plots.svg import LIGHT, add_knots, add_legend, name_axes, saved, with_even_text
+from rov_fmu.report.templates import pretty_unit
+from rov_fmu.tank.columns import in_degrees
 from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -77,6 +78,7 @@ class PaperFigure:
     def _draw(self, figure: Figure, rows: int, columns: int) -> None:
         for ax, plot in zip(np.ravel(figure.subplots(rows, columns)), self.plots, strict=True):
             plot(ax)
+        add_legend(figure, 4 if columns > 1 or figure.get_figwidth() > COLUMNS["single"] else 2)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -138,7 +140,7 @@ def paper_figures() -> Iterator[PaperFigure]:
         "steady_velocity",
         f"Steady velocity over the command in {listed(axes)}: the model of {_PAPER} (dashed), the model refitted to "
         "all measured V_ss and Tau (solid), and the measured V_ss (points).",
-        tuple(partial(_steady, k=k, refit=refit, table=tables[axis], has_legend=axis == axes[0]) for axis in axes),
+        tuple(partial(_steady, k=k, refit=refit, table=tables[axis]) for axis in axes),
     )
 
 
@@ -151,63 +153,64 @@ def _measured_taus(table: ResponseTable) -> str:
     return f"Points: measured Tau, at 63 % of the measured V_ss{missing}."
 
 
-def _steady(ax: Axes, k: Vehicle, refit: Vehicle, table: ResponseTable, *, has_legend: bool) -> None:
+def _steady(ax: Axes, k: Vehicle, refit: Vehicle, table: ResponseTable) -> None:
     """Draw V_ss over the command along an axis: the paper's model, the refit, and the paper's measurements."""
     axis, commands = table.axis, range(0, 101, 2)
-    of_paper, of_refit = ([rov.response(axis, command / 100.0)[0] for command in commands] for rov in (k, refit))
-    points = [(float(command), float(V)) for command, V in table.steady.items()]
-    lines = [
-        *ax.plot(commands, of_paper, "--", color=LIGHT["grey"], linewidth=1.8),
-        *ax.plot(commands, of_refit, "-", color=LIGHT["blue"], linewidth=1.8),
-        *ax.plot(*zip(*points, strict=True), "o", color=LIGHT["orange"], markersize=4.0, zorder=5),
-    ]
-    if has_legend:
-        for line, label in zip(lines, ("paper", "refit", "measured"), strict=True):
-            line.set_label(label)
-    finish(ax, axis.name.capitalize(), "command (%)", f"$V_{{ss}}$ ({axis.unit})")
+    factor, unit = in_degrees(axis.unit)
+    for rov, label, dashes, color in ((k, "model of the paper", "--", "grey"), (refit, "refitted model", "-", "blue")):
+        V_ss = [factor * rov.response(axis, command / 100.0)[0] for command in commands]
+        ax.plot(commands, V_ss, dashes, color=LIGHT[color], linewidth=1.8, label=label)
+    points = [(float(command), factor * float(V)) for command, V in table.steady.items()]
+    ax.plot(*zip(*points, strict=True), "o", color=LIGHT["orange"], markersize=4.0, zorder=5, label="measured")
+    name_axes(ax, f"steady {axis.name} velocity", unit, "command (%)")
+    from_zero(ax)
     ax.set_xlim(0, 100)
 
 
 def _rear_thrust(ax: Axes, k: Vehicle, unweighted: tuple[float, float]) -> None:
-    _curve(ax, 100.0, 1.0, unweighted, "--", "grey", "all points (8)")
-    _curve(ax, 100.0, 1.0, (k["a_t_rear"], k["b_t_rear"]), "-", "blue", "weighted (9)")
-    finish(ax, "", "command (%)", "$F_l + F_r$ (N)")
+    _curve(ax, 100.0, 1.0, unweighted, "--", "grey", "thrust fitted to all points")
+    _curve(ax, 100.0, 1.0, (k["a_t_rear"], k["b_t_rear"]), "-", "blue", "thrust fitted with weights")
+    name_axes(ax, "thrust of both rear thrusters", "N", "command (%)")
+    from_zero(ax)
 
 
 def _top_thrust(ax: Axes, k: Vehicle) -> None:
-    _curve(ax, 100.0, 1.0, (k["a_t_top"], k["b_t_top"]), "-", "blue", "(10)")
-    finish(ax, "", "command (%)", "$F_t$ (N)")
+    _curve(ax, 100.0, 1.0, (k["a_t_top"], k["b_t_top"]), "-", "blue", None)
+    name_axes(ax, "thrust of the top thruster", "N", "command (%)")
+    from_zero(ax)
 
 
 def _drag(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
     axis = table.axis
-    names = (axis.coefficient("a_d"), axis.coefficient("b_d"))
+    factor, unit = in_degrees(axis.unit)
     v = np.array([float(V) for V in table.steady.values()])
     force = np.array([k.force(axis, float(c) / 100.0) for c in table.steady])
     end = 1.1 * float(v.max())
     through, *_ = np.linalg.lstsq(np.column_stack([v**2, v]), force, rcond=None)
-    _curve(ax, 1.0, end, through, "--", "grey", "least squares of the points")
-    _curve(ax, 1.0, end, (k[names[0]], k[names[1]]), "-", "blue", axis.equations[0])
-    ax.plot(v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label=f"Table {table.steady_number}")
-    finish(ax, "", f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
+    own = k[axis.coefficient("a_d")], k[axis.coefficient("b_d")]
+    _curve(ax, factor, end, through, "--", "grey", "drag fitted to all points")
+    _curve(ax, factor, end, own, "-", "blue", "drag of the paper")
+    ax.plot(factor * v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label="measured velocity")
+    kind = "torque" if axis.is_rotation else "force"
+    name_axes(ax, f"drag {kind}", axis.load, f"{axis.name} velocity ({pretty_unit(unit)})")
+    from_zero(ax)
+    if unit == "m/s":
+        add_knots(ax, "x")
 
 
 def _steps(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
-    axis = table.axis
     steps = [measured_step(table, Decimal(command)) for command in _STEPS]
-    draw_steps(ax, axis, steps, [(untuned(k), "--"), (k, "-")])
-    looks = {"--": "non-linear", "-": "scaled", ":": "measured $V_{ss}$"}
+    draw_steps(ax, table.axis, steps, [(untuned(k), "--"), (k, "-")])
+    looks = {"--": "non-linear model", "-": "scaled model", ":": "measured steady velocity"}
     if any(step.Tau for step in steps):
-        looks["o"] = "measured $Tau$"
+        looks["o"] = "measured time constant"
     for look, label in looks.items():
         ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
-    finish(ax, "", "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
-    if axis is SURGE:  # inside the plot the legend would hide the curves
-        legend = ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(looks), columnspacing=1.0)
-        with_formulas(*legend.get_texts())
 
 
-def _curve(ax: Axes, scale: float, end: float, curve: Sequence[float], dashes: str, color: str, label: str) -> None:
+def _curve(
+    ax: Axes, scale: float, end: float, curve: Sequence[float], dashes: str, color: str, label: str | None
+) -> None:
     a, b = curve
     x = np.linspace(0.0, end, 61)
     ax.plot(scale * x, a * x**2 + b * x, dashes, color=LIGHT[color], linewidth=1.8, label=label)

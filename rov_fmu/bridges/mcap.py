@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.io.messages import InputError
+from rov_fmu.report.plots.geometry import place
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -205,8 +206,6 @@ def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "Sce
 
 def hull_size(vehicle: Vehicle) -> Array:
     """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
-    from rov_fmu.report.plots.drawing import place  # imports Matplotlib, which takes a second
-
     corners = np.abs([place(vehicle, thruster) for thruster in vehicle.layout.thrusters])
     size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
     return size
@@ -215,8 +214,6 @@ def hull_size(vehicle: Vehicle) -> Array:
 def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iterator["ArrowPrimitive"]:
     """Yield the jets as arrows in the frame of the vehicle. An arrow of Foxglove points along its own x axis."""
     from foxglove.messages import ArrowPrimitive, Pose
-
-    from rov_fmu.report.plots.drawing import place
 
     for thruster in vehicle.layout.thrusters:
         share = shares.get(thruster.name, 0.0)

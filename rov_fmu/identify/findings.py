@@ -52,6 +52,8 @@ STOPPING = (
 )
 _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""
+_ODD = 3.0
+"""A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
@@ -76,7 +78,8 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "many thrusters pulled together, and the battery"
         ),
         "unknown force": (
-            "{what} in {files}{since}. Check the tether, contact with the bottom or a wall, a current, and the payload"
+            "{what} in {files}{since}. Check the thrusters for weed and damage, the tether, contact with the bottom or "
+            "a wall, a current, and the payload"
         ),
         "change of thrust": "{what} in {files}{since}. Check the battery, and the thrusters for weed and damage",
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -289,6 +292,50 @@ def next_tests(axes: Sequence[AxisResult]) -> list[str]:
     ]
     nothing = "no test would narrow an interval by a tenth. The widest is that of {} of {}, ±{:.0%}."
     return useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
+
+
+def repairs(identification: Identification) -> list[str]:
+    """Return what to do about each log that does not fit the others, in sentences. It comes before any other test."""
+    odd: dict[str, list[str]] = {}
+    for file, reason in _disagreements(identification):
+        odd.setdefault(file, []).append(reason)
+    others = len(identification.folder.logs) - len(odd)
+    rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
+    return [
+        f"Repair {file} or take it out of the folder{rest}. {' '.join(reasons)} Then identify again."
+        for file, reasons in odd.items()
+    ]
+
+
+def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
+    """Yield each log that does not fit the others, with the reason as a sentence: a probable slip, motion that the
+    others predict worse than no change, or a slow force that is much larger than in the others.
+
+    Where half of the logs are predicted worse than no change, the model is wrong, and no log is the odd one.
+    """
+    slipped = {(slip.file, slip.quantity) for slip in identification.slips}
+    for slip in identification.slips:
+        yield slip.file, f"Check the {slip.quantity}: {slip.words}?"
+    for result in identification.axes:
+        judged = [p for p in result.predictions if p.is_judged]
+        for p in judged:
+            own = [other for other in judged if other.quantity == p.quantity]
+            is_odd = 2 * sum(other.error > other.unchanged for other in own) < len(own)
+            if p.error > p.unchanged and is_odd and (p.file, p.quantity) not in slipped:
+                error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+                yield (
+                    p.file,
+                    f"The prediction of its {p.quantity} is off by {error}, and one of no change by {unchanged}.",
+                )
+    pushed: dict[str, list[str]] = {}
+    for d in identification.disturbances:
+        forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
+        most = max((float(np.sqrt(np.mean(force**2))) for force in forces), default=inf)
+        if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
+            size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
+            pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (others at most {other})")
+    for file, forces_of in pushed.items():
+        yield file, f"An unknown slow force acts in it: {listed(forces_of)}. Check its thrusters and its tether."
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:

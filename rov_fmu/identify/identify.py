@@ -111,7 +111,7 @@ def _axis(
         known=_those_of(coefficients, names),
         predictions=own,
         points=tuple(points),
-        next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits),
+        next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits, answers),
     )
 
 

@@ -12,7 +12,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
-from rov_fmu.identify.result import NextTest
+from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -26,8 +26,14 @@ _RATE = 10.0
 """The samples per second of the proposed test."""
 
 
-def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: TankLimits) -> NextTest | None:
-    """Return the test that narrows the least certain steady velocity of an axis most; None without a log of it."""
+def next_test(
+    objective: Objective, posterior: Posterior, axis: Axis, limits: TankLimits, answers: Sequence[Answer]
+) -> NextTest | None:
+    """Return the test that narrows the least certain steady velocity of an axis most; None without a log of it.
+
+    The intervals of the answers are those that people see. They may be wider than the posterior says, for example
+    because the thrust changes slowly; a test does not narrow this part.
+    """
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
 
     def motion(z: Array, command: float) -> AxisAlone:
@@ -46,7 +52,10 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
         return np.log(np.abs([speed(z, c) for c in COMMANDS]))
 
     slopes = posterior.slopes(logarithms, posterior.of_vehicle)
-    now = _widths(slopes, posterior.covariance)
+    known = _widths(slopes, posterior.covariance)
+    shown = {a.command: 0.5 * (a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in answers}
+    rest = np.array([max(shown.get(c, 0.0) ** 2 - one**2, 0.0) for c, one in zip(COMMANDS, known, strict=True)])
+    now = np.sqrt(known**2 + rest)
     worst = int(np.argmax(now))
     found = []
     for strength in _STRENGTHS:
@@ -59,8 +68,9 @@ def next_test(objective: Objective, posterior: Posterior, axis: Axis, limits: Ta
             continue
         covariance = np.asarray(np.linalg.inv(np.linalg.inv(posterior.covariance) + 0.5 * more), np.float64)
         words = f"hold {strength:.0%} of {axis.name} for {hold:.0f} s, rest, then -{strength:.0%} for {hold:.0f} s"
-        target = f"V_ss at {COMMANDS[worst]:.0%}"
-        found.append(NextTest(axis, words, target, float(now[worst]), float(_widths(slopes, covariance)[worst])))
+        then = np.sqrt(_widths(slopes, covariance) ** 2 + rest)
+        target = f"the speed at {COMMANDS[worst]:.0%}"
+        found.append(NextTest(axis, words, target, float(now[worst]), float(then[worst])))
     return min(found, key=lambda test: test.then, default=None)
 
 

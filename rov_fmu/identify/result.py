@@ -236,7 +236,7 @@ class NextTest:
     words: str
     """What to do, such as `hold 0.6 for 8 s, then -0.6 for 8 s`."""
     target: str
-    """The number that it narrows, in words, such as `V_ss at 50 %`."""
+    """The number that it narrows, in words, such as `the speed at 50%`."""
     now: float
     """The relative half-width of that number's interval."""
     then: float

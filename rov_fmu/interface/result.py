@@ -138,8 +138,7 @@ class Result(Mapping[str, Array]):
         return figure
 
     def _draw(self, figure: "Figure", names: str | Sequence[str] | None) -> None:
-        from rov_fmu.report.plots.svg import LIGHT, LINES, add_knots, draw_commands
-        from rov_fmu.report.templates import in_words
+        from rov_fmu.report.plots.svg import LIGHT, LINES, draw_commands, name_axes
 
         chosen = self._moving() if names is None else (names,) if isinstance(names, str) else tuple(names)
         if not chosen:
@@ -169,9 +168,7 @@ class Result(Mapping[str, Array]):
             low, high = panel.dataLim.intervaly
             if max(abs(low), abs(high)) > 0.0 and high - low < 1e-3 * max(abs(low), abs(high)):  # constant
                 panel.set_ylim(min(0.0, 1.1 * low), max(0.0, 1.1 * high))
-            panel.set_title(in_words(quantity, unit), loc="left")
-            if unit == "m/s":
-                add_knots(panel)
+            name_axes(panel, quantity, unit)
             panel.legend(loc="center left", bbox_to_anchor=(1.16, 0.5))
         if commands:
             draw_commands(axes[-1], self.time, commands, self.command_unit)

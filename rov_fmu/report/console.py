@@ -1,9 +1,12 @@
 """The console that the commands print on, its tables, and the printout of the paper's tables and of a proof."""
 
 import os
+import re
 import shlex
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
+from dataclasses import replace
 from decimal import Decimal
 from math import isnan
 from pathlib import Path
@@ -11,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from rov_fmu.io.messages import listed, one_line, wrapped
@@ -78,15 +81,46 @@ def print_end(written: Sequence[Path], following: str = "") -> None:
 
 
 def print_table(found: Table, out: Console | None = None) -> None:
-    """Print a table with its title and its caption. A pipe or a file gets whole lines, and a narrow terminal wraps
-    cells."""
+    """Print a table with its title and its caption. A pipe or a file gets whole lines. A terminal that is too narrow
+    for the numbers gets several tables, each with the first column, and wraps the cells of texts."""
     out = out or console()
     if out.is_terminal:
-        out.print(found)
+        for part in _narrowed(found, out):
+            out.print(part)
         return
-    out.width = max(out.width, out.measure(found, options=out.options.update(max_width=10_000)).maximum)
+    out.width = max(out.width, _width(found, out))
     for line in out.render_lines(found, pad=False):
         out.print("".join(segment.text for segment in line).rstrip(), soft_wrap=True)
+
+
+def _narrowed(found: Table, out: Console) -> Iterator[Table]:
+    """Yield tables with as many columns of numbers as fit beside the first column; the last one has the texts, too."""
+    first, *others = found.columns
+    texts = [column for column in others if column.justify != "right"]
+    groups: list[list[Column]] = [[]]
+    for column in others:
+        if column not in texts:
+            if groups[-1] and _width(_with_columns(found, [first, *groups[-1], column]), out) > out.width:
+                groups.append([])
+            groups[-1].append(column)
+    for n, group in enumerate(groups):
+        is_last = n == len(groups) - 1
+        part = _with_columns(found, [first, *group, *(texts if is_last else [])])
+        part.title = found.title if n == 0 else None
+        part.caption = found.caption if is_last else None
+        yield part
+
+
+def _with_columns(found: Table, columns: Sequence[Column]) -> Table:
+    """Return a table with some of its columns."""
+    part = copy(found)
+    part.columns = [replace(column, _index=n) for n, column in enumerate(columns)]
+    return part
+
+
+def _width(found: Table, out: Console) -> int:
+    """Return the width of a table in which no cell is wrapped."""
+    return out.measure(found, options=out.options.update(max_width=10_000)).maximum
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
@@ -176,5 +210,9 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
 
 
 def text(value: float | Decimal | None, form: str = "") -> str:
-    """Return a number in a format, or a dash for None and NaN."""
-    return "-" if value is None or isnan(value) else format(value, form)
+    """Return a number in a format, or a dash for None and NaN. A number that is rounded to 0 has no minus sign."""
+    if value is None or isnan(value):
+        return "-"
+    written = format(value, form)
+    is_zero = not re.search("[1-9]|inf", written)
+    return written.replace("-", "+" if form.startswith("+") else "") if is_zero else written

@@ -12,6 +12,7 @@ from rov_fmu.identify.findings import (
     name_of,
     next_tests,
     relative_error,
+    repairs,
     size_in_words,
     verdict_in_words,
     with_error,
@@ -30,6 +31,8 @@ def print_identification(identification: Identification) -> None:
     """
     out, vehicle = console(), identification.vehicle
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
+    for words in repairs(identification):
+        paragraph(out, f"First: {words}")
     for result in identification.axes:
         paragraph(out, f"- {verdict_in_words(result)}")
     for found in (_answers(identification.axes), _errors(identification.axes)):
@@ -86,7 +89,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
 
 def _against(value: float, measured: float) -> tuple[str, str]:
     """Return the cells for a value of a model and its deviation from the measured value."""
-    return text(value, ".4f"), text(round(value / measured - 1.0, 3) + 0.0, DEVIATION)  # + 0.0 makes 0.0 of -0.0
+    return text(value, ".4f"), text(value / measured - 1.0, DEVIATION)
 
 
 def print_tuning(tuning: Tuning) -> None:

@@ -62,6 +62,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         made=made or _today(),
         findings=findings.by_heading(results.findings),
         next_tests=findings.next_tests(results.axes),
+        repairs=findings.repairs(results),
         shown=shown,
         forces=curves,
         plot=plot,

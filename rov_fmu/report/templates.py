@@ -10,7 +10,8 @@ from pathlib import Path
 from markupsafe import Markup
 
 from rov_fmu.io.templates import render
-from rov_fmu.report.plots.svg import PALETTE
+from rov_fmu.report import console
+from rov_fmu.report.palette import PALETTE
 from rov_fmu.vehicle import uncertainty
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -80,10 +81,10 @@ def _with_signs(text: str) -> str:
 
 
 def text(value: float | None, form: str) -> str:
-    """Return a number in a format, or a dash for None and NaN."""
+    """Return a number in a format with typographic signs, or a dash for None and NaN."""
     if value is None or isnan(value):
         return "–"
-    return format(value, form).replace("%", " %").replace("-", "−").replace("inf", "∞")
+    return console.text(value, form).replace("%", " %").replace("-", "−").replace("inf", "∞")
 
 
 def sentence(text: str) -> str:

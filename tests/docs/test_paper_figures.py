@@ -101,10 +101,9 @@ def test_a_caption_and_the_legend_tell_of_the_points_that_are_drawn(name: str) -
     assert drawn_points == {"figure_11a": 3, "figure_11b": 2, "surge_steps": 0}[name]
     assert ("Points: measured Tau" in caption) == (drawn_points > 0)
     assert ("none at 70 %" in caption) == (drawn_points == 2)
-    legend = ax.get_legend()
-    assert legend
-    labels = [text.get_text() for text in legend.get_texts()]
-    assert labels == ["non-linear", "scaled", "measured $V_{ss}$", "measured $Tau$"][: 4 if drawn_points else 3]
+    _, labels = ax.get_legend_handles_labels()
+    named = ["non-linear model", "scaled model", "measured steady velocity", "measured time constant"]
+    assert labels == named[: 4 if drawn_points else 3]
 
 
 def test_the_readme_tells_which_figures_are_not_the_papers() -> None:
@@ -129,5 +128,8 @@ def test_curves_and_points_are_those_that_the_paper_prints() -> None:
     assert measured[1] == pytest.approx((0.47, 42.9 * 0.3**2 + 2.711 * 0.3), rel=1e-3), "Table 4 at 30 %"
     surge = {str(line.get_label()): points(line) for line in drawn(FIGURES["steady_velocity"]).lines}
     assert surge["measured"][1] == pytest.approx((30.0, 0.47))
-    assert surge["paper"][15] == pytest.approx((30.0, 0.4729), abs=1e-4)
+    assert surge["model of the paper"][15] == pytest.approx((30.0, 0.4729), abs=1e-4)
+    turning = drawn(FIGURES["figure_9"])
+    assert turning.get_xlabel() == "yaw velocity (°/s)"
+    assert points(turning.lines[-1])[2][0] == pytest.approx(2.00 * 180.0 / np.pi, rel=1e-9), "Table 5 at 40 %"
     assert drawn(FIGURES["figure_11a"]).texts[0].get_text() == "30 %"

@@ -18,12 +18,23 @@ from rov_fmu.identify.findings import (
     heading,
     next_tests,
     relative_error,
+    repairs,
     sentences,
     told,
     warnings,
     with_error,
 )
-from rov_fmu.identify.result import Coefficient, Disturbance, Effect, Identification, Logging, NextTest, Point, Slip
+from rov_fmu.identify.result import (
+    Coefficient,
+    Disturbance,
+    Effect,
+    Identification,
+    Logging,
+    NextTest,
+    Point,
+    Slip,
+    UnknownForce,
+)
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.findings import Finding
@@ -127,14 +138,14 @@ CASES: Sequence[tuple[str, str, Identification, str]] = [
         "Warnings",
         disturbance(),
         "surge: an unknown slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 41 s on. Check the "
-        "tether, contact with the bottom or a wall, a current, and the payload",
+        "thrusters for weed and damage, the tether, contact with the bottom or a wall, a current, and the payload",
     ),
     (
         "unknown force",
         "Warnings",
         disturbance(axis=YAW, size=0.21, unit="N.m", since=0.3),
-        "yaw: an unknown slow torque of 0.21 N.m (RMS), 16% of the torque, acts in log_3.csv. Check the tether, "
-        "contact with the bottom or a wall, a current, and the payload",
+        "yaw: an unknown slow torque of 0.21 N.m (RMS), 16% of the torque, acts in log_3.csv. Check the thrusters "
+        "for weed and damage, the tether, contact with the bottom or a wall, a current, and the payload",
     ),
     (
         "change of thrust",
@@ -331,6 +342,72 @@ def test_the_next_tests_begin_with_the_widest_interval() -> None:
     (only,) = next_tests(axes[2:])
     assert only == "no test would narrow an interval by a tenth. The widest is that of V_ss at 50% of yaw, ±10%."
     assert next_tests([replace(axes[0], next_test=None)]) == []
+
+
+def three(**changes: Any) -> Identification:
+    """The quiet result of three logs, whose surge velocity is predicted with an error of 0.1 m/s in each."""
+    files = (*FILES, "log_3.csv")
+    (axis,) = surge(predictions=tuple(prediction(SURGE, "surge velocity", file) for file in files)).axes
+    folder = replace(quiet().folder, logs=[*map(log, files)])
+    return quiet(**{"axes": (replace(axis, next_test=None),), "folder": folder, **changes})
+
+
+def worse(result: Identification, *files: str) -> Identification:
+    """The result with a prediction that is off by 0.9 m/s in these logs; one of no change is off by 0.7 m/s."""
+    (axis,) = result.axes
+    own = tuple(replace(p, error=0.9) if p.file in files else p for p in axis.predictions)
+    return replace(result, axes=(replace(axis, predictions=own),))
+
+
+def slow_forces(*sizes: float) -> dict[str, Any]:
+    """An unknown force in surge with these sizes in the logs, in N. The largest one counts."""
+    files = (*FILES, "log_3.csv")
+    largest = files[sizes.index(max(sizes))]
+    return {
+        "disturbances": (Disturbance("force", SURGE, largest, max(sizes), "N", 0.2, 9.0, 30.0),),
+        "unknown_forces": tuple(
+            UnknownForce(SURGE, file, TIME, np.full(len(TIME), size), np.ones(len(TIME)))
+            for file, size in zip(files, sizes, strict=True)
+        ),
+    }
+
+
+ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the other 2 logs. "
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (three(), []),
+        (three(slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),)), [f"{ODD}Check the depth: is it in cm?"]),
+        (
+            worse(three(), "log_3.csv"),
+            [f"{ODD}The prediction of its surge velocity is off by 0.90 m/s, and one of no change by 0.70 m/s."],
+        ),
+        (worse(three(), "log_2.csv", "log_3.csv"), []),
+        (
+            worse(three(slips=(Slip("log_3.csv", "surge velocity", "is it in cm", 20.0),)), "log_3.csv"),
+            [f"{ODD}Check the surge velocity: is it in cm?"],
+        ),
+        (
+            three(**slow_forces(0.5, 0.4, 3.3)),
+            [
+                f"{ODD}An unknown slow force acts in it: 3.3 N in surge (others at most 0.50 N). Check its thrusters "
+                "and its tether."
+            ],
+        ),
+        (three(**slow_forces(0.5, 1.4, 3.3)), []),
+        (
+            three(slips=tuple(Slip(f"log_{n}.csv", "depth", "is it in cm", 20.0) for n in (1, 2, 3))),
+            [f"Repair log_{n}.csv or take it out of the folder. Check the depth: is it in cm?" for n in (1, 2, 3)],
+        ),
+    ],
+)
+def test_a_log_that_disagrees_with_the_others_is_repaired_before_anything_is_measured(
+    result: Identification, words: list[str]
+) -> None:
+    """Not the log is wrong where half of the logs are predicted badly, or where the unknown force is about as large."""
+    assert repairs(result) == [f"{sentence} Then identify again." for sentence in words]
 
 
 def test_the_error_of_an_answer_is_relative() -> None:

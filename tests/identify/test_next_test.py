@@ -42,7 +42,7 @@ def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
 
 
 def proposed(fit: Fit, axis: Axis = HEAVE, **limits: float) -> NextTest | None:
-    return next_test(fit.objective, replace(fit.posterior, z=fit.kept.z), axis, TankLimits(**limits))
+    return next_test(fit.objective, replace(fit.posterior, z=fit.kept.z), axis, TankLimits(**limits), ())
 
 
 def plan(test: NextTest) -> tuple[tuple[float, float], ...]:
@@ -59,7 +59,7 @@ def test_a_test_narrows_the_least_certain_velocity(fit: Fit) -> None:
         test = proposed(fit, axis)
         assert test
         assert test.axis is axis
-        assert re.fullmatch(r"V_ss at -?[35]0%", test.target)
+        assert re.fullmatch(r"the speed at -?[35]0%", test.target)
         assert 0.0 < test.then < test.now
         assert test.is_useful == (test.then < 0.9 * test.now)
 

@@ -7,16 +7,22 @@ import re
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
+from decimal import Decimal
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from lxml import html
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.fmu.archive import Content, native_content, python_content, web_module
 from rov_fmu.fmu.variables import variables
-from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.page.fmu_page import documentation_page, plot_steady, plot_steps
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
@@ -205,6 +211,43 @@ def test_any_coefficients_and_any_range_of_commands(
     assert "The rear thrust is negative" not in documentation_page(changed)
 
 
+def panel_of(draw: Callable[..., None], vehicle: Vehicle, axis: Axis, **more: Any) -> Axes:
+    """Return the panel that a plot of the page draws, laid out."""
+    figure = Figure(figsize=(3.7, 2.9), layout="constrained")
+    ax = figure.subplots()
+    draw(ax, vehicle=vehicle, axis=axis, table=None, **more)
+    figure.draw_without_rendering()
+    return ax
+
+
+def test_the_plots_are_in_degrees_and_have_knots_beside_metres_per_second(vehicle: Vehicle) -> None:
+    """Table 7 prints 2.82 rad/s in yaw at 50 %, and a_d V^2 + b_d V = alpha F gives 2.8544."""
+    turning, ahead = (panel_of(plot_steady, vehicle, axis) for axis in (YAW, SURGE))
+    commands, V = next(np.asarray(line.get_data()) for line in turning.lines if line.get_label() == "tuned")
+    assert V[commands == 50.0][0] == pytest.approx(2.8544 * 180.0 / np.pi, rel=1e-4)
+    assert turning.get_title(loc="left") == "Steady yaw velocity (°/s)"
+    assert not turning.child_axes
+    (knots,) = ahead.child_axes
+    assert knots.get_ylim()[1] == pytest.approx(ahead.get_ylim()[1] * 3600.0 / 1852.0)
+    steps = panel_of(plot_steps, vehicle, YAW, commands=[Decimal(50)])
+    assert steps.get_title(loc="left") == "Yaw velocity after a step (°/s)"
+    assert np.asarray(steps.lines[0].get_ydata())[-1] == pytest.approx(float(V[commands == 50.0][0]), rel=0.03)
+
+
+def test_what_is_always_0_or_holds_everywhere_is_not_drawn(heavy: Vehicle) -> None:
+    """BlueROV2 Heavy holds for every command, so nothing is shaded; lines near 0 have labels beside each other."""
+    ax = panel_of(plot_steady, heavy, HEAVE)
+    assert not ax.patches
+    assert panel_of(plot_steady, replace(heavy, command_range=(0.2, 0.7)), HEAVE).patches
+    steps = panel_of(plot_steps, heavy, HEAVE, commands=[Decimal(10), Decimal(100)])
+    boxes = [text.get_window_extent() for text in steps.texts]
+    assert len(boxes) == 4
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    (knots,) = steps.child_axes
+    numbers = [label.get_window_extent() for label in knots.get_yticklabels()]
+    assert not any(box.overlaps(number) for box in boxes for number in numbers)
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [
@@ -288,7 +331,7 @@ def test_the_page_describes_lag_and_coupling(heavy_page: str) -> None:
         assert claim not in text, claim
     assert ["1 thruster 1 (front starboard)", "u_1", "t200", "−0.7071, 0.7071, 0", "0.156, 0.111, 0.085"] in table
     (row,) = [row for row in table if row[0] == "a_d_u" and len(row) == 6]
-    assert row[2:4] == ["141", "130.5 … 151.5"]
+    assert row[2:4] == ["141", "130 … 152"]
 
 
 def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_page: str) -> None:

@@ -20,9 +20,11 @@ from matplotlib.text import Annotation
 from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
-from rov_fmu.report.plots.drawing import VIEWS, draw_icon, draw_thrusters, place, scenes
+from rov_fmu.report.palette import PALETTE
+from rov_fmu.report.plots.drawing import draw_icon, draw_thrusters
+from rov_fmu.report.plots.geometry import VIEWS, place, scenes
 from rov_fmu.report.plots.png import png_file
-from rov_fmu.report.plots.svg import LINES, PALETTE, inline_svg, with_formulas
+from rov_fmu.report.plots.svg import LINES, inline_svg, with_formulas
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
@@ -250,3 +252,21 @@ def test_a_drawing_holds_its_arrows_and_names_which_do_not_cover_each_other(kind
     tips = [text.xy for text in ax.texts if isinstance(text, Annotation)]
     assert tips
     assert all(left < x < right and high < y < low for x, y in tips)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("name", ["videoray", "bluerov2", "bluerov2_heavy"])
+def test_no_name_of_a_force_lies_on_an_axis_of_the_body(name: str, view: str) -> None:
+    """The axes run from the centre of mass, at (0, 0), forward and downward in the drawing."""
+    vehicle = load_vehicle(SHIPPED[name])
+    scene = scenes(vehicle)[view]
+    figure = Figure(figsize=scene.inches, layout="constrained")
+    ax = figure.subplots()
+    draw_thrusters(ax, vehicle, scene)
+    figure.draw_without_rendering()
+    axes = [(1.4 * share * scene.size, 0.0) for share in np.linspace(0.0, 1.0, 200)]
+    axes += [(0.0, 0.9 * share * scene.size) for share in np.linspace(0.0, 1.0, 200)]
+    on_axes = ax.transData.transform(axes)
+    forces = [text for text in ax.texts if text.get_text().startswith("$F")]
+    assert forces
+    assert not any(text.get_window_extent().contains(*point) for text in forces for point in on_axes)

@@ -21,7 +21,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, next_tests, size_in_words, told
-from rov_fmu.identify.result import AxisResult, Effect, Identification
+from rov_fmu.identify.result import AxisResult, Effect, Identification, Slip
 from rov_fmu.io.output import write_whole
 from rov_fmu.report import report
 from rov_fmu.report.console import _Console
@@ -122,7 +122,7 @@ def test_the_first_screen_has_verdicts_answers_the_worst_prediction_and_the_data
     table = rows(page)
     knots = [f"{speed * 3600 / 1852:.2g} knots" for speed in (0.15, 0.25)]
     assert [
-        "Down",
+        "Downheave",
         f"0.15 m/s0.14 to 0.17{knots[0]}",
         f"0.25 m/s0.23 to 0.28{knots[1]}",
         "0.50 m/s0.45 to 0.550.97 knots",
@@ -136,12 +136,38 @@ def test_the_first_screen_has_verdicts_answers_the_worst_prediction_and_the_data
         "the heading (anew every 10 s) of log_2.csv, predicted from the commands alone by a fit to the other log",
         "The bands should contain 95 % of the samples; they contain 95 % for surge, 90 % for heave and 40 % for yaw.",
         "Identification from two dive logs · 2026-11-23",
-        "2 logs of 120 s (log_1.csv, log_2.csv), 3 forces, 9 points, commands of 20 % to 70 %.",
+        "2 logs of together 120 s (log_1.csv, log_2.csv), 3 forces, 9 points, commands of 20 % to 70 %.",
         "The tests had commands of 20 % to 70 %: the speed at 100 % is extrapolated.",
         "Yaw: hold 0.6 for 8 s, then −0.6 for 8 s. V_ss at 50 %, now ±60 %, becomes ±30 %.",
         "Yaw: the prediction of the heading in log_2.csv is off by 52 ° (RMS)",
     ):
         assert part in words
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_ten_questions_of_an_owner_are_answered_before_anything_is_unfolded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The key is the result: V_ss is the command times 1 m/s ahead, and the second of two logs has a depth in cm."""
+    wrong = replace(without_findings(), slips=(Slip(FILES[1], "depth", "is it in cm", 20.0),))
+    made = report_page(told(wrong), made=date(2026, 11, 23))
+    words, forward = unfolded(made), next(row for row in rows(made) if row[0] == "Forwardsurge")
+    assert forward[2].startswith("0.500 m/s0.490 to 0.510"), "how fast at half power"
+    assert forward[3].startswith("1.00 m/s0.98 to 1.02"), "how fast at full power"
+    assert forward[4].startswith("1.00 s0.98 to 1.02"), "how long until it moves"
+    assert forward[5].startswith("1.00 m0.98 to 1.02"), "how far it coasts"
+    key = {
+        "can I trust yaw": "Yaw: do not use",
+        "can I trust surge": "Surge: good",
+        "from which data": "2 logs of together 120 s (log_1.csv, log_2.csv)",
+        "what is wrong with log_2": "it disagrees with the other log. Check the depth: is it in cm?",
+        "what to do first": "First: Repair log_2.csv or take it out of the folder",
+        "what to measure next": "Yaw: hold 0.6 for 8 s",
+        "how well is an unseen dive predicted": "they contain 95 % for surge, 90 % for heave and 40 % for yaw",
+    }
+    assert [question for question, answer in key.items() if answer not in words] == []
+    told_first = " ".join(" ".join(printed(told(wrong), monkeypatch, 80)).split())
+    assert told_first.index("First: Repair log_2.csv") < told_first.index("surge: good")
+    assert words.index("First: Repair") < words.index("Surge: good") < words.index("What you can expect")
+    assert "Repair" not in unfolded(report_page(example(), made=date(2026, 11, 23)))
 
 
 def test_findings_stand_under_their_headings(page: str) -> None:
@@ -286,7 +312,7 @@ def test_another_fit_is_compared_in_every_table_and_plot_that_it_has_numbers_for
     table = rows(page)
     assert f"“Compared” is {other.name}." in unfolded(page)
     V, Tau = other.response(SURGE, 0.5)
-    (speed,) = [row[2] for row in table if row[0] == "Forward"]
+    (speed,) = [row[2] for row in table if row[0] == "Forwardsurge"]
     assert speed.endswith(f"compared: {number(V, 3)} m/s")
     (answer,) = [row for row in table if row[:2] == ["50 %", "compared"] and row[5] == "m/s" and float(row[2]) > 1.0]
     assert [float(answer[2]), float(answer[6])] == pytest.approx([V, Tau], rel=1e-3)
@@ -370,9 +396,15 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
 
 
 @pytest.mark.parametrize("width", [40, 80])
-def test_a_narrow_terminal_wraps_cells_and_cuts_nothing(monkeypatch: pytest.MonkeyPatch, width: int) -> None:
+def test_a_narrow_terminal_gets_several_tables_and_no_number_is_broken(
+    monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
     lines = printed(example(), monkeypatch, width)
     assert max(map(len, lines)) <= width
+    speeds = [line for line in lines if line.startswith("bow to starboard (yaw)")]
+    assert len(speeds) == {40: 5, 80: 2}[width]
+    assert "".join(speeds).count("±30%") == 5
+    assert any("90 deg/s ±30%" in line for line in speeds)
     text = "".join("".join(lines).split())
     assert "…" not in text
     for number_ in ("0.300", "0.500", "1.00", "±30%"):

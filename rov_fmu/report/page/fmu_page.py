@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rov_fmu.c.compile import INTERFACES
 from rov_fmu.c.simulation import simulate
@@ -23,18 +24,20 @@ from rov_fmu.io.messages import listed
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.live import Flown, live
 from rov_fmu.report.page.pictures import pictures
-from rov_fmu.report.plots.drawing import draw_thrusters, scenes
+from rov_fmu.report.plots.drawing import draw_thrusters
+from rov_fmu.report.plots.geometry import scenes
 from rov_fmu.report.plots.steps import (
     Step,
     draw_curve,
     draw_steps,
-    finish,
+    from_zero,
     held_commands,
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.report.plots.svg import LIGHT, image, inline_svg
+from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes
 from rov_fmu.report.templates import page
+from rov_fmu.tank.columns import in_degrees
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -72,8 +75,8 @@ def documentation_page(
     layout = vehicle.layout
     tables = tables_by_axis(vehicle)
     held = held_commands(vehicle, tables.values())
-    axes = [form.axis for form in layout.axes]
-    first = axes[0]
+    first = layout.axes[0].axis
+    driven = [form.axis for form in layout.axes if layout.signs(form.axis)]
     start = layout.driving(first, 0.3)
     rest = {**layout.usual_inputs, **layout.at_rest}
     shown = equations.of(layout)
@@ -109,7 +112,7 @@ def documentation_page(
         moved=float(simulate(vehicle, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
         moves_at_rest=any(vehicle.derivatives(rest, rest).values()),
         held=held,
-        motions=[motion for axis in axes if layout.signs(axis) for motion in _motions(vehicle, axis, held)],
+        motions=[motion for axis in driven for motion in _motions(vehicle, axis, held)],
         frames=[image(label, path) for label, path in own],
         thrusters=[
             _plot(f"Thrusters {view}", partial(draw_thrusters, vehicle=vehicle, scene=scene), scene.inches)
@@ -121,14 +124,14 @@ def documentation_page(
                 f"V_ss over the command: {a.name}",
                 partial(plot_steady, vehicle=vehicle, axis=a, table=tables.get(a.name)),
             )
-            for a in axes
+            for a in driven
         ],
         steps=[
             _plot(
                 f"Step responses: {a.name}",
                 partial(plot_steps, vehicle=vehicle, axis=a, commands=held, table=tables.get(a.name)),
             )
-            for a in axes
+            for a in driven
         ],
     )
 
@@ -217,22 +220,25 @@ def _is_tuned(vehicle: Vehicle) -> bool:
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
     """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
     low, high = (100.0 * end for end in vehicle.command_range)
+    factor, unit = in_degrees(axis.unit)
     least = -100 if differs_by_direction(vehicle, axis) else 0
-    ax.axvspan(low, high, label="range of the model", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
-    if least:
-        ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    if (low, high) != (0.0, 100.0):
+        ax.axvspan(low, high, label="valid commands", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+        if least:
+            ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     commands = range(least, 101, 2)
-    models = [("tuned α and β", vehicle, "blue", "-")]
+    models = [("tuned", vehicle, "blue", "-")]
     if _is_tuned(vehicle):
-        models.insert(0, ("α = β = 1", untuned(vehicle), "grey", "--"))
+        models.insert(0, ("without tuning", untuned(vehicle), "grey", "--"))
     for label, model, color, dashes in models:
-        V_ss = [model.response(axis, c / 100.0)[0] for c in commands]
+        V_ss = [factor * model.response(axis, c / 100.0)[0] for c in commands]
         name = label if len(models) > 1 else None
         ax.plot(commands, V_ss, dashes, label=name, color=LIGHT[color], linewidth=1.8)
     if table and table.steady:
-        points = [(float(c), float(V)) for c, V in table.steady.items()]
+        points = [(float(c), factor * float(V)) for c, V in table.steady.items()]
         ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
-    finish(ax, f"{axis.name.capitalize()}: steady velocity ({axis.unit})", "command (%)")
+    name_axes(ax, f"steady {axis.name} velocity", unit, "command (%)")
+    from_zero(ax)
     ax.set_xlim(least, 100)
 
 
@@ -244,9 +250,13 @@ def plot_steps(
     if differs_by_direction(vehicle, axis):
         steps += [Step(-step.command) for step in steps]
     draw_steps(ax, axis, steps, [(vehicle, "-")])
-    ax.set_title(f"{axis.name.capitalize()}: velocity ({axis.unit})", loc="left")
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:
-    """Return one plot as inline SVG."""
-    return inline_svg(label, lambda figure: draw(figure.subplots()), size)
+    """Return one plot as inline SVG, with a legend if there is something to tell apart."""
+
+    def drawn(figure: Figure) -> None:
+        draw(figure.subplots())
+        add_legend(figure)
+
+    return inline_svg(label, drawn, size)

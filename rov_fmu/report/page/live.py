@@ -15,7 +15,7 @@ from rov_fmu.c.compile import MODULE_SOURCES
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.fmu.variables import variables
-from rov_fmu.report.plots.drawing import place, size_of
+from rov_fmu.report.plots.geometry import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json

@@ -6,7 +6,8 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from rov_fmu.fmu.terminals import FOLDER, ICON, SIGNAL
-from rov_fmu.report.plots.drawing import Scene, draw_icon, draw_thrusters, scenes
+from rov_fmu.report.plots.drawing import draw_icon, draw_thrusters
+from rov_fmu.report.plots.geometry import Scene, scenes
 from rov_fmu.report.plots.png import png_file
 from rov_fmu.report.plots.svg import LIGHT, Draw, svg_file
 from rov_fmu.vehicle.vehicle import Vehicle

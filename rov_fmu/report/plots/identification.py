@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.result import Answer, AxisResult, Point, Prediction
-from rov_fmu.report.plots.svg import LIGHT, add_knots, draw_commands
-from rov_fmu.report.templates import in_words
+from rov_fmu.report.plots.svg import LIGHT, add_legend, draw_commands, name_axes
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.log import Log
@@ -38,7 +37,8 @@ def plot_prediction(figure: Figure, shown: Prediction) -> None:
     """Plot the measured and the predicted values of an unseen log, with the 95 % band."""
     ax: Axes = figure.subplots()
     _draw_prediction(ax, shown)
-    _finish(figure, "time (s)")
+    ax.set_xlabel("time (s)")
+    add_legend(figure)
 
 
 def _draw_prediction(ax: Axes, shown: Prediction) -> None:
@@ -53,7 +53,7 @@ def _draw_prediction(ax: Axes, shown: Prediction) -> None:
         ax.plot(time, factor * shown.compared[some], "--", color=LIGHT["grey"], label="compared")
     ax.set(xlim=(time[0], time[-1]))
     ax.margins(y=0.12)
-    _name(ax, shown.quantity, unit)
+    name_axes(ax, shown.quantity, unit)
 
 
 def plot_answers(figure: Figure, result: AxisResult, quantity: Literal["V_ss", "Tau"]) -> None:
@@ -64,8 +64,8 @@ def plot_answers(figure: Figure, result: AxisResult, quantity: Literal["V_ss", "
     _curve(ax, factor, result.answers, quantity, "blue", "this fit, with 95 % band")
     _points(ax, factor, [p for p in result.points if p.quantity == quantity])
     _curve(ax, factor, result.compared, quantity, "grey", "compared")
-    _name(ax, "steady velocity" if is_steady else "time to 63 %", unit)
-    _finish(figure, "command (%)")
+    name_axes(ax, "steady velocity" if is_steady else "time to 63 %", unit, "command (%)")
+    add_legend(figure)
 
 
 def plot_forces(figure: Figure, points: Sequence[Point], compared: Sequence[float | None] | None = None) -> None:
@@ -79,8 +79,8 @@ def plot_forces(figure: Figure, points: Sequence[Point], compared: Sequence[floa
         other = np.array([compared[n] for n in order], float)
         ax.plot(commands, other, "--", color=LIGHT["grey"], label="compared")
     _points(ax, 1.0, shown)
-    _name(ax, "force", points[0].unit)
-    _finish(figure, "command (%)")
+    name_axes(ax, "force", points[0].unit, "command (%)")
+    add_legend(figure)
 
 
 def _curve(ax: Axes, factor: float, answers: Sequence[Answer], quantity: str, color: str, label: str | None) -> None:
@@ -107,17 +107,3 @@ def _points(ax: Axes, factor: float, points: Sequence[Point]) -> None:
         if some := [(100.0 * p.command, factor * p.measured) for p in points if p.counts is counts]:
             x, y = zip(*some, strict=True)
             ax.plot(x, y, "o", color=LIGHT["orange"], markerfacecolor=face, markersize=4.5, zorder=5, label=label)
-
-
-def _name(ax: Axes, quantity: str, unit: str) -> None:
-    """Name what an axis shows, in words and with its unit, and add knots beside m/s."""
-    ax.set_title(in_words(quantity, unit), loc="left")
-    ax.locator_params(nbins=6)
-    if unit == "m/s":
-        add_knots(ax)
-
-
-def _finish(figure: Figure, x: str) -> None:
-    """Name the horizontal axis, and add a legend below the plot, where it hides nothing."""
-    figure.axes[0].set_xlabel(x)
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, columnspacing=1.0)

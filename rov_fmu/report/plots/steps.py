@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from math import ceil, isfinite
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,14 +13,19 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Curve
-from rov_fmu.report.plots.svg import LIGHT, with_formulas
+from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes
+from rov_fmu.tank.columns import in_degrees
 from rov_fmu.vehicle.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = TypeVar("Number", float, Decimal)
 
-LINES = ("teal", "blue", "violet", "orange")
-"""The colours of the lines in a plot, by role."""
+_MOST = 4
+"""The largest number of lines in a plot."""
+_APART = 0.065
+"""The least distance of the labels of lines, as a share of the height of a plot."""
+_LABELS = 40.0
+"""The width of the labels of lines, points."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,7 @@ def measured_step(table: ResponseTable | None, command: Decimal) -> Step:
 
 def evenly(commands: Sequence[Number]) -> list[Number]:
     """Return up to four of the commands, evenly spaced from the first to the last."""
-    last = len(LINES) - 1
-    return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
+    return sorted({commands[round((len(commands) - 1) * n / (_MOST - 1))] for n in range(_MOST)})
 
 
 def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
@@ -64,17 +68,11 @@ def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Dec
     return evenly(common)
 
 
-def finish(
-    ax: Axes, title: str, x: str, y: str = "", where: Literal["upper left", "lower right"] = "upper left"
-) -> None:
-    """Add labels, title and legend. The axes begin at 0, unless a value is negative."""
-    with_formulas(ax.set_xlabel(x), ax.set_ylabel(y), ax.set_title(title, loc="left"))
+def from_zero(ax: Axes) -> None:
+    """Let the axes of a panel begin at 0, unless a value is negative."""
     ax.set_xlim(left=0.0)
     if ax.dataLim.y0 >= 0.0:
         ax.set_ylim(bottom=0.0)
-    ax.locator_params(nbins=6)
-    if ax.get_legend_handles_labels()[0]:
-        with_formulas(*ax.legend(loc=where).get_texts())
 
 
 def draw_curve(ax: Axes, vehicle: Vehicle, curve: Curve) -> None:
@@ -87,7 +85,7 @@ def draw_curve(ax: Axes, vehicle: Vehicle, curve: Curve) -> None:
         ax.axvspan(low, high, label="dead band", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     c = sorted(commands)
     ax.plot([100.0 * x for x in c], [vehicle.curve_force(curve, x) for x in c], color=LIGHT["blue"], linewidth=1.8)
-    finish(ax, f"Curve {curve.name}: thrust (N)", "command (%)")
+    name_axes(ax, f"thrust, curve {curve.name}", "N", "command (%)")
     ax.set_xlim(-100, 100)
 
 
@@ -109,7 +107,8 @@ def after_step(vehicle: Vehicle, axis: Axis, command: float, times: Sequence[flo
 
 
 def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Vehicle, str]]) -> None:
-    """Plot the velocity after steps of the command for every model, and label the curve of the last model.
+    """Plot the velocity after steps of the command for every model, and label the curve of the last model with the
+    command.
 
     A measured V_ss is a dotted line, and a measured Tau is a point at 1 - 1/e of it.
     """
@@ -117,20 +116,32 @@ def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tup
     Taus += [Tau for step in steps for Tau in step.Tau]
     end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
     t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
+    factor, unit = in_degrees(axis.unit)
     roles = dict(zip(sorted({abs(step.command) for step in steps}), LINES, strict=False))
+    ends: list[tuple[float, str, str]] = []
     for step in steps:
         color = LIGHT[roles[abs(step.command)]]
         for vehicle, dashes in models:
-            v = after_step(vehicle, axis, step.command, t)
+            v = factor * np.array(after_step(vehicle, axis, step.command, t))
             ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
-        label = f"{100.0 * step.command:g} %".replace("-", "−")
-        ax.text(1.015 * end, v[-1], label, color=color, va="center", fontsize=8.5)
+        ends.append((float(v[-1]), f"{100.0 * step.command:g} %".replace("-", "−"), color))
         for V in step.V_ss:
-            ax.plot([0, end], [V, V], ":", color=color, linewidth=1.2)
+            ax.plot([0, end], [factor * V, factor * V], ":", color=color, linewidth=1.2)
         if step.V_ss:
-            at = RISE * (sum(step.V_ss) / len(step.V_ss))
+            at = RISE * factor * (sum(step.V_ss) / len(step.V_ss))
             ax.plot(step.Tau, [at] * len(step.Tau), "o", color=color, markersize=5.0, zorder=5)
-    ax.set(xlim=(0, end), xlabel="time (s)")
+    name_axes(ax, f"{axis.name} velocity after a step", unit, "time (s)", gap=_LABELS)
+    ax.set_xlim(0, end)
     if all(step.command >= 0.0 for step in steps):
         ax.set_ylim(bottom=0.0)
-    ax.locator_params(nbins=6)
+    _label(ax, ends)
+
+
+def _label(ax: Axes, ends: Sequence[tuple[float, str, str]]) -> None:
+    """Label each line at its end, given its last value, its label and its colour. Labels do not cover each other."""
+    low, high = ax.get_ylim()
+    place, apart = low - high, _APART * (high - low)
+    for value, label, color in sorted(ends):
+        place = max(value, place + apart)
+        right = 1.015 * ax.get_xlim()[1]
+        ax.text(right, place, label, color=color, va="center", fontsize=8.5)

@@ -12,13 +12,14 @@ from io import BytesIO
 from operator import mul
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from cycler import cycler
 from lxml import etree
 from markupsafe import Markup
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.style import context
@@ -27,28 +28,19 @@ from matplotlib.ticker import MaxNLocator
 
 from rov_fmu.io.messages import brief
 from rov_fmu.io.picture import read_svg
+from rov_fmu.report.palette import PALETTE
+from rov_fmu.report.templates import in_words
 
-PALETTE = {
-    "page": ("#fcfdfe", "#11171d"),
-    "panel": ("#f1f5f9", "#1a222b"),
-    "ink": ("#1c2733", "#e3e9ee"),
-    "muted": ("#566572", "#a3b2bf"),
-    "rule": ("#d3dce3", "#33404c"),
-    "band": ("#e7f0f7", "#1d2c39"),
-    "grey": ("#84919c", "#8796a3"),
-    "teal": ("#12877b", "#4fd0c0"),
-    "blue": ("#0a5cad", "#6db3f2"),
-    "violet": ("#8e1eff", "#ac6bff"),
-    "orange": ("#c43e12", "#ff9468"),
-    "steel": ("#22303d", "#4d6172"),
-    "metal": ("#5d6f7e", "#8497a6"),
-}
-"""The colours on a light and on a dark page, by role. A plot in a page refers to the role, so it follows the page."""
 LIGHT = {role: light for role, (light, _) in PALETTE.items()}
+"""The colours on a light page. In a page, a plot follows the page."""
 LINES = ("blue", "orange", "teal", "violet", "steel")
 """The colours of lines, in the order of their use. They differ for colour-blind people, too."""
 KNOTS = 3600.0 / 1852.0
 """Knots in 1 m/s."""
+_IN_KNOTS: Any = partial(mul, KNOTS), partial(mul, 1.0 / KNOTS)
+"""The functions from m/s to knots and back."""
+_PAD = 3.5
+"""The distance of the numbers from an axis, points."""
 _FONTS = "system-ui, sans-serif"
 STYLE: Any = {
     "svg.fonttype": "none",
@@ -70,6 +62,8 @@ STYLE: Any = {
     "axes.titlecolor": LIGHT["ink"],
     "grid.color": LIGHT["rule"],
     "grid.linewidth": 0.6,
+    "xtick.major.pad": _PAD,
+    "ytick.major.pad": _PAD,
     "xtick.bottom": False,
     "ytick.left": False,
     "xtick.color": LIGHT["muted"],
@@ -106,13 +100,37 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str =
     return Markup(svg)
 
 
-def add_knots(ax: Axes) -> None:
-    """Add a scale in knots at the right of a panel in m/s."""
-    scales: Any = partial(mul, KNOTS), partial(mul, 1.0 / KNOTS)
-    knots = ax.secondary_yaxis("right", functions=scales)
-    knots.set_ylabel("knots")
-    knots.spines["right"].set_visible(False)
-    knots.yaxis.set_major_locator(MaxNLocator(5))
+def name_axes(ax: Axes, quantity: str, unit: str, x: str = "", *, gap: float = 0.0) -> None:
+    """Name what the axes of a panel show, in words and with units, and add a scale in knots at the right of one in m/s.
+
+    `gap` is the distance of this scale from the panel, in points.
+    """
+    ax.set_title(in_words(quantity, unit), loc="left")
+    ax.set_xlabel(x)
+    ax.locator_params(nbins=6)
+    if unit == "m/s":
+        add_knots(ax, "y", gap)
+
+
+def add_knots(ax: Axes, along: Literal["x", "y"], gap: float = 0.0) -> None:
+    """Add a scale in knots to a panel with m/s: above it, or at its right, at a distance in points."""
+    if along == "y":
+        scale = ax.secondary_yaxis("right", functions=_IN_KNOTS)
+        axis: XAxis | YAxis = scale.yaxis
+    else:
+        scale = ax.secondary_xaxis("top", functions=_IN_KNOTS)
+        axis = scale.xaxis
+    scale.spines[:].set_visible(False)
+    axis.set_tick_params(length=0.0, pad=_PAD + gap)
+    axis.set_label_text("knots")
+    axis.set_major_locator(MaxNLocator(5))
+
+
+def add_legend(figure: Figure, columns: int = 2) -> None:
+    """Add one legend for all panels below them, where it hides nothing, if a line or an area has a name."""
+    named = {label: look for ax in figure.axes for look, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if named:
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns, columnspacing=1.0)
 
 
 def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = "1") -> None:
@@ -127,7 +145,7 @@ def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = 
     for names in groups.values():
         label = ", ".join(names)
         ax.plot(time, factor * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
-    ax.set_title(f"Commands ({shown})", loc="left")
+    name_axes(ax, "commands", shown)
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     ax.locator_params("y", nbins=4)
 

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from rov_fmu.report.plots.steps import LINES, evenly
-from rov_fmu.report.plots.svg import LIGHT, Draw, inline_svg, with_even_text, with_formulas
+from rov_fmu.report.plots.steps import evenly
+from rov_fmu.report.plots.svg import LIGHT, LINES, Draw, inline_svg, with_even_text, with_formulas
 from rov_fmu.report.templates import number, pretty_unit
 from rov_fmu.study.results.results import Results, scale_of
 
