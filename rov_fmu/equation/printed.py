@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
-from .expression import FUNCTIONS, PYTHON, Expression, call, total, written
+from .expression import FUNCTIONS, PYTHON, Expression, Name, call, total, written
 from .layout import Layout
 from .step import interpolated
 from .terms import Equation, equation_of, rate_formula
@@ -116,8 +116,8 @@ def _assignments(formulas: Mapping[str, Expression]) -> str:
     return "\n".join(lines)
 
 
-def _value(name: str) -> str:
-    return f'v["{name}"]'
+def _value(name: Name) -> str:
+    return f'v["{name.identifier}"]'
 
 
 def _rates(equation: Equation, layout: Layout, states: list[str]) -> str:
@@ -175,7 +175,7 @@ def _lagging(equation: Equation) -> Iterable[str]:
     for progress, forces in equation.lags.items():
         rate = written(equation.rows[progress][0].coefficient, PYTHON, _value, least=6)
         for force, steady in forces.items():
-            before, after = _value(force), _value(steady)
+            before, after = _value(Name(force)), _value(Name(steady))
             yield f'"{force}": {before} - ({after} - {before}) * expm1(-{rate} * _time)'
 
 
