@@ -517,6 +517,23 @@ def tangent(  # noqa: PLR0911 - a case for each operation
     return _added(a and right * call("pow", left, right - 1.0) * a, "+", b and x * logarithm * b)
 
 
+def tangents(
+    formulas: Mapping[str, Expression], given: Iterable[str]
+) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Return formulas, each with the formula of its change after it, and the changes by the names that change.
+
+    `given` are the variables whose changes are known.
+    """
+    changes: dict[str, Expression] = {name: change_of(name) for name in given}
+    steps: dict[str, Expression] = {}
+    for name, formula in formulas.items():
+        steps[name] = formula
+        if change := tangent(formula, changes.get):
+            changes[name] = change_of(name)
+            steps[change_of(name).identifier] = change
+    return steps, changes
+
+
 def _of_function(x: Operation, argument: Expression, change: Expression) -> Expression:
     """Return the change of a function of one argument, or of its negative, by the change of the argument."""
     slopes: dict[str, Callable[[], Expression]] = {
