@@ -4,10 +4,9 @@ The module needs only the standard library and step.py. It is part of the FMU in
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
-from typing import Any
 
 from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
 from .expression import FUNCTIONS, PYTHON, Expression, Name, call, total, written
@@ -99,14 +98,9 @@ def lagging(v, _time):
 
 @lru_cache(maxsize=100)
 def model_of(layout: Layout) -> ModuleType:
-    """Return the module of a vehicle, with the functions of the standard library."""
-    return loaded(layout, {name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]})
-
-
-def loaded(layout: Layout, functions: Mapping[str, Callable[..., Any]]) -> ModuleType:
-    """Return the module of a vehicle with its own expm1, sin, cos, sqrt, pow, log and atan2."""
+    """Return the module of a vehicle."""
     module = ModuleType("equation")
-    module.__dict__.update(functions, interpolated=interpolated)
+    module.__dict__.update({name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]}, interpolated=interpolated)
     exec(compile(equation_text(layout), "<equation>", "exec"), module.__dict__)
     return module
 
