@@ -21,7 +21,6 @@ from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.report.page import equations
-from rov_fmu.report.page.equations import Text
 from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.templates import number
 from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
@@ -155,9 +154,8 @@ def _command_reference() -> str:
 
 def _equations(name: str) -> str:
     """The equations of a vehicle that ships, a line each; the number of the paper's equation behind."""
-    layout = load_vehicle(SHIPPED[name]).layout
-    write = Text(layout).line
-    return "\n".join(f"{write(line):<96} {line.reference}".rstrip() for line in equations.of(layout))
+    lines = [(str(line), line.reference) for line in equations.of(load_vehicle(SHIPPED[name]).layout)]
+    return "\n".join(f"{line:<96} {reference}".rstrip() for line, reference in lines)
 
 
 def _terminals() -> Table:

@@ -1,10 +1,13 @@
 """The Jacobians of a step.
 
 They are the derivatives of the states at its end with respect to the states at its start, the inputs and the
-coefficients.
+coefficients. In the table of terms, the states are y' = sum of c y_j y_k, where y_j or y_k may be 1. A derivative of
+the motion solves the variational equation, which follows by the product rule:
 
-The step of rov_fmu/equation/step.py is taken with dual numbers, which carry their derivatives through every operation
-(forward differentiation). A reversal does not interrupt the derivatives: every term with a coefficient that depends on
+    s' = sum of (dc y_j y_k + c s_j y_k + c y_j s_k).
+
+Both equations are solved together, for all derivatives at once: each state, and each coefficient c, is a row with its
+value and its derivatives. A reversal does not interrupt the derivatives: every term with a coefficient that depends on
 the direction of a velocity is 0 where this velocity is 0, so the rates are continuous there.
 """
 
@@ -12,20 +15,25 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
-from rov_fmu.equation import step
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import delayed_name
+from rov_fmu.equation.expression import change_of, compiled, slope_name, tangents
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.printed import loaded
+from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+_TOLERANCE = 1e-10
+"""The relative tolerance of a substep."""
+_MOST = 1_000_000
+"""The largest number of evaluations of the rates. Only a very long step, or a motion that overflows, needs more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,188 +71,120 @@ def step_jacobian(
     for name in coefficients:
         if name not in vehicle.coefficients:
             raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*vehicle.coefficients])}")
-    names = [*layout.state, *layout.inputs, *coefficients]
-    numbers = np.hstack([[[{**vehicle.coefficients, **inputs, **state}[name]] for name in names], np.eye(len(names))])
-    known = {**vehicle.coefficients, **dict(zip(names, map(Dual, numbers), strict=True))}
+    values: dict[str, Any] = {**vehicle.coefficients, **inputs, **state}
+    changes = dict(zip([*layout.state, *layout.inputs, *coefficients], np.eye(len(values)), strict=False))
     if layout.has_dead_time:
-        known |= {delayed_name(name): known[name] for name in layout.commands}
+        values |= {delayed_name(name): values[name] for name in layout.commands}
+        changes |= {delayed_name(name): changes[name] for name in layout.commands}
+    width = len(layout.state) + len(layout.inputs) + len(coefficients)
+    values |= {change_of(name).identifier: changes[name][:width] if name in changes else 0.0 for name in values}
     with np.errstate(all="ignore"):  # an overflow ends the motion
-        motion = _Tangents(_model_of(layout), known)
-        is_done = motion.move(h)
-    if not is_done:
+        after = _variational(layout).after(values, h, width)
+    if not np.isfinite(after).all():
         raise ValueError(
             "the derivatives of the step cannot be computed: it overflows, or never settles and needs to be shorter"
         )
-    after = motion.end()
-    derivatives = np.array([_row(after[name], numbers.shape[1])[1:] for name in layout.state])
-    n, m = len(layout.state), len(layout.state) + len(layout.inputs)
-    return StepJacobian(
-        {name: float(after[name]) for name in layout.state}, derivatives[:, :n], derivatives[:, n:m], derivatives[:, m:]
-    )
+    ends = np.cumsum([len(layout.state), len(layout.inputs)])
+    numbers = dict(zip(layout.state, after[:, 0].tolist(), strict=True))
+    return StepJacobian(numbers, *np.split(after[:, 1:], ends, axis=1))
 
 
-class Dual:
-    """A number and its derivatives, in one array: the number is first."""
+class _Variational:
+    """The variational equation of a layout."""
 
-    __slots__ = ("row",)
+    def __init__(self, layout: Layout) -> None:
+        self.layout, self.equation = layout, equation_of(layout)
+        equation, states = self.equation, [*self.equation.states]
+        terms = [term for row in equation.rows.values() for term in row]
+        self.places = {name: n for n, name in enumerate(states)}
+        self.factors = np.array(
+            [[*map(states.index, term.factors), *[len(states)] * (2 - len(term.factors))] for term in terms]
+        ).T
+        self.sums = np.repeat(np.eye(len(states)), [len(row) for row in equation.rows.values()], axis=1)
+        """The matrix that adds the terms of each state."""
+        self.coefficients = [f"coefficient_of_term_{n}" for n in range(len(terms))]
+        functions: dict[str, Callable[..., float]] = {
+            "pow": lambda base, exponent: base**exponent if base > 0.0 or exponent >= 0.0 else 0.0
+        }
+        functions |= equation.measured | {slope_name(name): table.slope for name, table in equation.tables.items()}
+        given = [*layout.inputs, *layout.state, *layout.delayed, *layout.coefficients]
+        own = dict(zip(self.coefficients, (term.coefficient for term in terms), strict=True))
+        before, changes = tangents({**equation.program, **equation.forces, **own}, given)
+        ends = {f"next_{force}": end for force, (_, end) in equation.lagging.items()}
+        after, _ = tangents({**ends, **equation.ends}, [*changes, *states])
+        self._before, self._after = compiled(before, functions), compiled(after, functions)
 
-    def __init__(self, row: Array) -> None:
-        self.row = row
+    def after(self, values: Mapping[str, Any], h: float, width: int) -> Array:
+        """Return the states of the vehicle after h seconds, each with its derivatives; NaN if the motion overflows.
 
-    def __float__(self) -> float:
-        return float(self.row[0])
+        `values` are the inputs, states and coefficients, and the changes of each: an array of this width, or 0.
+        """
+        equation, count = self.equation, len(self.places)
 
-    def __bool__(self) -> bool:
-        return float(self) != 0.0
+        def rows(found: Mapping[str, Any], names: Sequence[str]) -> Array:
+            table = np.zeros((len(names), 1 + width))
+            for row, name in zip(table, names, strict=True):
+                row[0], row[1:] = found[name], found.get(change_of(name).identifier, 0.0)
+            return table
 
-    def __neg__(self) -> "Dual":
-        return Dual(-self.row)
+        held = self._before(values)
+        lags = {self.places[name]: rows(held, [*equation.rows[name][0].coefficient.names])[0] for name in equation.lags}
+        monitored = [self.places[name] for name in equation.monitored]
+        by_direction: dict[bytes, Array] = {}
 
-    def __abs__(self) -> "Dual":
-        return -self if self < 0.0 else self
+        def coefficients(reverse: NDArray[np.bool_]) -> Array:
+            if reverse.tobytes() not in by_direction:
+                signs = dict(zip(equation.monitored, np.where(reverse, -1.0, 1.0).tolist(), strict=True))
+                by_direction[reverse.tobytes()] = rows(self._before({**values, **signs}), self.coefficients)
+            return by_direction[reverse.tobytes()]
 
-    def __add__(self, other: "Dual | float") -> "Dual":
-        return Dual(self.row + other.row) if isinstance(other, Dual) else self._with(float(self) + other, 1.0)
+        def with_lags(t: float, y: Array) -> Array:
+            """Return the states and a row for 1. The arrived fraction of a lag is 1 - exp(-t / T)."""
+            table = np.vstack([y.reshape(count, 1 + width), np.eye(1, 1 + width)])
+            for n, rate in lags.items():
+                table[n] = t * math.exp(-rate[0] * t) * rate
+                table[n, 0] = -math.expm1(-rate[0] * t)
+            return table
 
-    def __sub__(self, other: "Dual | float") -> "Dual":
-        return self + -other
+        evaluations = 0
 
-    def __mul__(self, other: "Dual | float") -> "Dual":
-        if not isinstance(other, Dual):
-            return Dual(self.row * other)
-        product = float(self) * other.row + float(other) * self.row
-        product[0] = float(self) * float(other)
-        return Dual(product)
+        def rates(t: float, y: Array) -> Array:
+            nonlocal evaluations
+            evaluations += 1
+            table = with_lags(t, y)
+            first, second = table[self.factors]
+            terms = _product(coefficients(table[monitored, 0] < 0.0), _product(first, second))
+            found = self.sums @ terms
+            found[[*lags]] = 0.0 if evaluations < _MOST else np.nan
+            return found.ravel()
 
-    def __truediv__(self, other: "Dual | float") -> "Dual":
-        if not isinstance(other, Dual):
-            return Dual(self.row / other)
-        return self * other._with(1.0 / float(other), -1.0 / float(other) ** 2)
-
-    def __pow__(self, exponent: float) -> "Dual":
-        return self._with(float(self) ** exponent, exponent * float(self) ** (exponent - 1.0))
-
-    def __radd__(self, other: float) -> "Dual":
-        return self + other
-
-    def __rsub__(self, other: float) -> "Dual":
-        return -self + other
-
-    def __rmul__(self, other: float) -> "Dual":
-        return self * other
-
-    def __rtruediv__(self, other: float) -> "Dual":
-        return self._with(other / float(self), -other / float(self) ** 2)
-
-    def __lt__(self, other: "Dual | float") -> bool:
-        return float(self) < float(other)
-
-    def __gt__(self, other: "Dual | float") -> bool:
-        return float(self) > float(other)
-
-    def __le__(self, other: "Dual | float") -> bool:
-        return float(self) <= float(other)
-
-    def __ge__(self, other: "Dual | float") -> bool:
-        return float(self) >= float(other)
-
-    def __eq__(self, other: object) -> bool:
-        return float(self) == other
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def _with(self, value: float, slope: float) -> "Dual":
-        """Return a function of this number by its value and its derivative."""
-        row = slope * self.row
-        row[0] = value
-        return Dual(row)
-
-
-def _row(x: "Dual | float", width: int) -> Array:
-    """Return a number and its derivatives, which are 0 for a float."""
-    return x.row if isinstance(x, Dual) else np.concatenate(([x], np.zeros(width - 1)))
-
-
-def _function(value: Callable[[float], float], slope: Callable[[float], float]) -> Callable[[Any], Any]:
-    """Return a function of dual numbers and floats."""
-    return lambda x: x._with(value(float(x)), slope(float(x))) if isinstance(x, Dual) else value(x)
-
-
-def _power(base: Any, exponent: Any) -> Any:
-    """Return the power of a base that is not negative."""
-    x, n = float(base), float(exponent)
-    found: Any = x**n
-    if isinstance(base, Dual):
-        found = base._with(found, n * x ** (n - 1.0) if x > 0.0 or n >= 1.0 else 0.0)
-    if isinstance(exponent, Dual):
-        found = exponent._with(0.0, x**n * math.log(x) if x > 0.0 else 0.0) + found
-    return found
-
-
-def _arctangent(y: Any, x: Any) -> Any:
-    """Return atan2."""
-    square = float(x) ** 2 + float(y) ** 2
-    change = y * (float(x) / square) - x * (float(y) / square)
-    return change + (math.atan2(float(y), float(x)) - float(change))
-
-
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "expm1": _function(math.expm1, math.exp),
-    "sin": _function(math.sin, math.cos),
-    "cos": _function(math.cos, lambda x: -math.sin(x)),
-    "sqrt": _function(math.sqrt, lambda x: 0.5 / math.sqrt(x)),
-    "log": _function(math.log, lambda x: 1.0 / x),
-    "pow": _power,
-    "atan2": _arctangent,
-}
+        start = np.zeros((count, 1 + width))
+        starting = [name for name in equation.states if name in equation.starts]
+        start[[self.places[name] for name in starting]] = rows(held, starting)
+        tolerances = {"rtol": _TOLERANCE, "atol": 1e-2 * _TOLERANCE}
+        solved = solve_ivp(rates, (0.0, h), start.ravel(), "DOP853", first_step=0.1 * h, **tolerances)
+        if not solved.success:
+            return np.full((len(self.layout.state), 1 + width), np.nan)
+        end = with_lags(h, solved.y[:, -1])
+        by_name = dict(zip(equation.states, end, strict=False))
+        moved = {name: row[0] for name, row in by_name.items()}
+        moved |= {change_of(name).identifier: row[1:] for name, row in by_name.items()}
+        results = self._after({**held, **moved})
+        own = {name: f"next_{name}" for name in (*equation.lagging, *QUATERNION)}
+        found = rows(results, [own.get(name, name) for name in self.layout.state])
+        for n, name in enumerate(self.layout.state):
+            if name in self.places and name not in equation.starts:
+                found[n] += rows(values, [name])[0]  # an integral, which began at 0
+        return found
 
 
 @lru_cache(maxsize=100)
-def _model_of(layout: Layout) -> ModuleType:
-    return loaded(layout, _FUNCTIONS)
+def _variational(layout: Layout) -> _Variational:
+    return _Variational(layout)
 
 
-class _Slopes(list[Any]):
-    """The rates of the states as dual numbers, which are the rows of a matrix."""
-
-    def __init__(self, matrix: Array) -> None:
-        super().__init__(map(Dual, matrix))
-        self.matrix = matrix
-
-
-_TOLERANCE = 1e-10  # of a derivative in a substep
-_SHARE = 1e-4  # derivatives below this share of the others of their direction may be rounding errors
-
-
-class _Tangents(step.Motion):
-    """A motion of dual numbers. No state settles, because its derivatives may still change."""
-
-    def __init__(self, model: ModuleType, values: Mapping[str, Any]) -> None:
-        self.width = len(next(x for x in values.values() if isinstance(x, Dual)).row)
-        super().__init__(model, values)
-        self.settled.clear()  # a lag whose forces have arrived still has derivatives
-        self.begin()
-
-    def rates(self, after: float, y: list[Any]) -> _Slopes:
-        """Return the rates of the states some seconds after the start of the substep."""
-        return _Slopes(np.array([_row(x, self.width) for x in super().rates(after, y)]))
-
-    def combined(self, weights: Mapping[int, float], slopes: Sequence[Any]) -> _Slopes:
-        """Return a weighted sum of slopes."""
-        total = np.zeros_like(slopes[0].matrix)
-        for n, weight in weights.items():
-            total += weight * slopes[n].matrix
-        return _Slopes(total)
-
-    def error(self, h: float, y: list[Any], fifth: Any, third: Any) -> float:
-        """Return the largest error of a state or of a derivative, relative to its tolerance."""
-        change = h * np.abs(self.rate.matrix[:, 1:])  # type: ignore[attr-defined]
-        size = np.abs(np.array([_row(x, self.width)[1:] for x in y])) + change
-        least = np.maximum(size, _SHARE * size.max(axis=0)) * _TOLERANCE
-        errors = h * np.abs(fifth.matrix[:, 1:])
-        worst = np.divide(errors, least, out=np.zeros_like(errors), where=errors > 0.0).max(initial=0.0)
-        return max(super().error(h, y, fifth, third), float(worst)) if np.isfinite(size).all() else math.inf
-
-    def settle(self, h: float) -> bool:  # noqa: ARG002
-        """Return False."""
-        return False
+def _product(a: Array, b: Array) -> Array:
+    """Return the products of rows with derivatives."""
+    found = a[:, :1] * b
+    found[:, 1:] += a[:, 1:] * b[:, :1]
+    return found

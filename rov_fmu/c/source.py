@@ -15,6 +15,7 @@ from rov_fmu.equation.expression import (
     Number,
     change_of,
     tangent,
+    tangents,
     to_c,
     total,
     written,
@@ -299,7 +300,7 @@ class EquationSource:
         """Return statements that add the changes of the attitude at the start to d."""
         if not self.layout.has_attitude:
             return []
-        steps, changes = _tangents(start_formulas(), self.layout.initial)
+        steps, changes = tangents(start_formulas(), self.layout.initial)
         states = [name for name in self.layout.state if name in changes]
         results = {f"d[REF_{name}]": Name(f"d[REF_{name}]") + changes[name] for name in states}
         return _assigned(steps, results, {**_with_changes(self.layout.initial), **{place: place for place in results}})
@@ -310,30 +311,13 @@ class EquationSource:
         Before, d has the changes of all other variables.
         """
         given = self.variables - {*self.layout.calculated}
-        steps, changes = _tangents({**self.equation.program, **self.equation.outputs}, given)
+        steps, changes = tangents({**self.equation.program, **self.equation.outputs}, given)
         calculated = [name for name in self.layout.calculated if name in changes]
         results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
             change = tangent(self.equation.rates[name], changes.get)
             results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
         return _assigned(steps, results, _with_changes(given))
-
-
-def _tangents(
-    formulas: Mapping[str, Expression], given: Iterable[str]
-) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return formulas, each with the formula of its change after it, and the changes by the names that change.
-
-    `given` are the variables whose changes are known.
-    """
-    changes: dict[str, Expression] = {name: change_of(name) for name in given}
-    steps: dict[str, Expression] = {}
-    for name, formula in formulas.items():
-        steps[name] = formula
-        if change := tangent(formula, changes.get):
-            changes[name] = change_of(name)
-            steps[change_of(name).identifier] = change
-    return steps, changes
 
 
 def _assigned(

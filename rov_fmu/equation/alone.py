@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from math import e, inf
 
 from .attitude import entry
+from .catalogue import REVERSE
 from .expression import (
     Expression,
     Name,
@@ -33,6 +34,8 @@ from .forces import forces_of
 from .layout import Layout
 from .terms import equation_of
 
+POWERS = {2: "A", 1: "B"}
+"""The coefficient of drag by the power of the velocity: a drag of power n is |v|^(n - 1) v times it."""
 RISE = 1.0 - 1.0 / e
 """The fraction of V_ss that is reached after Tau, (17)."""
 
@@ -60,21 +63,17 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     if not layout.by_velocity[velocity].axis.is_rotation:
         constant.append((entry(3, 3),))
     loads: list[Expression] = []
-    drag: dict[str, list[Expression]] = {"A": [], "B": [], "A_reverse": [], "B_reverse": []}
-    for force in forces_of(layout, equation.names):
-        if force.axis != velocity:
-            continue
-        ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
+    drag: dict[str, list[Expression]] = {key + end: [] for end in ("", REVERSE) for key in POWERS.values()}
+    for force in (force for force in forces_of(layout, equation.names) if force.axis == velocity):
+        power = len(force.factors)
         if force.factors in constant:
             loads.append(scaled(force.sign, product(*force.coefficient)))
-        elif force.factors == (velocity,):
-            drag["B"].append(minus(ahead))
-            drag["B_reverse"].append(minus(astern))
-        elif force.factors == (velocity, velocity):
-            drag["A"].append(minus(ahead))
-            drag["A_reverse"].append(astern)
         elif set(force.factors) == {velocity}:
-            raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
+            if power not in POWERS:
+                raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
+            ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
+            drag[POWERS[power]].append(minus(ahead))
+            drag[POWERS[power] + REVERSE].append(astern if power % 2 == 0 else minus(astern))
     forces = {force: Name(steady) for own in equation.lags.values() for force, steady in own.items()}
     torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
     formulas = {**{key: total(parts) for key, parts in drag.items()}, "C": gain * total(loads)}
@@ -84,7 +83,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
 def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """Return the formulas of V_ss and Tau of an axis alone, after those that they contain."""
     found = alone_formulas(layout, velocity)
-    drag = {key: directed(Name("C"), found[key], found[f"{key}_reverse"]) for key in "AB"}
+    drag = {key: directed(Name("C"), found[key], found[key + REVERSE]) for key in POWERS.values()}
     return {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
 
 

@@ -1,4 +1,4 @@
-"""Expressions as values: built with operators, printed as C or Python, differentiated, and evaluated.
+"""Expressions as values: built with operators, printed as C, Python, text or MathML, differentiated, and evaluated.
 
 An expression is a number, a name, or an operation on expressions. Formulas are written as one writes them in Python:
 
@@ -10,12 +10,13 @@ Printing changes neither the order nor the association of operations, so C and P
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
+from itertools import groupby
 from operator import mul
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 Real: TypeAlias = "Expression | float"
 
@@ -223,65 +224,212 @@ def plain(x: Expression) -> Expression:
 
 FUNCTIONS = ("sin", "cos", "abs", "sqrt", "hypot", "pow", "log", "atan2", "atanh")
 """The functions of expressions besides the thrust tables."""
-_RANK = {"if": 0, "or": 1, "and": 2, "<": 3, ">": 3, ">=": 3, "==": 3, "+": 4, "-": 4, "*": 5, "/": 5, "neg": 6}
-"""How strongly operations bind."""
+Ranks: TypeAlias = Mapping[str, tuple[int, tuple[int, ...]]]
 _CALL = 9
+_RANKS: Ranks = {
+    **dict.fromkeys(("<", ">", ">=", "=="), (3, (4, 4))),
+    **dict.fromkeys("+-", (4, (4, 5))),
+    **dict.fromkeys("*/", (5, (5, 6))),
+    "neg": (6, (6,)),
+}
+_CHOICES: Ranks = {"if": (0, (1, 1, 0)), "or": (1, (3, 3)), "and": (2, (3, 3))}
 
 
 @dataclass(frozen=True)
 class Language:
-    """How a language writes what differs between languages."""
+    """How a language writes expressions."""
 
-    choice: str
-    both: str = " and "
-    either: str = " or "
-    functions: Mapping[str, str] = field(default_factory=dict)
-    """The names of functions, if they are others."""
-    infinity: str = "inf"
-    is_branchless: bool = False
-    """True if choices, `both` and `either` are functions."""
+    forms: Mapping[str, str]
+    """The texts of operations, with {} or {0}, {1} ... for their operands."""
+    ranks: Ranks = field(default_factory=lambda: {**_RANKS, **_CHOICES})
+    """How strongly operations bind, and how strongly an operand must bind to stand without brackets.
+
+    An operation that is not among them is a call, which binds with _CALL and whose operands need no brackets."""
+    number: Callable[[float], str] = repr
+    bracket: str = "({})"
+    is_code: bool = True
+    """True if an operation without a form is written as a + b or f(a, b). False if it cannot be written."""
 
 
-C = Language("{0} ? {1} : {2}", " && ", " || ", {"abs": "fabs"}, "INFINITY")
-PYTHON = Language("{1} if {0} else {2}")
-ARRAYS = Language("where({0}, {1}, {2})", "both({}, {})", "either({}, {})", is_branchless=True)
+C = Language(
+    {"neg": "-{}", "if": "{} ? {} : {}", "and": "{} && {}", "or": "{} || {}", "abs": "fabs({})"},
+    number=lambda value: "INFINITY" if value == math.inf else repr(value),
+)
+PYTHON = Language({"neg": "-{}", "if": "{1} if {0} else {2}"})
+ARRAYS = Language({"neg": "-{}", "if": "where({}, {}, {})", "and": "both({}, {})", "or": "either({}, {})"}, _RANKS)
 """Python for arrays and symbols, which have no single truth value."""
+_READERS: Ranks = {
+    **_RANKS,
+    "neg": (5, (5,)),
+    "dead band": (0, (0, 0, 0)),
+    **dict.fromkeys(("sin", "cos", "log"), (_CALL, (6,))),
+    **dict.fromkeys(("square", "cube", "rate"), (_CALL, (_CALL,))),
+    "pow": (_CALL, (_CALL, _CALL)),
+}
+TEXT = Language(
+    {
+        **{"+": "{} + {}", "-": "{} − {}", "*": "{} {}", "/": "{} / {}", "neg": "−{}"},
+        **{"square": "{}²", "cube": "{}³", "pow": "{}^{}", "abs": "|{}|", "sqrt": "√({})", "atan2": "atan2({}, {})"},
+        **{name: f"{name} {{}}" for name in ("sin", "cos", "log")},
+        **{"sgn": "sgn({})", "rate": "{}'", "directed": "{}±", "dead band": "{2} where {0} > 0, else 0"},
+    },
+    _READERS,
+    "{:.4g}".format,
+    is_code=False,
+)
+"""Plain text for readers, of what `collected` returns. A coefficient that depends on a direction has a ±."""
+_BRACKET = '<mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>'
+_CELL = '<mtd style="text-align: left">'
+MATHML = Language(
+    {
+        **{"+": "{}<mo>+</mo>{}", "-": "{}<mo>−</mo>{}", "neg": '<mo form="prefix">−</mo>{}'},
+        "*": '{}<mspace width=".1em"/>{}',
+        "/": "<mfrac><mrow>{}</mrow><mrow>{}</mrow></mfrac>",
+        **{"square": "<msup>{}<mn>2</mn></msup>", "cube": "<msup>{}<mn>3</mn></msup>", "pow": "<msup>{}{}</msup>"},
+        "abs": '<mrow><mo stretchy="false">|</mo>{}<mo stretchy="false">|</mo></mrow>',
+        **{"sqrt": "<msqrt>{}</msqrt>", "atan2": f"<mi>atan2</mi>{_BRACKET.format('{}<mo>,</mo>{}')}"},
+        **{
+            name: f'<mspace width=".07em"/><mi>{name}</mi><mspace width=".17em"/>{{}}' for name in ("sin", "cos", "log")
+        },
+        **{"sgn": f"<mi>sgn</mi>{_BRACKET}", "rate": "<mover>{}<mo>˙</mo></mover>", "directed": "{}±"},
+        "dead band": "<mrow><mo>{{</mo><mtable>"
+        f"<mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr>"
+        f"<mtr>{_CELL}<mn>0</mn></mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
+    },
+    {**_READERS, "/": (8, (0, 0)), "dead band": (_CALL, (0, 0, 0))},
+    "<mn>{:.4g}</mn>".format,
+    _BRACKET,
+    is_code=False,
+)
+"""The same as MathML, in which the bar of a fraction and the brace of a choice replace brackets."""
 
 
 def to_c(x: Expression, name_in_c: Callable[[str], str] = str) -> str:
     """Write an expression in C. `name_in_c` gives the C expression for an identifier."""
-    return written(x, C, name_in_c)
+    return written(x, C, lambda name: name_in_c(name.identifier))
 
 
-def written(x: Expression, language: Language, name_of: Callable[[str], str] = str, least: int = 0) -> str:
-    """Write an expression in a language, in brackets if it binds less than the rank `least`."""
+def written(
+    x: Expression, language: Language, name_of: Callable[[Name], str] = lambda name: name.identifier, least: int = 0
+) -> str:
+    """Write an expression in a language, in brackets if it binds less than the rank `least`.
 
-    def part(x: Expression, least: int) -> str:
-        return written(x, language, name_of, least)
+    `name_of` says how a name is written. Raises ValueError if the language has no form for an operation.
+    """
+    match x:
+        case Name():
+            return name_of(x)
+        case Number(value):
+            return language.number(value)
+        case Operation("directed", (_, Name(identifier, kind, owners), _)) if "directed" in language.forms:
+            return name_of(Name(language.forms["directed"].format(identifier), kind, owners))
+    shown = x if isinstance(x, Operation) and x.op in language.forms else plain(x)
+    assert isinstance(shown, Operation)
+    form = _form(shown, language)
+    rank, operands = language.ranks.get(shown.op, (_CALL, (0,) * len(shown.args)))
+    parts = [written(arg, language, name_of, need) for arg, need in zip(shown.args, operands, strict=True)]
+    text = form.format(*parts)
+    return text if rank >= least else language.bracket.format(text)
 
-    x = plain(x)
-    if isinstance(x, Name):
-        return name_of(x.identifier)
-    if isinstance(x, Number):
-        return language.infinity if x.value == math.inf else repr(x.value)
-    assert isinstance(x, Operation)
-    rank = _CALL if language.is_branchless and x.op in ("if", "and", "or") else _RANK.get(x.op, _CALL)
-    match x.op, x.args:
-        case "neg", (a,):
-            text = f"-{part(a, 6)}"
-        case "if", (test, a, b):
-            text = language.choice.format(part(test, 1), part(a, 1), part(b, 0))
-        case "and" | "or" as op, args:
-            word = language.both if op == "and" else language.either
-            texts = [part(a, 3) for a in args]
-            text = reduce(word.format, texts) if language.is_branchless else word.join(texts)
-        case op, (a, b) if rank == 3:
-            text = f"{part(a, 4)} {op} {part(b, 4)}"
-        case op, (a, b) if rank < _CALL:
-            text = f"{part(a, rank)} {op} {part(b, rank + 1)}"
-        case function, args:
-            text = f"{language.functions.get(function, function)}({', '.join(part(a, 0) for a in args)})"
-    return text if rank >= least else f"({text})"
+
+def _form(x: Operation, language: Language) -> str:
+    if x.op not in language.forms and not language.is_code:
+        raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
+    usual = f"{{}} {x.op} {{}}" if x.op in language.ranks else f"{x.op}({', '.join('{}' for _ in x.args)})"
+    return language.forms.get(x.op, usual)
+
+
+# ---- Sums of products for readers ------------------------------------------------------------------------------------
+
+
+class _Product(NamedTuple):
+    """A sign, the factors above the fraction bar, and those below it. A factor is not a product itself."""
+
+    sign: int = 1
+    above: tuple[Expression, ...] = ()
+    below: tuple[Expression, ...] = ()
+
+    def times(self, other: "_Product") -> "_Product":
+        """Return the product of both, with numbers first."""
+        above = sorted((*self.above, *other.above), key=lambda factor: not isinstance(factor, Number))
+        return _Product(self.sign * other.sign, tuple(above), (*self.below, *other.below))
+
+    def formula(self, factors: Callable[[Iterable[Expression]], Iterable[Expression]] = iter) -> Expression:
+        """Return the product as an expression. `factors` changes its factors."""
+        above, below = product(*factors(self.above)), product(*factors(self.below))
+        found = above / below if self.below else above
+        return -found if self.sign < 0 else found
+
+
+def collected(x: Expression) -> Expression:
+    """Return a formula as one writes it: a sum of products, in the order in which it is built.
+
+    Numbers come first, equal factors form a power, and a common first factor stands before a bracket: a x - a y becomes
+    a (x - y). Numbers count as equal if their first twelve digits are. The value changes by rounding only.
+    """
+    return total(one.formula(_powers) for one in _products(x))
+
+
+def _powers(factors: Iterable[Expression]) -> Iterator[Expression]:
+    """Yield factors, with what is within them collected. A factor that repeats becomes a square or a cube."""
+    for factor, equal_ones in groupby(factors):
+        inner, count = factor, len([*equal_ones])
+        if isinstance(factor, Operation):
+            within = tuple(map(collected, factor.args))
+            inner = collected(factor) if _is_sum(factor) else Operation(factor.op, within)
+        yield from [inner] if count == 1 else [call({2: "square", 3: "cube"}[count], inner)]
+
+
+def _products(x: Expression) -> list[_Product]:
+    """Return the products of which a formula is the sum, with each common first factor before a bracket."""
+    alike: dict[object, list[_Product]] = {}
+    for place, one in enumerate(_terms(x)):
+        head = one.above[0] if len(one.above) > 1 else None
+        key = f"{head.value:.12g}" if isinstance(head, Number) else head or place
+        alike.setdefault(key, []).append(one)
+    found = []
+    for first, *others in alike.values():
+        rest = total(_Product(one.sign * first.sign, one.above[1:], one.below).formula() for one in (first, *others))
+        found.append(_Product(first.sign, first.above[:1]).times(_product(rest)) if others else first)
+    return found
+
+
+def _terms(x: Expression) -> list[_Product]:
+    match x:
+        case Number(0.0):
+            return []
+        case Operation("+" | "-" as op, (left, right)):
+            sign = _Product(1 if op == "+" else -1)
+            return _terms(left) + [sign.times(one) for one in _terms(right)]
+    whole = _product(x)
+    if len(whole.above) == 1 and not whole.below and _is_sum(whole.above[0]):
+        return [_Product(whole.sign).times(one) for one in _terms(whole.above[0])]
+    return [whole]
+
+
+def _is_sum(x: Expression) -> bool:
+    return isinstance(x, Operation) and x.op in ("+", "-")
+
+
+def _product(x: Expression) -> _Product:  # noqa: PLR0911 - a case for each operation
+    """Return a formula as one product, in which a sum of several products is a factor."""
+    match x:
+        case Number(1.0):
+            return _Product()
+        case Operation("neg", (inner,)):
+            return _Product(-1).times(_product(inner))
+        case Operation("*", (left, right)):
+            return _product(left).times(_product(right))
+        case Operation("/", (left, right)):
+            below = _product(right)
+            return _product(left).times(_Product(below.sign, below.below, below.above))
+        case Operation("+" | "-"):
+            terms = _products(x)
+            if len(terms) == 1:
+                return terms[0]
+            if all(one.sign < 0 for one in terms):
+                return _Product(-1, (total(one._replace(sign=1).formula() for one in terms),))
+    return _Product(1, (x,))
 
 
 # ---- Evaluation ------------------------------------------------------------------------------------------------------
@@ -367,6 +515,23 @@ def tangent(  # noqa: PLR0911 - a case for each operation
     assert x.op == "pow"  # the base is not negative
     logarithm = where(left > 0.0, call("log", left), 0.0)
     return _added(a and right * call("pow", left, right - 1.0) * a, "+", b and x * logarithm * b)
+
+
+def tangents(
+    formulas: Mapping[str, Expression], given: Iterable[str]
+) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Return formulas, each with the formula of its change after it, and the changes by the names that change.
+
+    `given` are the variables whose changes are known.
+    """
+    changes: dict[str, Expression] = {name: change_of(name) for name in given}
+    steps: dict[str, Expression] = {}
+    for name, formula in formulas.items():
+        steps[name] = formula
+        if change := tangent(formula, changes.get):
+            changes[name] = change_of(name)
+            steps[change_of(name).identifier] = change
+    return steps, changes
 
 
 def _of_function(x: Operation, argument: Expression, change: Expression) -> Expression:

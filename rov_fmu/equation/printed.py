@@ -4,13 +4,12 @@ The module needs only the standard library and step.py. It is part of the FMU in
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
-from typing import Any
 
 from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
-from .expression import FUNCTIONS, PYTHON, Expression, call, total, written
+from .expression import FUNCTIONS, PYTHON, Expression, Name, call, total, written
 from .layout import Layout
 from .step import interpolated
 from .terms import Equation, equation_of, rate_formula
@@ -101,14 +100,9 @@ def lagging(v, _time):
 
 @lru_cache(maxsize=100)
 def model_of(layout: Layout) -> ModuleType:
-    """Return the module of a vehicle, with the functions of the standard library."""
-    return loaded(layout, {name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]})
-
-
-def loaded(layout: Layout, functions: Mapping[str, Callable[..., Any]]) -> ModuleType:
-    """Return the module of a vehicle with its own expm1, sin, cos, sqrt, pow, log and atan2."""
+    """Return the module of a vehicle."""
     module = ModuleType("equation")
-    module.__dict__.update(functions, interpolated=interpolated)
+    module.__dict__.update({name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]}, interpolated=interpolated)
     exec(compile(equation_text(layout), "<equation>", "exec"), module.__dict__)
     return module
 
@@ -118,8 +112,8 @@ def _assignments(formulas: Mapping[str, Expression]) -> str:
     return "\n".join(lines)
 
 
-def _value(name: str) -> str:
-    return f'v["{name}"]'
+def _value(name: Name) -> str:
+    return f'v["{name.identifier}"]'
 
 
 def _rates(equation: Equation, layout: Layout, states: list[str]) -> str:
@@ -177,7 +171,7 @@ def _lagging(equation: Equation) -> Iterable[str]:
     for progress, forces in equation.lags.items():
         rate = written(equation.rows[progress][0].coefficient, PYTHON, _value, least=6)
         for force, steady in forces.items():
-            before, after = _value(force), _value(steady)
+            before, after = _value(Name(force)), _value(Name(steady))
             yield f'"{force}": {before} - ({after} - {before}) * expm1(-{rate} * _time)'
 
 

@@ -107,7 +107,7 @@ class Motion:
 
         The rate of a velocity that is 0 tells its direction, unless it is a rounding error.
         """
-        self.size = [max(size, abs(float(x))) for size, x in zip(self.size, self.y, strict=True)]
+        self.size = [max(size, abs(x)) for size, x in zip(self.size, self.y, strict=True)]
         self.terms: State = self.model.sizes(self.held, self.time, self.y)
         self.rate = self.rates(0.0, self.y)
         before = dict(self.direction)
@@ -128,7 +128,7 @@ class Motion:
         Once all has settled, whole turns are skipped, because each changes the offsets by the same.
         """
         rest = self.substeps(h)
-        turn = tau / (hypot(*(float(self.y[i]) for i in self.model.TURNING)) or nan)
+        turn = tau / (hypot(*(self.y[i] for i in self.model.TURNING)) or nan)
         if self.has_settled and rest > 2.0 * turn:
             before, heading = list(self.y), self.heading
             if self.substeps(turn) > 0.0:
@@ -159,7 +159,7 @@ class Motion:
                 continue
             if reversing is not None:
                 y, _ = self.trial(length)
-                y[reversing] -= float(y[reversing])
+                y[reversing] = 0.0
             self.y, self.time, rest = y, self.time + length, rest - length
             self.heading = self.turned(y, self.heading)
             self.begin()
@@ -183,12 +183,12 @@ class Motion:
         """Return the largest error of a substep relative to the tolerance. `fifth` and `third` estimate its rate."""
         error = self.swing(y)
         own = zip(self.size, y, self.terms, strict=True)
-        sizes = [max(size, abs(float(x))) + h * float(terms) for size, x, terms in own]
+        sizes = [max(size, abs(x)) + h * terms for size, x, terms in own]
         for group in self.model.GROUPS:
             least = _SHARE * max(sizes[i] for i in group)
             for i in group:
                 sizes[i] = max(sizes[i], least)
-        for size, e, e_3 in zip(sizes, map(float, fifth), map(float, third), strict=True):
+        for size, e, e_3 in zip(sizes, fifth, third, strict=True):
             a, b = (h * x / size / _TOLERANCE if size else 0.0 for x in (e, e_3))
             if a * a > 0.0:
                 error = max(error, a * a / sqrt(a * a + 0.01 * b * b))
@@ -213,17 +213,17 @@ class Motion:
             sign, length = self.direction[name], found[0]
 
             def velocity(t: float, i: int = i, sign: float = sign) -> float:
-                return sign * float(self.trial(t)[0][i])
+                return sign * self.trial(t)[0][i]
 
             def slope(t: float, i: int = i, sign: float = sign) -> float:
-                return sign * float(self.rates(t, self.trial(t)[0])[i])
+                return sign * self.rates(t, self.trial(t)[0])[i]
 
             if self.y[i] and self.rate[i] * sign < 0.0 < rates[i] * sign and y[i] * sign > 0.0:
-                length = _root(slope, length, float(self.rate[i] * sign), float(rates[i] * sign))  # where it is slowest
+                length = _root(slope, length, self.rate[i] * sign, rates[i] * sign)  # where it is slowest
             reached = y[i] * sign if length == h else velocity(length)
-            if reached < -_EPSILON * max(self.size[i], abs(float(y[i]))):
+            if reached < -_EPSILON * max(self.size[i], abs(y[i])):
                 if self.y[i]:
-                    found = _root(velocity, length, float(self.y[i] * sign), float(reached)), i
+                    found = _root(velocity, length, self.y[i] * sign, reached), i
                     continue
                 if self.is_rounding(i, self.rate[i]):
                     self.direction[name] = -sign
@@ -243,7 +243,7 @@ class Motion:
                 y = list(self.y)
                 for i in group:
                     if abs(y[i]) <= _FADED * (self.size[i] + h * self.terms[i]):
-                        y[i] -= float(y[i])
+                        y[i] = 0.0
                 rates, terms = self.rates(0.0, y), self.model.sizes(self.held, self.time, y)
                 if all(abs(rates[i]) <= 16.0 * _EPSILON * terms[i] for i in group):
                     self.settled |= set(group)
@@ -260,7 +260,7 @@ class Motion:
 
     def rows(self, y: State) -> list[list[float]]:
         """Return the first two rows of the rotation matrix."""
-        return [[float(y[i]) for i in row] for row in self.model.ROTATION]
+        return [[y[i] for i in row] for row in self.model.ROTATION]
 
     def turned(self, y: State, heading: float) -> float:
         """Return the heading of the direction beside the nose, by at most half a turn from a heading before."""
@@ -271,7 +271,8 @@ class Motion:
         if not self.model.ROTATION:
             return 0.0
         (a, b), (c, d) = beside_nose(self.rows(self.y)), beside_nose(self.rows(y))
-        return float(min(hypot(c - a, d - b) / max(0.9 * hypot(a, b), 1e-9), 1e9) ** 8.0)
+        swung = hypot(c - a, d - b) / max(0.9 * hypot(a, b), 1e-9)
+        return min(swung, 1e9) ** 8
 
     def end(self) -> dict[str, float]:
         """Return the states of the vehicle by their names."""
@@ -283,7 +284,7 @@ class Motion:
             e, a, b, c = (y[name] for name in self.model.QUATERNION)
             length = (e * e + a * a + b * b + c * c) ** 0.5
             found |= {name: y[name] / length for name in self.model.QUATERNION}
-            found["psi"] = heading({name: float(x) for name, x in y.items()}, self.heading)
+            found["psi"] = heading(y, self.heading)
         return found
 
 

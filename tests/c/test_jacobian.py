@@ -14,7 +14,8 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import SIX, VEHICLES, random_inputs, random_state
 
-ALL = {**VEHICLES, "six_coupled": SIX}
+SWIFT = VEHICLES["lag without coupling"].with_(T_t200=0.001)
+ALL = {**VEHICLES, "six_coupled": SIX, "a very short lag": SWIFT}
 H = 0.5
 
 
@@ -58,6 +59,8 @@ def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
         found = step_jacobian(rov, inputs, state, H, [*rov.coefficients])
         after, derivatives = _variational(rov, inputs, state)
         assert np.allclose([*found.after.values()], after, rtol=1e-8, atol=1e-8)
+        moved = rov.step(inputs, state, H)
+        assert found.after == pytest.approx({name: moved[name] for name in state}, rel=1e-8, abs=1e-8)
         assert np.allclose(
             np.hstack((found.states, found.inputs, found.coefficients)), derivatives, rtol=1e-6, atol=1e-6
         )

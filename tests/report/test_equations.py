@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Mapping
-from math import copysign, prod
+from math import copysign
 
 import pytest
 from lxml import html
@@ -10,7 +10,7 @@ from lxml import html
 from rov_fmu.equation.expression import Expression, Name, Operation, compiled, where
 from rov_fmu.equation.layout import Layout
 from rov_fmu.report.page import equations
-from rov_fmu.report.page.equations import Equations, Line, MathML, Text, products
+from rov_fmu.report.page.equations import Equations, Line, mathml, text
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, VEHICLES, random_body, random_inputs, random_state, random_vehicle
@@ -23,25 +23,16 @@ ROVS = {
     "everything": load_vehicle(EVERYTHING),
 }
 Values = Mapping[str, float]
-SIGN = {"sgn": lambda x: copysign(1.0, x) if x else 0.0}
+FUNCTIONS = {
+    "sgn": lambda x: copysign(1.0, x) if x else 0.0,
+    "rate": lambda x: x,
+    "square": lambda x: x * x,
+    "cube": lambda x: x * x * x,
+}
 
 
 def value_of(x: Expression, at: Values) -> float:
-    return float(compiled({"value": x}, SIGN)(at)["value"])
-
-
-def value_as_shown(x: Expression, at: Values) -> float:
-    """Return the value of a formula by the products in which the page shows it."""
-    return sum(
-        one.sign * prod(factor(f, at) for f in one.above) / prod(factor(f, at) for f in one.below)
-        for one in products(x)
-    )
-
-
-def factor(x: Expression, at: Values) -> float:
-    """Return the value of a factor; a sum in brackets is again shown as products."""
-    is_sum = isinstance(x, Operation) and x.op in ("+", "-")
-    return value_as_shown(x, at) if is_sum else value_of(x, at)
+    return float(compiled({"value": x}, FUNCTIONS)(at)["value"])
 
 
 def exactly(rov: Vehicle, inputs: Values, state: Values) -> dict[str, float]:
@@ -53,21 +44,28 @@ def exactly(rov: Vehicle, inputs: Values, state: Values) -> dict[str, float]:
 
 
 def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> dict[str, float]:
-    """Return the value of every name to the left of an equation by what is to its right; rates as der(<name>)."""
+    """Return the value of every name to the left of an equation by what is to its right; rates as der(<name>).
+
+    Of several rates on the left, the first is found, and the others are exact.
+    """
     exact = exactly(rov, inputs, state)
     at = {**rov.coefficients, **inputs, **state}
     at |= {name: max(-1.0, min(1.0, at[name])) for name in rov.layout.commands}
+    rates = {name: exact[f"der({name})"] for name in rov.layout.state}
     found: dict[str, float] = {}
 
     def calculate(line: Line) -> None:
-        name = line.name.identifier
-        value = value_as_shown(line.right, at)
-        if line.factor is not None:
-            others = sum(at[m.identifier] * exact[f"der({other.identifier})"] for m, other in line.coupled)
-            found[f"der({name})"] = (value - others) / value_of(line.factor, at)
-        else:
-            found[name] = value
-            at[name] = max(-1.0, min(1.0, value)) if line in shown.commands else value
+        right = value_of(line.right, at)
+        if isinstance(line.left, Name):
+            found[line.left.identifier] = right
+            at[line.left.identifier] = max(-1.0, min(1.0, right)) if line in shown.commands else right
+            return
+        first = line.left
+        while isinstance(first, Operation) and first.op == "+":
+            first = first.args[0]
+        (name,) = first.names & rov.layout.state.keys()
+        others, gain = (value_of(line.left, {**at, **rates, name: x}) for x in (0.0, 1.0))
+        found[f"der({name})"] = (right - others) / (gain - others)
 
     for line in shown.commands:
         calculate(line)
@@ -78,8 +76,7 @@ def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> 
         first = curve.thrusters[0].name
         for line in curve.advance:  # the page mentions the other thrusters in words: "likewise"
             at |= {
-                f"loss_{t.name}": value_as_shown(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]})
-                for t in curve.thrusters
+                f"loss_{t.name}": value_of(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]}) for t in curve.thrusters
             }
     for name in rov.layout.calculated:
         if name not in at and name.startswith("F_"):
@@ -130,7 +127,7 @@ def test_the_equations_shown_are_those_of_any_vehicle_in_six_axes() -> None:
 
 
 def _text(layout: Layout) -> list[str]:
-    return [f"{Text(layout).line(line)}  {line.reference}".strip() for line in equations.of(layout)]
+    return [f"{line}  {line.reference}".strip() for line in equations.of(layout)]
 
 
 def test_the_equations_of_the_paper_are_those_of_the_paper() -> None:
@@ -183,11 +180,10 @@ def test_a_full_mass_matrix_restoring_forces_and_attitude_are_shown() -> None:
 @pytest.mark.parametrize("kind", ROVS)
 def test_mathml_says_what_the_text_says(kind: str) -> None:
     """Letters, numbers and signs stand in the same order; in MathML a coefficient's marks are above its indices."""
-    layout = ROVS[kind].layout
-    text, mathml = Text(layout), MathML(layout)
-    for line in equations.of(layout):
-        written = html.fromstring(f"<math>{mathml.line(line)}</math>").text_content()
-        plain = text.line(line)
+    for line in equations.of(ROVS[kind].layout):
+        sides = f"<math>{mathml(line.left)}<mo>=</mo>{mathml(line.right)}</math>"
+        written = html.fromstring(sides).text_content()
+        plain = str(line)
         for old, new in (
             (" where", "for"),
             ("else", "otherwise"),
@@ -204,7 +200,7 @@ def test_mathml_says_what_the_text_says(kind: str) -> None:
 def test_a_form_that_cannot_be_shown_is_an_error() -> None:
     choice = where(Name("u") > 3.0, 2.0, Name("w"))
     with pytest.raises(ValueError, match=r"2\.0 if u > 3\.0 else w: there is no way to show this"):
-        Text(VEHICLES["VideoRay"].layout).sum(choice)
+        text(choice)
 
 
 def test_the_page_of_a_vehicle_shows_momenta_along_axes_that_it_lacks() -> None:

@@ -1,25 +1,24 @@
 """The equations of a vehicle for readers, made from its forces and from the formulas of its thrust and its pose.
 
-A formula is shown as a sum of products, in the order in which it is built. Numbers come first, and a common first
-factor stands before a bracket. The page leaves out only the saturation of commands, which its text mentions.
+A formula is shown as a sum of products. The page leaves out only the saturation of commands, which its text mentions.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 from markupsafe import escape
 
-from rov_fmu.equation.catalogue import REVERSE, YAW
+from rov_fmu.equation.catalogue import REVERSE, YAW, delayed_name
 from rov_fmu.equation.expression import (
-    FUNCTIONS,
-    PYTHON,
+    MATHML,
+    TEXT,
     Expression,
     Name,
     Number,
     Operation,
     beyond_dead_band,
     call,
+    collected,
     product,
     replaced,
     scaled,
@@ -28,36 +27,23 @@ from rov_fmu.equation.expression import (
 )
 from rov_fmu.equation.forces import COUPLING, forces_of
 from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.equation.terms import ONE, Equation, equation_of, mass_matrix
+from rov_fmu.equation.terms import Equation, equation_of, mass_matrix
 from rov_fmu.equation.thrust import by_direction, steady_name
-from rov_fmu.report.templates import RAISED, number
-
-
-@dataclass(frozen=True)
-class Symbol:
-    """A letter with its indices.
-
-    `mark` is − for a parameter that holds in reverse, ± for one of two parameters by direction, * for a steady force.
-    """
-
-    letter: str
-    index: str = ""
-    upper: str = ""
-    mark: str = ""
+from rov_fmu.report.templates import number
 
 
 @dataclass(frozen=True)
 class Line:
-    """An equation: on the left a name, or a factor times a time derivative, on the right a formula."""
+    """An equation. Its left side is a name, or a sum of factors times the rate of a name."""
 
-    name: Name
+    left: Expression
     right: Expression
     reference: str = ""
     """The number of the equation in the paper, or another publication of it."""
-    factor: Expression | None = None
-    """The factor of the time derivative of the name."""
-    coupled: tuple[tuple[Name, Name], ...] = ()
-    """The other rates on the left: their factors and the names of the variables."""
+
+    def __str__(self) -> str:
+        """Return the equation as plain text."""
+        return f"{text(self.left)} = {text(self.right)}"
 
 
 @dataclass(frozen=True)
@@ -89,6 +75,11 @@ class Equations:
     angles: list[Line]
     """The Euler angles, if the vehicle rolls or pitches."""
 
+    @property
+    def has_full_mass(self) -> bool:
+        """True if the left side of an equation of motion has the rates of several velocities."""
+        return any(isinstance(line.left, Operation) and line.left.op == "+" for line in self.motion)
+
     def __iter__(self) -> Iterator[Line]:
         """Iterate over all equations in the order of the page."""
         of_curves = (
@@ -106,30 +97,27 @@ def of(layout: Layout) -> Equations:
     mass = mass_matrix(layout, names)
     has_effective_inertia = layout.coupled or bool(mass.entries) or any("m_a" in form.keys for form in layout.axes)
 
-    def line(name: Name, formula: Expression, reference: str = "") -> Line:
-        return Line(name, replaced(formula, formulas), reference)
+    def line(left: Expression, formula: Expression, reference: str = "") -> Line:
+        return Line(left, collected(replaced(formula, formulas)), reference)
 
-    def rate(name: str, formula: Expression, factor: Expression = ONE) -> Line:
-        return replace(line(Name(name), formula), factor=factor)
-
-    def thrust(name: Name) -> list[Line]:
+    def thrust(name: Name, shown: Name | None = None) -> list[Line]:
         """Return the equation of a quantity that follows from the commands, if the vehicle has it."""
-        return [line(name, equation.thrust[name.identifier])] if name.identifier in equation.thrust else []
+        return [line(shown or name, equation.thrust[name.identifier])] if name.identifier in equation.thrust else []
 
     def motion(form: VehicleAxis) -> Line:
         """Return the equation of motion of an axis: with effective masses on the left, if the axis has several."""
         v = form.axis.velocity
-        loads = total(force.formula for force in forces_of(layout, names) if force.axis == v)
+        loads = [force.formula for force in forces_of(layout, names) if force.axis == v]
         if not has_effective_inertia:
-            found = rate(v, Name(form.axis.coefficient("beta")) * loads, Name(form.axis.inertia))
-            return replace(found, reference=form.axis.equations[1])
+            right = Name(form.axis.coefficient("beta")) * total(loads)
+            return line(Name(form.axis.inertia) * _rate(v), right, form.axis.equations[1])
         if layout.coupled:
-            by_pair = mass.products(v).items()
-            munk = [(sign, _entry(*entry), pair) for pair, entries in by_pair for sign, entry in entries]
-            loads = total([loads, *(scaled(sign, product(entry, *map(Name, pair))) for sign, entry, pair in munk)])
-        partners = [((b if a == v else a), _entry(a, b)) for a, b in mass.entries if v in (a, b)]
-        coupled = tuple((entry, Name(other)) for other, entry in partners if other in layout.by_velocity)
-        return replace(rate(v, loads, _entry(v, v)), reference=form.axis.equations[1], coupled=coupled)
+            munk = [(sign, _entry(*entry), pair) for pair, own in mass.products(v).items() for sign, entry in own]
+            loads += [scaled(sign, product(entry, *map(Name, pair))) for sign, entry, pair in munk]
+        partners = {b if a == v else a: _entry(a, b) for a, b in mass.entries if v in (a, b)}
+        masses = {v: _entry(v, v), **partners}
+        left = total(entry * _rate(axis) for axis, entry in masses.items() if axis in layout.by_velocity)
+        return line(left, total(loads), form.axis.equations[1])
 
     inertia = [line(_entry(v, v), 1.0 / mass.gains[v]) for v in layout.by_velocity] if has_effective_inertia else []
     inertia += [line(_entry(*pair), formula) for pair, formula in mass.entries.items()]
@@ -140,25 +128,28 @@ def of(layout: Layout) -> Equations:
         steady, force = steady_name(first, curve, names), Name(f"F_{first}")
         shown = [line(steady, _steady(first, curve, equation), curve.equation)]
         shown += thrust(names("beyond", first)) if "c_0" in curve.keys else []
-        lag = [rate(force.identifier, steady - force, Name(curve.coefficient("T")))] if curve.has_lag else []
+        lag = [line(Name(curve.coefficient("T")) * _rate(force.identifier), steady - force)] if curve.has_lag else []
         by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
         tau = Name(f"tau_{curve.name}")
         turning = equation.forces.get(tau.identifier)
         torque = [] if turning is None else [line(tau, turning, "(4)" if by_arm else "")]
         curves.append(CurveLines(curve, thrusters, shown, thrust(names("loss", first)), lag, torque))
-    mixed = [one for t in layout.thrusters for one in thrust(names("mixed", t.name))]
+    mixed = [one for t in layout.thrusters for one in thrust(names("mixed", t.name), names("command", t.name))]
+    angles = [one for fin in layout.fins for one in thrust(names("angle", fin.name))]
     return Equations(
         [motion(form) for form in layout.axes],
         inertia,
-        [
-            *(replace(one, name=names("command", *one.name.owners)) for one in mixed),
-            *(one for fin in layout.fins for one in thrust(names("angle", fin.name))),
-        ],
+        mixed + angles,
         curves,
-        [rate(name, equation.rates[name]) for name in layout.pose],
+        [line(_rate(name), equation.rates[name]) for name in layout.pose],
         [line(Name(name), formula) for name, formula in _rotation(layout, equation).items()],
         [line(Name(name), formula) for name, formula in equation.outputs.items()],
     )
+
+
+def _rate(name: str) -> Expression:
+    """Return the time derivative of a variable, as the page shows it."""
+    return call("rate", Name(name))
 
 
 def _entry(a: str, b: str) -> Name:
@@ -201,13 +192,16 @@ def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     names = equation.names
     kinds = ("saturated", "command", "net_weight", "righting", "arm", "constant")
     inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
-    inlined -= {
-        names("command", t.name).identifier
-        for t in layout.thrusters
-        if names("mixed", t.name).identifier in equation.thrust
-    }
-    found = {name: formula for name, formula in equation.program.items() if name in inlined}
+    mixed = [name for name in names.of_kind("mixed") if name.identifier in equation.thrust]
+    inlined -= {names("command", *name.owners).identifier for name in mixed}
+    found = {name: _unsaturated(formula) for name, formula in equation.program.items() if name in inlined}
+    if layout.has_dead_time:  # a fraction is that of the command that acts
+        found |= {name.identifier: Name(delayed_name(*name.owners)) for name in names.of_kind("fraction")}
     return found | ({"square_length": Number(1.0)} if layout.has_attitude else {})
+
+
+def _unsaturated(x: Expression) -> Expression:
+    return x.args[0] if isinstance(x, Operation) and x.op == "saturated" else x
 
 
 def choices(lines: Iterable[Line]) -> list[Operation]:
@@ -223,84 +217,20 @@ def _choices(x: Expression) -> Iterator[Operation]:
             yield from _choices(arg)
 
 
-# ---- Sums of products ------------------------------------------------------------------------------------------------
+# ---- Written ---------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Product:
-    """A sign, the factors above the fraction bar, and those below it. A factor is not a product itself."""
+class Symbol:
+    """A letter with its indices.
 
-    sign: int = 1
-    above: tuple[Expression, ...] = ()
-    below: tuple[Expression, ...] = ()
-
-    def __mul__(self, other: "Product") -> "Product":
-        """Return the product of both, with numbers first."""
-        above = sorted((*self.above, *other.above), key=lambda factor: not isinstance(factor, Number))
-        return Product(self.sign * other.sign, tuple(above), (*self.below, *other.below))
-
-
-def products(x: Expression) -> list[Product]:
-    """Return a formula as a sum of products. Common first factors stand before a bracket: a x - a y becomes a (x - y).
-
-    Numbers count as equal if their first twelve digits are.
+    `mark` is − for a parameter that holds in reverse, ± for one of two parameters by direction, * for a steady force.
     """
-    alike: dict[object, list[Product]] = {}
-    for place, one in enumerate(_terms(x)):
-        head = one.above[0] if len(one.above) > 1 else None
-        key = f"{head.value:.12g}" if isinstance(head, Number) else head or place
-        alike.setdefault(key, []).append(one)
-    found = []
-    for first, *others in alike.values():
-        rest = total(scaled(one.sign * first.sign, _quotient(one.above[1:], one.below)) for one in (first, *others))
-        found.append(Product(first.sign, first.above[:1]) * _product(rest) if others else first)
-    return found
 
-
-def _quotient(above: Iterable[Expression], below: tuple[Expression, ...]) -> Expression:
-    return product(*above) / product(*below) if below else product(*above)
-
-
-def _terms(x: Expression) -> list[Product]:
-    match x:
-        case Number(0.0):
-            return []
-        case Operation("+" | "-" as op, (left, right)):
-            sign = Product(1 if op == "+" else -1)
-            return _terms(left) + [sign * one for one in _terms(right)]
-    one = _product(x)
-    is_sum = len(one.above) == 1 and not one.below and _is_sum(one.above[0])
-    return [Product(one.sign) * term for term in _terms(one.above[0])] if is_sum else [one]
-
-
-def _is_sum(x: Expression) -> bool:
-    return isinstance(x, Operation) and x.op in ("+", "-")
-
-
-def _product(x: Expression) -> Product:  # noqa: PLR0911 - a case for each operation
-    """Return a formula as one product, in which a sum of several products is a factor."""
-    match x:
-        case Number(1.0):
-            return Product()
-        case Operation("neg", (inner,)):
-            return Product(-1) * _product(inner)
-        case Operation("saturated", (inner,)):
-            return _product(inner)
-        case Operation("*", (left, right)):
-            return _product(left) * _product(right)
-        case Operation("/", (left, right)):
-            below = _product(right)
-            return _product(left) * Product(below.sign, below.below, below.above)
-        case Operation("+" | "-"):
-            terms = products(x)
-            if len(terms) == 1:
-                return terms[0]
-            if all(one.sign < 0 for one in terms):
-                return Product(-1, (total(_quotient(one.above, one.below) for one in terms),))
-    return Product(1, (x,))
-
-
-# ---- Written ---------------------------------------------------------------------------------------------------------
+    letter: str
+    index: str = ""
+    upper: str = ""
+    mark: str = ""
 
 
 _LETTERS = {
@@ -315,7 +245,7 @@ _INDICES = ("t", "d", "a", "0", "V", "max", "u")
 
 def symbol_of(name: Name) -> Symbol:
     """Return the symbol of a name: a letter with the indices that its identifier has, as in m_a_u or alpha_u."""
-    stem = name.identifier.removesuffix(REVERSE)
+    stem = name.identifier.removesuffix("±").removesuffix(REVERSE)
     head, *rest = stem.split("_", 1)
     if name.kind:
         head, index, upper = name.kind, "_".join(name.owners).removeprefix("u_"), ""
@@ -325,161 +255,46 @@ def symbol_of(name: Name) -> Symbol:
         index, _, upper = rest[0].partition("_") if rest else ("", "", "")
         if upper and index not in _INDICES:
             index, upper = rest[0], ""
-    mark = "−" if stem != name.identifier else "*" if head == "steady" else ""
+    mark = {"": "*" if head == "steady" else "", REVERSE: "−"}.get(name.identifier.removeprefix(stem), "±")
     return Symbol(_LETTERS.get(head, head), index, upper, mark)
 
 
-class Text:
-    """Equations as plain text, with the names of the FMU's variables."""
+def text(x: Expression) -> str:
+    """Write a formula as plain text, with the names of the FMU's variables."""
 
-    forms: Mapping[str, str] = {
-        "rate": "{}'",
-        "number": "{}",
-        "equal": "{} = {}",
-        "sign": " {} ",
-        "first": "{}",
-        "fraction": "{} / {}",
-        "power": "{0}{2}",
-        "bracket": "({})",
-        "abs": "|{}|",
-        "sgn": "sgn({})",
-        "sqrt": "√({})",
-        "atan2": "atan2({}, {})",
-        "pow": "({})^{}",
-        "function": "{} {}",
-        "cases": "{1} where {0} > 0, else {2}",
-    }
-
-    def __init__(self, layout: Layout) -> None:
-        self._is_late = layout.has_dead_time
-
-    def line(self, line: Line) -> str:
-        """Write one equation."""
-        left = self.factor(line.name)
-        if line.factor is not None:
-            left = self.rate(line.factor, line.name)
-        for factor, name in line.coupled:
-            left += self.write("sign", "+") + self.rate(factor, name)
-        return self.write("equal", left, self.sum(line.right))
-
-    def rate(self, factor: Expression, name: Name) -> str:
-        """Write a factor times a time derivative."""
-        return self.factors((factor, call("rate", name)) if factor != ONE else (call("rate", name),))
-
-    def sum(self, x: Expression) -> str:
-        """Write a formula as a sum of products."""
-        return self.terms(products(x))
-
-    def terms(self, terms: Iterable[Product]) -> str:
-        """Write a sum of products."""
-        text = ""
-        for one in terms:
-            if text or one.sign < 0:
-                text += self.write("sign" if text else "first", "−" if one.sign < 0 else "+")
-            if one.below:
-                text += self.write("fraction", self.part(one.above), self.part(one.below))
-            else:
-                text += self.factors(one.above)
-        return text or self.write("number", "0")
-
-    def factors(self, factors: tuple[Expression, ...]) -> str:
-        """Write a product."""
-        counts = [(self.factor(factor), len(list(equal))) for factor, equal in groupby(factors)]
-        texts = [self.write("power", text, n, str(n).translate(RAISED)) if n > 1 else text for text, n in counts]
-        return self.side_by_side(texts) or self.write("number", "1")
-
-    def part(self, factors: tuple[Expression, ...]) -> str:
-        """Write the numerator or the denominator of a fraction."""
-        return self.factors(factors) if len(factors) < 2 else self.write("bracket", self.factors(factors))
-
-    def factor(self, x: Expression) -> str:  # noqa: PLR0911 - a case for each kind of factor
-        """Write a factor. Raises ValueError if there is no way to show it."""
-        match x:
-            case Name():
-                return self.symbol(self.symbol_of(x))
-            case Number(value):
-                return self.write("number", number(value, 4))
-            case Operation("directed", (_, Name() as forward, _)):
-                return self.symbol(replace(self.symbol_of(forward), mark="±"))
-            case Operation("dead band", (beyond, _, force)):
-                return self.write("cases", self.factor(beyond), self.sum(force), self.sum(Number(0.0)))
-            case Operation("+" | "-"):
-                return self.write("bracket", self.sum(x))
-            case Operation(function, args) if function in self.forms:
-                return self.write(function, *map(self.sum, args))
-            case Operation(function, (argument,)) if function in FUNCTIONS:
-                return self.write("function", function, self.sum(argument))
-        raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
-
-    def symbol_of(self, name: Name) -> Symbol:
-        """Return the symbol of a name. A fraction of the command is one that acts after the dead time."""
+    def name_of(name: Name) -> str:
         symbol = symbol_of(name)
-        return replace(symbol, upper="d") if name.kind == "fraction" and self._is_late else symbol
+        shown = "_".join(part for part in (symbol.letter, symbol.index, symbol.upper) if part)
+        return shown + (REVERSE if symbol.mark == "−" else symbol.mark)
 
-    def write(self, form: str, *parts: object) -> str:
-        """Fill the parts into one of the forms."""
-        return self.forms[form].format(*parts)
-
-    def symbol(self, symbol: Symbol) -> str:
-        """Write a letter and its indices."""
-        name = "_".join(part for part in (symbol.letter, symbol.index, symbol.upper) if part)
-        return name + {"−": REVERSE}.get(symbol.mark, symbol.mark)
-
-    def side_by_side(self, factors: Iterable[str]) -> str:
-        """Write factors one after the other."""
-        return " ".join(factors)
+    return written(x, replace(TEXT, number=lambda value: number(value, 4)), name_of)
 
 
-class MathML(Text):
-    """Equations in MathML, for the page."""
+def mathml(x: Expression) -> str:
+    """Write a formula in MathML, for the page."""
 
-    _CELL = '<mtd style="text-align: left">'
-    forms: Mapping[str, str] = {
-        "rate": "<mover>{}<mo>˙</mo></mover>",
-        "number": "<mn>{}</mn>",
-        "equal": "{}<mo>=</mo>{}",
-        "sign": "<mo>{}</mo>",
-        "first": '<mo form="prefix">{}</mo>',
-        "fraction": "<mfrac><mrow>{}</mrow><mrow>{}</mrow></mfrac>",
-        "power": "<msup>{0}<mn>{1}</mn></msup>",
-        "bracket": '<mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>',
-        "abs": '<mrow><mo stretchy="false">|</mo>{}<mo stretchy="false">|</mo></mrow>',
-        "sqrt": "<msqrt>{}</msqrt>",
-        "atan2": '<mi>atan2</mi><mrow><mo stretchy="false">(</mo>{}<mo>,</mo>{}<mo stretchy="false">)</mo></mrow>',
-        "pow": '<msup><mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow><mrow>{}</mrow></msup>',
-        "sgn": '<mi>sgn</mi><mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>',
-        "function": '<mspace width=".17em"/><mi>{}</mi><mspace width=".17em"/>{}<mspace width=".17em"/>',
-        "cases": f"<mrow><mo>{{{{</mo><mtable><mtr>{_CELL}{{1}}</mtd>"
-        f"{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr><mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
-    }
-
-    def parts(self, line: Line) -> Iterator[str]:
-        """Yield the left side with the first term, and then each term: a line may break between them."""
-        first, *others = products(line.right)
-        left = self.line(replace(line, right=Number(0.0))).removesuffix(self.sum(Number(0.0)))
-        yield left + self.terms([first])
-        for one in others:
-            sign = "−" if one.sign < 0 else "+"
-            yield f'<mo form="infix">{sign}</mo>{self.terms([replace(one, sign=1)])}'
-
-    def symbol(self, symbol: Symbol) -> str:
-        letter, index, upper = (
-            f"<mi>{escape(part)}</mi>" if part else "" for part in (symbol.letter, symbol.index, symbol.upper)
-        )
+    def name_of(name: Name) -> str:
+        symbol = symbol_of(name)
+        parts = (symbol.letter, symbol.index, symbol.upper)
+        letter, index, upper = (f"<mi>{escape(part)}</mi>" if part else "" for part in parts)
         if symbol.mark:
             upper = f'<mrow>{upper}<mo lspace="0" rspace="0">{symbol.mark}</mo></mrow>'
         if upper:
             return f"<msubsup>{letter}{index or '<mrow/>'}{upper}</msubsup>"
         return f"<msub>{letter}{index}</msub>" if index else letter
 
-    def part(self, factors: tuple[Expression, ...]) -> str:
-        if len(factors) == 1 and _is_sum(factors[0]):  # the bar replaces the brackets
-            return self.sum(factors[0])
-        return self.factors(factors)
+    return written(x, replace(MATHML, number=lambda value: f"<mn>{number(value, 4)}</mn>"), name_of)
 
-    def side_by_side(self, factors: Iterable[str]) -> str:
-        text = ""
-        for factor in factors:  # without a space, an index touches the letter after it
-            space = text.endswith(("</mn>", "</msub>")) and not factor.startswith("<mrow>")
-            text += f'<mspace width=".1em"/>{factor}' if space else factor
-        return text
+
+def parts_in_mathml(line: Line) -> list[str]:
+    """Return the left side with the first term, and then each term: a line may break between them."""
+
+    def parts(x: Expression) -> list[str]:
+        match x:
+            case Operation("+" | "-" as op, (before, last)):
+                sign = {"-": "−"}.get(op, op)
+                return [*parts(before), f'<mo form="infix">{sign}</mo>{mathml(last)}']
+        return [mathml(x)]
+
+    first, *others = parts(line.right)
+    return [f"{mathml(line.left)}<mo>=</mo>{first}", *others]

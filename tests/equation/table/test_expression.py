@@ -5,6 +5,7 @@ Values and derivatives are compared with those that mpmath computes with 50 digi
 
 import random
 from collections.abc import Callable
+from xml.etree import ElementTree
 
 import mpmath as mp
 import numpy as np
@@ -12,13 +13,16 @@ import pytest
 
 from rov_fmu.equation.expression import (
     ARRAYS,
+    MATHML,
     PYTHON,
+    TEXT,
     Expression,
     Name,
     Names,
     Operation,
     beyond_dead_band,
     call,
+    collected,
     compiled,
     directed,
     equal,
@@ -82,6 +86,36 @@ def test_sums_and_products_have_their_sign_before_the_first_factor() -> None:
     assert to_c(product(a, b + c, 2.0)) == "a * (b + c) * 2.0"
     weighted = [scaled(w, x) for w, x in ((1.0, a), (-1.0, b), (0.5, c * d), (-2.0, a))]
     assert to_c(total(weighted)) == "a - b + 0.5 * c * d - 2.0 * a"
+
+
+@pytest.mark.parametrize(
+    ("expression", "shown"),
+    [
+        (a * b - a * c, "a (b − c)"),
+        (a * -b - a * c, "−a (b + c)"),
+        (d - (a * -b - a * c), "d + a (b + c)"),
+        (a * 0.5 * b + 0.5 * c, "0.5 (a b + c)"),
+        (a * b * b / (c * d) + 1.0 * a, "a b² / (c d) + a"),
+        (a * b * b + a * b * c, "a b (b + c)"),
+        (of(-0.0) + a * a * a - 0.0, "a³"),
+        (a / (b / c), "a c / b"),
+        (-(a + b) * c, "−(a + b) c"),
+        (call("sqrt", a * a + b * b) * call("sin", a + b), "√(a² + b²) sin (a + b)"),
+        (call("pow", a / b, c), "(a / b)^c"),
+        (directed(a, b, c) * call("abs", a), "b± |a|"),
+        (beyond_dead_band(a, b, c * d), "c d where a > 0, else 0"),
+        (total([]), "0"),
+    ],
+)
+def test_readers_see_a_sum_of_products(expression: Expression, shown: str) -> None:
+    assert written(collected(expression), TEXT) == shown
+
+
+def test_mathml_has_a_fraction_in_place_of_brackets() -> None:
+    shown = collected((a + b) / (c - 2.5) + call("pow", a / b, c))
+    top = ElementTree.fromstring(f"<math>{written(shown, MATHML, lambda name: f'<mi>{name.identifier}</mi>')}</math>")
+    assert "".join(top.itertext()) == "a+bc−2.5+(ab)c"
+    assert [one.tag for one in top.iter() if one.tag in ("mfrac", "msup")] == ["mfrac", "msup", "mfrac"]
 
 
 def test_two_quantities_never_have_the_same_identifier() -> None:
@@ -173,9 +207,11 @@ def test_values_and_derivatives_are_those_that_mpmath_computes() -> None:
             moved = line(pair, at, change)
             slope = tangent(pair.ours, lambda name: Name(f"d_{name}")) or of(0.0)
             values = {**at, **{f"d_{name}": x for name, x in change.items()}}
+            alike = compiled({"value": collected(pair.ours)}, {**SQUARE, "cube": lambda x: x * x * x})(values)
             found = compiled({"value": pair.ours, "slope": slope}, SQUARE)(values)
             value = moved(mp.mpf(0))
             assert found["value"] == pytest.approx(float(value), rel=1e-11, abs=1e-12), to_c(pair.ours)
+            assert alike["value"] == pytest.approx(float(value), rel=1e-9, abs=1e-10), written(pair.ours, PYTHON)
             step = mp.mpf(10) ** -20
             sides = [(moved(step) - value) / step, (value - moved(-step)) / step]
             if abs(sides[0] - sides[1]) < 1e-9 * (1 + abs(sides[0])):  # no kink at this point
