@@ -90,7 +90,9 @@ def text(value: float | None, form: str) -> str:
 def sentence(text: str) -> str:
     """Return a text with a capital first letter, except where it begins with the name of a file."""
     text = readable(text)
-    return text if re.search(r"\.[A-Za-z]", text.partition(":")[0]) else text[:1].upper() + text[1:]
+    head, colon, _ = text.partition(":")
+    start = head if colon else head.partition(" ")[0]
+    return text if re.search(r"\.[A-Za-z]", start) else text[:1].upper() + text[1:]
 
 
 def readable(text: str) -> str:

@@ -179,6 +179,7 @@ def test_findings_stand_under_their_headings(page: str) -> None:
     assert lists["warnings"] == [f"{sentence(warning)}." for warning in made.warnings]
     assert lists["facts"] == [f"{sentence(fact)}." for fact in made.facts]
     assert "doubts" not in lists
+    assert sentence("the thrust changes in log_1.csv") == "The thrust changes in log_1.csv"
     assert sentence("a b.csv: 3 pulses of 0 or 65535 us, -55%") == "a b.csv: 3 pulses of 0 or 65535 µs, −55 %"
 
 
