@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.arrays import Array
 from verification.identification import __main__ as command
 from verification.identification.data import Recorded, Recording, Split, load
 from verification.identification.datasets.exjobb import EXJOBB
@@ -138,6 +139,21 @@ def test_no_change_and_constant_velocity_are_what_they_say(split: Split) -> None
     assert moved[own] == pytest.approx(rate, abs=1e-9)
     since = ahead(recording, 1.0)[own]
     assert values[own] == pytest.approx(rate - 0.2 * (since + 0.1), abs=1e-9), "the sample 0.1 s before the start"
+
+
+class _Beside(Unchanged):
+    """Predicts every sample 2 beside its value in the first second of a span, and 3 beside it later."""
+
+    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:  # noqa: ARG002
+        values = recording.log.record.value
+        return values + np.where(ahead(recording, span) < 1.0, 2.0, 3.0), np.zeros(len(values))
+
+
+def test_bands_follow_the_errors_of_the_training_by_the_time_ahead(split: Split) -> None:
+    (one,) = run(_Beside(), split, [5.0]).predictions
+    expected = np.where(ahead(one.recording, 5.0) < 1.0, 2.0, 3.0)
+    assert one.deviation[one.counts] == pytest.approx(expected[one.counts])
+    assert np.abs(one.error[one.counts]) == pytest.approx(expected[one.counts]), "within half a turn for the heading"
 
 
 def _ramp(recording: Recording) -> Recording:

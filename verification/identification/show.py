@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import cycle
 from math import inf
+from typing import Any
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -13,7 +15,8 @@ from verification.identification.scores import Number, Score, summary
 
 REFERENCE = "no change"
 OURS = "rov-fmu"
-_ROLES = ("orange", "grey", "steel", "blue", "teal", "violet", "metal")
+_LOOKS = (("grey", "--"), ("grey", ":"), *((role, "-") for role in ("blue", "teal", "violet", "steel", "orange")))
+_RATIOS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 
 
 def _of(rows: Sequence[Score], name: str) -> list[str]:
@@ -73,23 +76,27 @@ def picture(rows: Sequence[Score]) -> str:
 
 def _draw(rows: Sequence[Score], sets: Sequence[str], figure: Figure) -> None:
     panels = figure.subplots(2, len(sets), squeeze=False, sharex=True, sharey="row")
-    methods = [OURS, *(name for name in _of(rows, "method") if name != OURS)]
-    colors = {name: LIGHT[role] for name, role in zip(methods, _ROLES, strict=False)}
+    methods = _of(rows, "method")
+    looks: dict[str, dict[str, Any]] = {
+        name: {"color": LIGHT[role], "linestyle": line, "marker": ".", "linewidth": 2.2 if name == OURS else 1.2}
+        for name, (role, line) in zip(methods, cycle(_LOOKS), strict=False)
+    }
     for data, upper, lower in zip(sets, *panels, strict=True):
         for method in _of([row for row in rows if row.data == data], "method"):
             own = [row for row in rows if (row.data, row.method) == (data, method)]
             spans = [*dict.fromkeys(row.span for row in own)]
             errors = summary(rows, data, method, REFERENCE).errors
             inside = [[row.inside_95 for row in own if row.span == span] for span in spans]
-            look = {"color": colors[method], "linewidth": 2.2 if method == OURS else 1.2, "marker": "."}
-            upper.plot(range(len(spans)), [errors[span] for span in spans], **look)
-            lower.plot(range(len(spans)), [100.0 * sum(some) / len(some) for some in inside], **look)
-        upper.set(yscale="log", ylim=(0.03, 3.0))
+            upper.plot(range(len(spans)), [errors[span] for span in spans], **looks[method])
+            lower.plot(range(len(spans)), [100.0 * sum(some) / len(some) for some in inside], **looks[method])
+        upper.set_yscale("log")
+        upper.set_yticks(_RATIOS, [f"{ratio:g}" for ratio in _RATIOS])
+        upper.minorticks_off()
         upper.set_title(data, loc="left")
         lower.axhline(95.0, color=LIGHT["muted"], linestyle=":", linewidth=1.0)
-        lower.set(ylim=(0.0, 102.0), xlabel="predicted over")
+        lower.set_xlabel("predicted over")
         lower.set_xticks(range(len(spans)), [_span(span).replace("open loop", "open") for span in spans])
     panels[0, 0].set_ylabel("error / that of no change")
     panels[1, 0].set_ylabel("samples in the 95 % bands (%)")
-    lines = [Line2D([], [], color=colors[name], marker=".") for name in methods]
+    lines = [Line2D([], [], **looks[name]) for name in methods]
     figure.legend(lines, methods, loc="outside lower center", ncols=4)

@@ -1,4 +1,4 @@
-"""Two simulated dives of a BlueROV2 Heavy, whose true coefficients are known (verification/references/rigid_pool.py).
+"""Simulated dives of a BlueROV2 Heavy, whose true coefficients are known (verification/references/rigid_pool.py).
 
 The owner knows the file of the usual vehicle as a base. The true one has other drag and inertia and slower thrusters. A
 pilot drives all six axes. The rough water adds what a model may lack: a battery that sags, a tether, waves, a link with
