@@ -178,6 +178,15 @@ def test_a_changed_file_is_refused_in_one_line(tmp_path: Path) -> None:
         assert "a.csv" in str(refused.value)
 
 
+def test_the_right_one_of_two_files_with_the_same_name_is_taken(tmp_path: Path) -> None:
+    for folder, text in (("a", "wrong"), ("b", "right")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "log.csv").write_text(text, encoding="utf-8")
+    digest = "27042f4e6eca7d0b2a7ee4026df2ecfa51d3339e6d122aa099118ecd8563bad9"
+    Recorded("mine", "somebody/Somewhere", "", {"a": {"log.csv": digest}}).write("training", tmp_path, tmp_path)
+    assert (tmp_path / "log.csv").read_text(encoding="utf-8") == "right"
+
+
 @pytest.mark.parametrize("known", [EXJOBB, TAUV], ids=lambda one: one.name)
 def test_every_third_recording_is_for_the_test(known: Recorded) -> None:
     training, test = (known.of_part(part) for part in ("training", "test"))

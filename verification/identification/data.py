@@ -78,15 +78,20 @@ class Recorded:
         for name in self.of_part(part):
             files = self.recordings[name]
             for file, expected in files.items():
-                path = next(iter(sorted(data.rglob(file))), data / self.name / file)
-                if (found := file_hash(path)) != expected:
-                    wrong = f"has the SHA-256 {found[:12]}... and must have {expected[:12]}..."
-                    raise DataFileError(f"{path}: {wrong}, that of the file of {self.origin}")
-                shutil.copy(path, folder)
+                shutil.copyfile(self._found(data, file, expected), folder / file)
             if len(files) > 1:
                 text += f"\n[dives.{name}]\nfiles = {[*files]}\n"
         for file, content in {ROV_FILE: text, **self.tables}.items():
             (folder / file).write_text(content, encoding="utf-8")
+
+    def _found(self, data: Path, file: str, expected: str) -> Path:
+        """Return the file with this name and this SHA-256 anywhere in a folder."""
+        paths = sorted(data.rglob(file)) or [data / file]
+        found = {file_hash(path): path for path in paths}
+        if expected not in found:
+            wrong = f"has the SHA-256 {next(iter(found))[:12]}... and must have {expected[:12]}..."
+            raise DataFileError(f"{paths[0]}: {wrong}, that of the file of {self.origin}")
+        return found[expected]
 
 
 # ---- Recordings ------------------------------------------------------------------------------------------------------
