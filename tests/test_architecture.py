@@ -34,6 +34,7 @@ MAY_IMPORT = {
     "examples": {"examples", REFERENCES, "rov_fmu"},
     "verification/benchmarks": {"verification/benchmarks", REFERENCES, "rov_fmu"},
     "verification/fuzzing": {"verification/fuzzing", REFERENCES, "rov_fmu"},
+    "verification/identification": {"verification/identification", REFERENCES, "rov_fmu"},
     "verification/interoperability": {"verification/interoperability", REFERENCES, "examples", "rov_fmu"},
     "tests/verification": {"tests", "tests/verification", "verification", "examples", "rov_fmu"},
     "tests/docs": {"tests", "tests/docs", "docs", "examples", "rov_fmu", REFERENCES},

@@ -90,12 +90,12 @@ def predictions(
             covariance = Posterior.of(objective.table, again.z, information).averaged.covariance
             covariance = _with_currents(objective, best, covariance, n)
             part = _Part(n, slice(None), words)
-            yield from _predicted(objective, part, _cautious(objective, again.z), covariance, other)
+            yield from _predicted(objective, part, cautious(objective, again.z), covariance, other)
             continue
         half = len(best.data[n].innovations) // 2
         for part in (_Part(n, slice(half, None), "the first half"), _Part(n, slice(half), "the second half")):
             z, covariance = _without(objective, best, part)
-            yield from _predicted(objective, part, _cautious(objective, z), covariance, other)
+            yield from _predicted(objective, part, cautious(objective, z), covariance, other)
 
 
 def _other(table: Table, against: Vehicle | None) -> Table | None:
@@ -110,14 +110,19 @@ def _other(table: Table, against: Vehicle | None) -> Table | None:
 
 def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
     """Return the covariance with the variance of the current of an unseen log: about as large as in the other logs."""
-    parameters, found = objective.table.parameters, covariance.copy()
-    currents = [n for n, p in enumerate(parameters) if p.kind == "current"]
-    others = [best.z[n] ** 2 + covariance[n, n] for n in currents if parameters[n].log != number]
-    for n in currents:
-        if parameters[n].log == number:
+    found = covariance.copy()
+    for n, p in enumerate(objective.table.parameters):
+        if p.kind == "current" and p.log == number:
             found[n], found[:, n] = 0.0, 0.0
-            found[n, n] = min(parameters[n].deviation ** 2, _LEAST_CURRENT**2 + float(np.mean(others)))
+            found[n, n] = unseen_current(objective.table, best.z, covariance, p.of)
     return found
+
+
+def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> float:
+    """Return the variance of the current of an unseen log: about as large as in the other logs of a table."""
+    currents = [n for n, p in enumerate(table.parameters) if p.kind == "current" and p.of != file]
+    others = float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
+    return min(table.parameters[currents[0]].deviation ** 2, _LEAST_CURRENT**2 + others)
 
 
 def _without(objective: Objective, best: Minimum, part: _Part) -> tuple[Array, Array]:
@@ -130,7 +135,7 @@ def _without(objective: Objective, best: Minimum, part: _Part) -> tuple[Array, A
     return np.clip(best.z - inverse @ gradient, objective.low, objective.high), 2.0 * inverse
 
 
-def _cautious(objective: Objective, z: Array) -> Array:
+def cautious(objective: Objective, z: Array) -> Array:
     """Return the parameters with at least the least change of thrust."""
     moved = z.copy()
     place = objective.table.place("slow gain")
@@ -149,20 +154,16 @@ def _predicted(
     begin = max(float(record.time[inside][0] - record.time[0]), 0.0) + SETTLING
     for span in (inf, AHEAD):
         try:
-            run = objective.run(z, part.log, begin=begin, span=span)
-            slopes = _slopes(objective, part.log, z, covariance, run, begin, span)
+            off_all, deviations = ahead(objective, part.log, z, covariance, begin, span)
             compared = objective.run(z, part.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
         later = inside & (record.time >= record.time[0] + begin)
-        variance = run.variances + np.einsum("ni,ij,nj->n", slopes, covariance, slopes)
         for number, m in enumerate(one.measured):
             at = later & (record.sensor == number)
             if at.sum() < 10 or (span < inf and m.sensor.is_velocity):
                 continue
-            off, deviation = run.innovations[at], np.sqrt(variance[at])
-            if m.channel.quantity.wraps:
-                deviation = np.minimum(deviation, _LOST)
+            off, deviation = off_all[at], deviations[at]
             measured = record.value[at]
             yield Prediction(
                 axis=m.sensor.axis,
@@ -182,6 +183,22 @@ def _predicted(
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 compared=measured - compared.innovations[at] if compared else None,
             )
+
+
+def ahead(
+    objective: Objective, number: int, z: Array, covariance: Array, begin: float, span: float
+) -> tuple[Array, Array]:
+    """Return measured minus predicted for each sample of a log, and the standard deviation of each prediction.
+
+    The predictions start anew at `begin` (s after the first sample) and after each `span`. The deviations contain the
+    noise and the uncertainty of the parameters. Raises DivergedError.
+    """
+    run = objective.run(z, number, begin=begin, span=span)
+    slopes = _slopes(objective, number, z, covariance, run, begin, span)
+    deviations = np.sqrt(run.variances + np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
+    wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
+    lost = wraps[objective.records[number].sensor]
+    return run.innovations, np.where(lost, np.minimum(deviations, _LOST), deviations)
 
 
 def _slopes(

@@ -156,7 +156,7 @@ def test_there_are_commands_to_look_at() -> None:
     wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables")]
     wanted += [
         "-m examples.videoray.figures",
-        *(f"-m verification.{name}" for name in ("interoperability", "fuzzing", "benchmarks")),
+        *(f"-m verification.{name}" for name in ("interoperability", "fuzzing", "benchmarks", "identification")),
     ]
     assert {*wanted, "build_fmu.py"} <= said
 

@@ -1,0 +1,240 @@
+"""The ROV identification benchmark: scores of known numbers, each method on a small vehicle, and the loader."""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.arrays import Array
+from verification.identification import __main__ as command
+from verification.identification.data import Recorded, Recording, Split, load
+from verification.identification.datasets.exjobb import EXJOBB
+from verification.identification.datasets.simulated import CALM, ROUGH, TINY, Simulated
+from verification.identification.datasets.tauv import TAUV
+from verification.identification.methods.identified import Identified
+from verification.identification.methods.least_squares import LeastSquares
+from verification.identification.methods.unchanged import ConstantVelocity, Unchanged
+from verification.identification.protocol import BEGIN, Method, Outcome, Predicted, ahead, run
+from verification.identification.scores import Score, bands, from_csv, numbers, scores, summary, to_csv
+
+NEEDS = {"_gaussian_process": "sklearn", "_neural_ode": "jax"}
+"""The package of an extra that a method needs."""
+
+
+@pytest.fixture(scope="module")
+def split(tmp_path_factory: pytest.TempPathFactory) -> Split:
+    return load(TINY, None, tmp_path_factory.mktemp("tiny"))
+
+
+@pytest.fixture(scope="module", params=command.METHODS, ids=lambda make: make.__name__.strip("_"))
+def outcome(request: pytest.FixtureRequest, split: Split) -> Outcome:
+    make: Callable[[], Method] = request.param
+    if package := NEEDS.get(make.__name__):
+        pytest.importorskip(package, reason=f"this method needs the extra [identification] with {package}")
+    return run(make(), split)
+
+
+# ---- Scores ----------------------------------------------------------------------------------------------------------
+
+
+def test_scores_are_those_computed_by_hand() -> None:
+    error = np.array([3.0, -4.0, 0.5, 0.0])
+    rms, in_50, in_95, width_50, width_95 = bands(error, np.array([1.0, 2.5, 1.0, 1.0]))
+    assert rms == pytest.approx(2.5124689)  # the root of 25.25 / 4
+    assert (in_50, in_95) == (0.5, 0.75), "|3| > 1.96, 4 < 4.9, 4 > 1.69, 0.5 < 0.674"
+    assert width_50 == pytest.approx(2.0 * 0.6744898 * 1.375)
+    assert width_95 == pytest.approx(2.0 * 1.9599640 * 1.375)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_the_coverage_of_normal_errors_is_that_of_the_normal_distribution(factor: float) -> None:
+    error = np.random.default_rng(1).standard_normal(40_000)
+    _, in_50, in_95, *_ = bands(error, np.full(len(error), factor))
+    expected = {0.5: (0.2641, 0.6729), 1.0: (0.5, 0.95), 2.0: (0.8226, 0.99991)}[factor]  # from a table of the normal
+    assert (in_50, in_95) == pytest.approx(expected, abs=0.01)
+
+
+def test_samples_are_pooled_by_quantity_and_span(split: Split) -> None:
+    (recording,) = split.test
+    counts = recording.log.record.time >= recording.log.record.time[0] + BEGIN
+    sensor = recording.log.record.sensor
+    error = np.where(counts, 1.0 + sensor, 1e6)  # what is before the begin must not count
+    made = [Predicted(recording, span, error, np.full(len(error), 0.6), counts) for span in (1.0, inf)]
+    rows = [*scores(Outcome(Unchanged(), split, made, 7.0))]
+    assert {(row.quantity, row.span): row.error for row in rows} == {
+        (m.channel.quantity.name, span): 1.0 + n for n, m in enumerate(recording.channels) for span in (1.0, inf)
+    }
+    assert {row.inside_95 for row in rows if row.error == 1.0} == {1.0}, "1 < 1.96 * 0.6"
+    assert {row.inside_95 for row in rows if row.error > 1.0} == {0.0}
+    assert {(row.samples, row.seconds, row.edits) for row in rows} == {(150, 7.0, split.edits[False])}
+
+
+def test_a_summary_is_relative_to_no_change(tmp_path: Path) -> None:
+    rows = [
+        Score("mine", method, quantity, "m", span, 9, error, 0.1, 0.5, inside, 1.0, 3.0, 2.5, 4)
+        for method, quantity, span, error, inside in (
+            ("no change", "depth", 1.0, 2.0, 0.9),
+            ("no change", "heading", 1.0, 4.0, 0.9),
+            ("other", "depth", 1.0, 1.0, 0.8),
+            ("other", "heading", 1.0, 8.0, 0.6),
+        )
+    ]
+    found = summary(rows, "mine", "other", "no change")
+    assert found.errors == pytest.approx({1.0: 1.0}), "the geometric mean of 1/2 and 2"
+    assert found.inside_95 == pytest.approx(0.7)
+    assert found.lowest == (0.6, "heading", 1.0)
+    (tmp_path / "scores.csv").write_text(to_csv(rows), encoding="utf-8")
+    assert from_csv(tmp_path / "scores.csv") == rows
+
+
+# ---- Methods ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_method_predicts_the_future_from_the_past_alone(outcome: Outcome) -> None:
+    """The samples of the last span are changed: no prediction of an earlier sample or of this span changes."""
+    recording, span = outcome.split.test[0], 5.0
+    record = recording.log.record
+    start = record.time[0] + BEGIN + 2.0 * span
+    last = record.time >= start
+    moved = replace(record, value=record.value + np.where(last, 0.3, 0.0))
+    changed = replace(recording, log=replace(recording.log, record=moved))
+    before, after = (outcome.method.predict(one, BEGIN, span) for one in (recording, changed))
+    counted = (record.time >= record.time[0] + BEGIN) & (record.time < start + span - 1e-9)
+    for one, other in zip(before, after, strict=True):
+        assert np.abs(one - other)[counted].max() < 1e-9
+
+
+def test_every_method_has_bands_around_a_finite_prediction(outcome: Outcome) -> None:
+    for one in outcome.predictions:
+        assert np.all(np.isfinite(one.error[one.counts]))
+        assert np.all(one.deviation[one.counts] > 0.0)
+
+
+def test_models_beat_no_change_and_ours_is_near_the_noise(outcome: Outcome, split: Split) -> None:
+    rows = [*scores(outcome), *(row for row in scores(run(Unchanged(), split)) if outcome.method.uses_thrust)]
+    found = summary(rows, "tiny", outcome.method.name, "no change")
+    if outcome.method.uses_thrust:
+        assert all(error < 0.25 for error in found.errors.values())
+    if outcome.method.name == "rov-fmu":
+        own = [row for row in rows if row.method == "rov-fmu" and row.unit.endswith("/s")]
+        assert all(row.error < 2.0 * row.noise for row in own)
+        assert all(row.inside_95 >= 0.85 for row in own)
+        assert all(row.low <= row.true <= row.high for row in numbers(outcome))
+        assert len([*numbers(outcome)]) == 10
+
+
+def test_no_change_and_constant_velocity_are_what_they_say(split: Split) -> None:
+    recording = _ramp(split.test[0])
+    values, _ = Unchanged().predict(recording, BEGIN, 1.0)
+    moved, _ = ConstantVelocity().predict(recording, BEGIN, 1.0)
+    record = recording.log.record
+    heading = np.array([not s.is_velocity for s in record.sensors])[record.sensor]
+    own = heading & (record.time >= record.time[0] + BEGIN)
+    rate = 0.1 + 0.2 * (record.time[own] - record.time[0])  # the heading turns at 0.2 rad/s, as its rate says
+    assert moved[own] == pytest.approx(rate, abs=1e-9)
+    since = ahead(recording, 1.0)[own]
+    assert values[own] == pytest.approx(rate - 0.2 * (since + 0.1), abs=1e-9), "the sample 0.1 s before the start"
+
+
+class _Beside(Unchanged):
+    """Predicts every sample 2 beside its value in the first second of a span, and 3 beside it later."""
+
+    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:  # noqa: ARG002
+        values = recording.log.record.value
+        return values + np.where(ahead(recording, span) < 1.0, 2.0, 3.0), np.zeros(len(values))
+
+
+def test_bands_follow_the_errors_of_the_training_by_the_time_ahead(split: Split) -> None:
+    (one,) = run(_Beside(), split, [5.0]).predictions
+    expected = np.where(ahead(one.recording, 5.0) < 1.0, 2.0, 3.0)
+    assert one.deviation[one.counts] == pytest.approx(expected[one.counts])
+    assert np.abs(one.error[one.counts]) == pytest.approx(expected[one.counts]), "within half a turn for the heading"
+
+
+def _ramp(recording: Recording) -> Recording:
+    """A recording of a heading of 0.1 rad that grows by 0.2 rad/s, and of velocities of 0.2."""
+    record = recording.log.record
+    heading = np.array([not s.is_velocity for s in record.sensors])[record.sensor]
+    value = np.where(heading, 0.1 + 0.2 * (record.time - record.time[0]), 0.2)
+    return replace(recording, log=replace(recording.log, record=replace(record, value=value)))
+
+
+# ---- Data ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_changed_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "a.csv").write_text("other", encoding="utf-8")
+    known = Recorded("mine", "somebody/Somewhere", "", {"a": {"a.csv": 64 * "0"}})
+    for data, reason in ((tmp_path, "has the SHA-256"), (tmp_path / "none", "cannot be read")):
+        with pytest.raises(DataFileError, match=reason) as refused:
+            known.write("training", data, tmp_path)
+        assert len(str(refused.value).splitlines()) == 1
+        assert "a.csv" in str(refused.value)
+
+
+def test_the_right_one_of_two_files_with_the_same_name_is_taken(tmp_path: Path) -> None:
+    for folder, text in (("a", "wrong"), ("b", "right")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "log.csv").write_text(text, encoding="utf-8")
+    digest = "27042f4e6eca7d0b2a7ee4026df2ecfa51d3339e6d122aa099118ecd8563bad9"
+    Recorded("mine", "somebody/Somewhere", "", {"a": {"log.csv": digest}}).write("training", tmp_path, tmp_path)
+    assert (tmp_path / "log.csv").read_text(encoding="utf-8") == "right"
+
+
+@pytest.mark.parametrize("known", [EXJOBB, TAUV], ids=lambda one: one.name)
+def test_every_third_recording_is_for_the_test(known: Recorded) -> None:
+    training, test = (known.of_part(part) for part in ("training", "test"))
+    assert sorted([*training, *test]) == sorted(known.recordings)
+    assert test == [*known.recordings][2::3]
+    digests = [digest for files in known.recordings.values() for digest in files.values()]
+    assert len({*digests}) == len(digests)
+    assert {len(digest) for digest in digests} == {64}
+
+
+@pytest.mark.parametrize("known", [EXJOBB, TAUV], ids=lambda one: one.name)
+def test_real_recordings_are_read(known: Recorded, tmp_path: Path) -> None:
+    data = os.environ.get("ROV_FMU_DATA")
+    if not data:
+        pytest.skip("ROV_FMU_DATA does not name a folder with copies of the recordings")
+    found = load(known, Path(data), tmp_path)
+    assert (len(found.training), len(found.test)) == (len(known.of_part("training")), len(known.of_part("test")))
+    assert {axis.name for axis in found.known.fitted} >= {"heave", "yaw"}
+
+
+# ---- The command -----------------------------------------------------------------------------------------------------
+
+
+def test_an_unknown_data_set_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert command.main(["--only", "mine", "-o", str(tmp_path)]) == 2
+    assert "--only mine: there is no such data set, only exjobb, tauv" in capsys.readouterr().err
+
+
+def test_the_command_writes_the_scores(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(command, "DATA_SETS", [TINY, EXJOBB])
+    monkeypatch.setattr(command, "METHODS", [Unchanged, LeastSquares])
+    monkeypatch.delenv("ROV_FMU_DATA", raising=False)
+    assert command.main(["-o", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    assert "exjobb: not run, because --data is not given" in err
+    assert "tiny: RMS error, SI units" in out
+    assert {row.method for row in from_csv(tmp_path / "scores.csv")} == {"no change", "least squares"}
+    assert "<svg" in (tmp_path / "scores.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("known", [CALM, ROUGH], ids=lambda one: one.name)
+def test_our_bands_and_intervals_cover_on_the_simulated_vehicle(known: Simulated, tmp_path: Path) -> None:
+    found = load(known, None, tmp_path)
+    outcome = run(Identified(), found)
+    rows = [*scores(outcome)]
+    assert sum(row.inside_95 for row in rows) / len(rows) >= 0.85
+    several = [*numbers(outcome)]
+    assert sum(row.low <= row.true <= row.high for row in several) >= 0.8 * len(several)

@@ -1,0 +1,96 @@
+"""Fit all methods to the training recordings of all data sets, predict the test recordings, and print the scores.
+
+-o gets scores.csv, coefficients.csv and scores.svg. The recordings are not distributed: --data (or ROV_FMU_DATA) is the
+folder with your copies of the repositories; without it, only what is simulated is run.
+"""
+
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.process import exit_code
+from verification.identification.data import DataSet, Recorded, load
+from verification.identification.datasets.exjobb import EXJOBB
+from verification.identification.datasets.simulated import CALM, ROUGH
+from verification.identification.datasets.tauv import TAUV
+from verification.identification.methods.identified import Identified
+from verification.identification.methods.least_squares import LeastSquares
+from verification.identification.methods.output_error import OutputError
+from verification.identification.methods.unchanged import ConstantVelocity, Unchanged
+from verification.identification.protocol import Method, run
+from verification.identification.scores import from_csv, numbers, scores, to_csv
+from verification.identification.show import picture, print_scores
+
+DATA_SETS: Sequence[DataSet] = (EXJOBB, TAUV, CALM, ROUGH)
+
+
+def _gaussian_process() -> Method:
+    from verification.identification.methods.gaussian_process import GaussianProcess
+
+    return GaussianProcess()
+
+
+def _neural_ode() -> Method:
+    from verification.identification.methods.neural_ode import NeuralODE
+
+    return NeuralODE()
+
+
+METHODS: Sequence[Callable[[], Method]] = (
+    Unchanged,
+    ConstantVelocity,
+    LeastSquares,
+    OutputError,
+    _gaussian_process,
+    _neural_ode,
+    Identified,
+)
+"""Each makes a method. Those that need a package of an extra import it first when they are made."""
+
+
+@click.command(help=__doc__)
+@click.option("--data", type=click.Path(path_type=Path), envvar="ROV_FMU_DATA", metavar="FOLDER")
+@click.option("--only", multiple=True, metavar="NAME", help="Only this data set; scores.csv keeps the others' rows.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, metavar="FOLDER")
+def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
+    names = [one.name for one in DATA_SETS]
+    if unknown := next((name for name in only if name not in names), None):
+        raise click.UsageError(f"--only {unknown}: there is no such data set, only {', '.join(names)}")
+    output.mkdir(parents=True, exist_ok=True)
+    files = [output / name for name in ("scores.csv", "coefficients.csv", "scores.svg")]
+    check_targets(files)
+    log = Console(stderr=True)
+    rows, found = [], []
+    with tempfile.TemporaryDirectory(prefix="identification-") as folder:
+        for one in DATA_SETS:
+            if (only and one.name not in only) or (isinstance(one, Recorded) and not data):
+                log.print(f"{one.name}: not run" + ("" if only else ", because --data is not given"))
+                continue
+            split = load(one, data, Path(folder))
+            for make in METHODS:
+                outcome = run(make(), split)
+                log.print(f"{one.name}: {outcome.method.name}, {outcome.seconds:.1f} s")
+                rows += [*scores(outcome)]
+                found += [*numbers(outcome)]
+    if only and files[0].exists():
+        rows = [row for row in from_csv(files[0]) if row.data not in only] + rows
+    print_scores(rows, found)
+    texts = to_csv(rows), to_csv(found), picture(rows)
+    write_whole(*(Output(path, text.encode()) for path, text in zip(files, texts, strict=True)))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 measured, 2 bad input, 130 interrupted."""
+    codes: dict[type[Exception], int] = {OSError: 2, FileError: 2, click.ClickException: 2}
+    name = "python -m verification.identification"
+    return exit_code("identification", lambda: _command(arguments, name, standalone_mode=False), codes)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The methods, one module each. The list is METHODS in verification/identification/__main__.py."""

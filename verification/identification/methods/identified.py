@@ -1,0 +1,65 @@
+"""This project's identification. What belongs to one log alone has its prior in an unseen log."""
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.identify import assess
+from rov_fmu.identify.likelihood.curves import Shapes
+from rov_fmu.identify.likelihood.fit import Fit, fit_all
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.likelihood.posterior import around
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
+from verification.identification.data import Recording, Split
+from verification.identification.protocol import Known
+
+_COMMANDS = (0.3, 0.5, -0.3, -0.5)
+
+
+class Identified:
+    """`rov-fmu identify`: the vehicle of the file, and the covariance of its parameters."""
+
+    name, uses_thrust, has_bands = "rov-fmu", True, True
+    found: Fit
+
+    def fit(self, split: Split) -> None:
+        """Fit all parameters to the training recordings."""
+        with threadpool_limits(limits=1, user_api="blas"):
+            self.found = fit_all(split.folder, split.known, [r.log for r in split.training], split.rows)
+
+    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
+        """Run the filter until each start, and the model from there on."""
+        own = self.found.averaged
+        table = table_of(self.found.known, [recording.log], [])
+        z = np.array([p.mean for p in table.parameters])
+        covariance = np.diag([p.deviation**2 for p in table.parameters])
+        places = [(n, own.table.place(p.kind, p.of, p.part)) for n, p in enumerate(table.parameters) if p.log is None]
+        here, there = np.array([(n, place) for n, place in places if place is not None]).T
+        z[here], covariance[np.ix_(here, here)] = own.z[there], own.covariance[np.ix_(there, there)]
+        for n, p in enumerate(table.parameters):
+            if p.kind == "current":
+                covariance[n, n] = assess.unseen_current(own.table, own.z, own.covariance, p.of)
+        objective = Objective(table, [recording.log], [])
+        off, deviations = assess.ahead(objective, 0, assess.cautious(objective, z), covariance, begin, span)
+        return recording.log.record.value - off, deviations**2
+
+    def coefficients(self, axis: Axis) -> Known:
+        """Return the numbers of the model with their posterior."""
+        own = self.found.averaged
+        names = [*(f"V_ss {100 * c:g} %" for c in _COMMANDS), "quadratic drag / inertia"]
+
+        def values(z: Array) -> Array:
+            vehicle = Vehicle(own.table.layout, own.table.coefficients(z.tolist()))
+            shapes: Shapes = own.table.shapes(z.tolist())
+            V = [shapes.motion(vehicle, axis, c).steady_velocity() for c in _COMMANDS]
+            A, _ = shapes.motion(vehicle, axis, _COMMANDS[0]).drag(1.0)
+            return np.log(np.abs([*V, A]))
+
+        found, covariance, _ = own.numbers(values)
+        errors = np.sqrt(np.diag(covariance))
+        return {
+            name: (float(np.exp(value)), *around(float(np.exp(value)), float(np.exp(value) * error), positive=True))
+            for name, value, error in zip(names, found, errors, strict=True)
+        }
