@@ -4,6 +4,7 @@ const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 const SPAN = 20; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
+const HELD = "Depth, heading and attitude are held, as ArduSub holds them; keys and sticks steer.";
 
 /** The axis that each arrow key drives, and the direction. @type {Record<string, [string, number]>} */
 const ARROWS = {
@@ -109,7 +110,7 @@ class Live {
     this.last = 0;
     this.connect();
     this.say(
-      `Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
+      `${this.flight.isHeld ? `${HELD} ` : ""}Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
     );
     this.follow(location.hash);
     this.show();
@@ -149,6 +150,13 @@ class Live {
     ghost.addEventListener("change", () => {
       this.flight.ghostShown = ghost.checked;
       this.changed = true;
+    });
+    const hold = /** @type {HTMLInputElement | null} */ (document.getElementById("live-hold"));
+    hold?.addEventListener("change", () => {
+      this.takeOver();
+      this.flight.isHeld = hold.checked;
+      this.say(hold.checked ? HELD : "Keys and sticks drive the thrusters alone; nothing is held.");
+      this.show();
     });
     stage.addEventListener("keydown", (event) => this.pressed(event));
     stage.addEventListener("keyup", (event) => this.keys.delete(event.code));
@@ -485,6 +493,12 @@ class Live {
       if (demands.size === 0) return;
       this.takeOver();
     }
+    if (this.flight.isHeld && !this.flight.test) {
+      const { begun } = this.flight;
+      this.flight.steer({ demands, added: this.held });
+      if (begun !== this.flight.begun) this.say("");
+      return;
+    }
     const commands = commandsOf(this.vehicle, demands);
     for (const [name, value] of Object.entries(this.held)) commands[name] = saturated(commands[name] + value);
     const { model } = this.flight.pilot;
@@ -515,7 +529,7 @@ class Live {
       this.say(flight.playback.verdict(this.vehicle));
       this.pause(true);
     }
-    if (flight.playback) this.show();
+    if (flight.playback || flight.steering()) this.show();
     if (flight.test && this.hasEnded()) {
       this.say(`${part("message").textContent} The test has ended.`);
       this.pause(true);

@@ -9,6 +9,8 @@ class Craft {
   /** @param {Model} model */
   constructor(model) {
     this.model = model;
+    /** What holds it level. @type {Hold | null} */
+    this.hold = null;
     /** The points of the track: north, east and depth in turn. @type {number[]} */
     this.track = [];
     /** The velocities by axis, at the times of the flight. @type {number[][]} */
@@ -28,12 +30,19 @@ class Craft {
     this.keep();
   }
 
-  /** Steps h seconds. Returns false when the step fails. @param {number} h */
-  step(h) {
+  /** Steps h seconds from a time on, under the commands that are set or by sticks. Returns false when the step fails.
+   * @param {number} time @param {number} h @param {Sticks | null} sticks */
+  step(time, h, sticks) {
     const { model, distances } = this;
     const { axes } = model.vehicle;
     const before = axes.map(({ velocity }) => model.get(velocity));
-    if (!model.step(h)) return false;
+    if (sticks && model.has("phi")) {
+      if (this.hold?.until !== time) this.hold = new Hold(model, time);
+      if (!this.hold.step(h, sticks)) return false;
+    } else {
+      if (sticks) model.give(commandsOf(model.vehicle, sticks.demands));
+      if (!model.step(h)) return false;
+    }
     axes.forEach(({ velocity }, a) => {
       distances[a] += (h / 2) * (before[a] + model.get(velocity));
     });
@@ -88,6 +97,10 @@ class Flight {
     this.test = null;
     /** @type {Playback | null} */
     this.playback = null;
+    /** True while the sticks steer a vehicle that is held level. */
+    this.isHeld = pilot.has("phi");
+    /** @type {Sticks} */
+    this.sticks = { demands: new Map(), added: {} };
     /** True after the first input. Until then, time stands still. */
     this.begun = false;
     this.reset();
@@ -119,6 +132,7 @@ class Flight {
       !this.begun ||
       (this.test === null &&
         this.playback === null &&
+        !(this.isHeld && this.sticks.demands.size > 0) &&
         variables.slice(0, inputs).every(([name, start]) => model.get(name) === start) &&
         axes.every(({ velocity }) => [velocity, `der(${velocity})`].every((name) => Math.abs(model.get(name)) < REST)))
     );
@@ -135,10 +149,10 @@ class Flight {
     const { model } = this.pilot;
     const changed = Object.entries(given).filter(([name, value]) => model.get(name) !== value);
     if (changed.length === 0) return;
-    for (const [name, value] of changed) model.set(name, value);
+    model.give(given);
     const { vehicle } = model;
     const handed = handedOver(vehicle, this.ghost.model.vehicle, (name) => model.get(name));
-    for (const [name, value] of Object.entries(handed)) this.ghost.model.set(name, value);
+    this.ghost.model.give(handed);
     this.followed();
     this.commands[this.commands.length - 1] = this.given();
     vehicle.axes.forEach(({ velocity, signs, external }, a) => {
@@ -153,8 +167,19 @@ class Flight {
   /** Sets α and β of the pilot's vehicle. @param {Record<string, number>} given */
   tune(given) {
     const { model } = this.pilot;
-    for (const [name, value] of Object.entries(given)) model.set(name, value);
+    model.give(given);
     model.tune();
+  }
+
+  /** Takes over the sticks of a vehicle that is held level. @param {Sticks} sticks */
+  steer(sticks) {
+    this.sticks = sticks;
+    this.begun ||= sticks.demands.size > 0 || Object.values(sticks.added).some((value) => value !== 0);
+  }
+
+  /** Returns the sticks while they steer: not a recording or a step test, whose commands are those of the thrusters. */
+  steering() {
+    return this.isHeld && !this.playback && !this.test ? this.sticks : null;
   }
 
   followed() {
@@ -176,8 +201,9 @@ class Flight {
           continue;
         }
       }
-      const followed = this.playback ? this.playback.move(this.ghost, step) : this.ghost.step(step);
-      if (!this.pilot.step(step) || !followed) {
+      const sticks = this.steering();
+      const followed = this.playback ? this.playback.move(this.ghost, step) : this.ghost.step(this.time, step, sticks);
+      if (!this.pilot.step(this.time, step, sticks) || !followed) {
         this.reset();
         return false;
       }

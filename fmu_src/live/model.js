@@ -3,10 +3,11 @@
 
 /**
  * An axis: the names of its velocity, load and position, their units, the commands that drive it with their signs, and the letters
- * of the keys that drive it in its positive and in its negative direction. `shares` are the commands by which the keys drive it.
+ * of the keys that drive it in its positive and in its negative direction. `shares` are the commands by which the keys drive it, `held` those
+ * by which Hold does.
  * `quantities` are those of its motion that a recording may have.
  * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string, quantities: Quantity[],
- *   signs: Record<string, number>, shares: Record<string, number>, keys: string}} Axis
+ *   signs: Record<string, number>, shares: Record<string, number>, held: Record<string, number>, keys: string}} Axis
  */
 /**
  * A quantity of rov_fmu/tank/catalogue.py: the names of its column, that in a recording of one axis, and those that need a known unit;
@@ -104,6 +105,11 @@ class Model {
       this.fractions.set(name, value);
       this.values[place] = neutral + value * (value > 0 ? high - neutral : neutral - low);
     }
+  }
+
+  /** Sets variables by name. @param {Record<string, number>} given */
+  give(given) {
+    for (const [name, value] of Object.entries(given)) this.set(name, value);
   }
 
   /** Takes over changed coefficients. */

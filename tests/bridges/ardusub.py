@@ -1,28 +1,17 @@
-"""A stand-in for ArduSub: its side of the JSON interface, its motor matrix, and its depth, heading and position hold.
+"""A stand-in for ArduSub: its side of the JSON interface, and its depth, heading and position hold.
 
-It follows ArduPilot's sources and imports nothing of the package. `libraries/SITL/SIM_JSON.cpp`: packets, the parser of
-replies, the repetition of a packet without a reply, and the clock. `AP_Motors6DOF.cpp`: the factors of the frames, and
-the mixing. `AC_AttitudeControl_Sub.h`, `AC_PosControl.cpp` and `AC_PID.cpp`: the cascades, their default gains, filters
-and limits. What it leaves out: sensors with noise, the filter that estimates the state, and the shaping of targets.
+It follows ArduPilot's sources. `libraries/SITL/SIM_JSON.cpp`: packets, the parser of replies, the repetition of a
+packet without a reply, and the clock. The law of depth and heading is that of `examples/hold_level.py`.
 """
 
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import atan, copysign, cos, pi, radians, sin, sqrt
+from math import atan, cos, radians, sin
 from socket import AF_INET, SOCK_DGRAM, socket
 
-VECTORED_6DOF = (
-    (0, 0, 1, 0, -1, 1),
-    (0, 0, -1, 0, -1, -1),
-    (0, 0, -1, 0, 1, 1),
-    (0, 0, 1, 0, 1, -1),
-    (1, -1, 0, -1, 0, 0),
-    (-1, -1, 0, -1, 0, 0),
-    (1, 1, 0, -1, 0, 0),
-    (-1, 1, 0, -1, 0, 0),
-)
-"""Roll, pitch, yaw, throttle, forward and lateral factor of each motor."""
+from examples.hold_level import Hold, Motion, Pid
+
 KEYS = {"gyro": 3, "accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "timestamp": 1, "rng_1": 1}
 KEYS |= {"voltage": 1, "current": 1}
 _OPTIONAL = {"rng_1", "voltage", "current"}
@@ -66,45 +55,6 @@ def _atof(text: str) -> float:
     return float(text[:end])
 
 
-def part_of(frequency: float, dt: float) -> float:
-    """The part of a change that passes ArduPilot's low-pass filter of first order in a step."""
-    return dt / (dt + 0.5 / pi / frequency) if frequency else 1.0
-
-
-def sqrt_controller(error: float, p: float, most: float) -> float:
-    """The rate that removes an error: proportional at first, then such that the deceleration is at most `most`."""
-    linear = most / p**2
-    return p * error if abs(error) <= linear else copysign(sqrt(2.0 * most * (abs(error) - 0.5 * linear)), error)
-
-
-@dataclass
-class Pid:
-    """AC_PID: the filters of target, error and derivative (Hz, 0 for none), and the limit of the integrator."""
-
-    p: float
-    i: float
-    d: float
-    most: float
-    target_filter: float = 0.0
-    error_filter: float = 0.0
-    slope_filter: float = 0.0
-    integral: float = 0.0
-    slope: float = 0.0
-    _last: tuple[float, float] | None = None
-    """The filtered target and error of the last step."""
-
-    def __call__(self, target: float, measured: float, dt: float) -> float:
-        if self._last is None:
-            self._last = target, target - measured
-        wanted, before = self._last
-        wanted += part_of(self.target_filter, dt) * (target - wanted)
-        error = before + part_of(self.error_filter, dt) * (wanted - measured - before)
-        self.slope += part_of(self.slope_filter, dt) * ((error - before) / dt - self.slope)
-        self.integral = max(-self.most, min(self.most, self.integral + self.i * error * dt))
-        self._last = wanted, error
-        return self.p * error + self.integral + self.d * self.slope
-
-
 @dataclass
 class ArduSub:
     """ArduSub's depth hold, or its position hold if `place` is given, with the default gains."""
@@ -137,12 +87,8 @@ class ArduSub:
         self.socket.connect(("127.0.0.1", self.port))
         self.socket.settimeout(self.timeout)
         self.at: dict[str, list[float]] = {}
-        self.roll, self.pitch = (Pid(0.135, 0.09, 0.0036, 0.444, 30.0, 0.0, 30.0) for _ in range(2))
-        self.yaw = Pid(0.18, 0.018, 0.0, 0.222, 5.0, 0.0, 5.0)
-        self.climb = Pid(8.0, 0.0, 0.0, 1000.0, error_filter=5.0)  # from cm/s to cm/s2
-        self.rise = Pid(0.5, 0.1, 0.0, 100.0, error_filter=20.0)  # from cm/s2; 1000 is full throttle
+        self.hold = Hold(self.depth, self.heading)
         self.north, self.east = (Pid(1.0, 0.5, 0.0, 10.0, error_filter=5.0) for _ in range(2))  # from m/s to m/s2
-        self.throttle = 0.0
 
     def close(self) -> None:
         self.socket.close()
@@ -187,34 +133,18 @@ class ArduSub:
         if not self.at:
             return found
         dt = 1.0 / self.rate
-        (phi, theta, psi), gyro = self.at["attitude"], self.at["gyro"]
-        error = (self.heading - psi + pi) % (2 * pi) - pi
-        most = radians(120.0)  # AC_ATTITUDE_ACCEL_Y_CONTROLLER_MAX_RADSS, which also limits the error
-        yaw_rate = sqrt_controller(max(-most / 6.0, min(most / 6.0, error)), 6.0, most)
-        wanted = (-6.0 * phi, -6.0 * theta, yaw_rate)  # the rates by ATC_ANG_*_P
-        roll, pitch, yaw = (
-            pid(target, rate, dt)
-            for pid, target, rate in zip((self.roll, self.pitch, self.yaw), wanted, gyro, strict=True)
-        )
-        throttle = self._throttle(dt)
+        (phi, theta, _), (ax, ay, az) = self.at["attitude"], self.at["accel_body"]
+        fall = -sin(theta) * ax + sin(phi) * cos(theta) * ay + cos(phi) * cos(theta) * az + 9.80665
+        attitude, gyro = (self._vector(key) for key in ("attitude", "gyro"))
+        motion = Motion(attitude, gyro, self.at["position"][2], self.at["velocity"][2], fall)
         forward, lateral = self.sticks(self.time) if self.place is None else self._to_place(self.place, dt)
-        turns = [roll * f[0] + pitch * f[1] + throttle * f[3] for f in VECTORED_6DOF]
-        moves = [yaw * f[2] + forward * f[4] + lateral * f[5] for f in VECTORED_6DOF]
-        most_turn, most_move = max(1.0, *map(abs, turns)), max(1.0, *map(abs, moves))
-        for n, (turn, move) in enumerate(zip(turns, moves, strict=True)):
-            out = max(-1.0, min(1.0, turn / most_turn + move / most_move))
+        for n, out in enumerate(self.hold.outputs(motion, forward, lateral, dt)):
             found[n] = int(1500 + 400 * out)
         return found
 
-    def _throttle(self, dt: float) -> float:
-        """The throttle from -1 to 1: PSC_POSZ_P = 3, PILOT_ACCEL_Z = 100 cm/s2, and a filter of 2 Hz."""
-        (phi, theta, _), (ax, ay, az) = self.at["attitude"], self.at["accel_body"]
-        depth, down = self.at["position"][2], self.at["velocity"][2]
-        acceleration = self.climb(sqrt_controller(100.0 * (depth - self.depth), 3.0, 100.0), -100.0 * down, dt)
-        measured = -100.0 * (-sin(theta) * ax + sin(phi) * cos(theta) * ay + cos(phi) * cos(theta) * az + 9.80665)
-        asked = max(-1.0, min(1.0, 2e-3 * self.rise(acceleration, measured, dt)))
-        self.throttle += part_of(2.0, dt) * (asked - self.throttle)
-        return self.throttle
+    def _vector(self, key: str) -> tuple[float, float, float]:
+        x, y, z = self.at[key]
+        return x, y, z
 
     def _to_place(self, place: tuple[float, float], dt: float) -> tuple[float, float]:
         """Forward and lateral from -1 to 1, as lean angles of a copter over 45 degrees: PSC_POSXY_P = 1."""

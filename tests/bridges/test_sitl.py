@@ -18,6 +18,7 @@ from time import process_time
 import numpy as np
 import pytest
 
+from examples.hold_level import VECTORED_6DOF
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, servo_packet
@@ -28,7 +29,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed
+from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import THRUST_EFFECTS, pulsed

@@ -99,6 +99,7 @@ Leg = dict[str, Any]
 
 _FLY = """legs => {
     live.pause(true);
+    live.flight.isHeld = false;
     live.flight.reset();
     const { model } = live.flight.pilot;
     return legs.map(({ length, inputs, tuning }) => {

@@ -28,7 +28,7 @@ _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
 _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
-_SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
+_SCRIPTS = ("model.js", "hold.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,8 @@ def _axis(vehicle: Vehicle, axis: Axis, keys: str) -> dict[str, Any]:
         "positionUnit": axis.position_unit,
         "quantities": as_json(axis),
         "signs": vehicle.layout.signs(axis),
-        "shares": _shares(vehicle, axis),
+        "shares": (shares := _shares(vehicle, axis)),
+        "held": _held(vehicle, axis, shares),
         "keys": keys,
     }
 
@@ -200,6 +201,17 @@ def _shares(vehicle: Vehicle, axis: Axis) -> dict[str, float]:
     most = np.abs(shares).max(initial=0.0)
     found = {name: round(float(x / (most or 1.0)), 4) for name, x in zip(layout.commands, shares, strict=True)}
     return {name: share for name, share in found.items() if share}
+
+
+def _held(vehicle: Vehicle, axis: Axis, shares: Mapping[str, float]) -> dict[str, float]:
+    """Return the commands by which the hold drives an axis of a vehicle that rolls or pitches.
+
+    They leave alone the thrusters that only balance the others, as ArduSub's motor matrices do: the hold balances.
+    """
+    if not vehicle.layout.has_attitude:
+        return {}
+    signs = vehicle.layout.signs(axis)
+    return {name: share for name, share in shares.items() if name in signs} or dict(shares)
 
 
 def _thruster(vehicle: Vehicle, thruster: Thruster, label: str) -> dict[str, Any]:
