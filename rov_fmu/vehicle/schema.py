@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 from math import hypot
 from pathlib import Path
@@ -146,13 +147,10 @@ class Arm(_coefficients("Arm", ARM)):  # type: ignore[misc]
 _CURVE = {key: kind.filled(curve="curve", equation="") for key, kind in CURVE.items()}
 
 
-_Read = TypeVar("_Read", ThrustTable, CurrentTable)
-
-
-def _file_read_by(read: Callable[[Path], _Read]) -> BeforeValidator:
+def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
     """Return the validator of the name of a CSV file beside the vehicle file, which it reads."""
 
-    def read_file(name: object, info: ValidationInfo) -> _Read:
+    def read_file(name: object, info: ValidationInfo) -> object:
         if not isinstance(name, str):
             raise ValueError("must be text in quotes")
         path = inside_or_shipped(folder_of(info), name)
@@ -204,9 +202,9 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
 
     model_config = DOCUMENTED
 
-    description: Name | None = None
+    description: Name = ""
     """A short description of the thrusters with this curve, for example "rear pair"."""
-    equation: Name | None = None
+    equation: Name = ""
     """The equation or table in which the curve is published. A bare number, (9), is of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
     """The number of thrusters that gave the force together when the curve was measured."""
@@ -231,8 +229,8 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
             name,
             keys,
             self.together,
-            self.description or "",
-            self.equation or "",
+            self.description,
+            self.equation,
             tuple(measured),
             replace(current.table, voltage=current.voltage) if current else None,
         )
@@ -325,7 +323,7 @@ class Thruster(Strict):
 
     name: Symbol
     """The name. The FMU's variables for the command and the force contain it: `u_<name>`, `F_<name>`."""
-    description: Name | None = None
+    description: Name = ""
     """A short description, for example "left thruster"."""
     curve: str
     """The name of the thrust curve."""
@@ -349,7 +347,7 @@ class Fin(_coefficients("Fin", {key: kind.filled(fin="fin") for key, kind in FIN
 
     name: Symbol
     """The name. The FMU's variable for the command contains it: `u_<name>`."""
-    description: Name | None = None
+    description: Name = ""
     """A short description, for example "rudder"."""
     direction: Direction
     """The direction of the lift at a positive command while the vehicle moves ahead."""
@@ -366,7 +364,7 @@ def _driven(one: Thruster | Fin) -> dict[str, Any]:
     given = {"direction": one.direction, "position": one.position}
     return {
         "direction": _unit_vector(one.direction.value),
-        "description": one.description or "",
+        "description": one.description,
         "sources": {key: place.source for key, place in given.items() if place},
     }
 
@@ -443,7 +441,7 @@ class Tables(Strict):
         """The table of each axis that the vehicle has."""
         return {axis: table for name, axis in AXES.items() if (table := getattr(self.axes, name, None)) is not None}
 
-    @property
+    @cached_property
     def layout(self) -> Layout:
         """The layout of the vehicle, for the model."""
         axes = tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items())
