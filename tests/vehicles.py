@@ -126,6 +126,14 @@ THRUST_EFFECTS = EVERYTHING.with_name("thrust_effects.toml")
 SIX_AXES = EVERYTHING.with_name("six_axes.toml")
 
 
+def carried(vehicle: Vehicle) -> tuple[object, ...]:
+    """What the parts of a vehicle carry along and `==` does not compare."""
+    layout = vehicle.layout
+    tables = {curve.name: [table.path for table in curve.tables] for curve in layout.curves}
+    currents = {curve.name: curve.electric_current for curve in layout.curves}
+    return {one.name: {**one.sources} for one in layout.driven}, tables, currents, layout.voltage_source
+
+
 def four_axes(vehicle: Vehicle) -> Vehicle:
     """Return a vehicle without roll and pitch, if it has them: its net weight is then a constant load in heave."""
     rov = vehicle

@@ -22,7 +22,6 @@ from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.vehicle.thrust_table import CurrentTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 GRAVITY = 9.80665
@@ -62,8 +61,6 @@ class Setup:
     servos: Servos
     start: Mapping[str, float] = field(default_factory=dict)
     """Inputs that are held, states and Euler angles at the start, in SI units, by name."""
-    electric_currents: Mapping[str, CurrentTable] = field(default_factory=dict)
-    """The electric current of one thruster, by curve."""
     bottom: float = inf
     """The depth of the bottom, m."""
     log: Path | None = None
@@ -146,11 +143,10 @@ class Flight:
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self._held = {**layout.usual_inputs, **setup.start}
-        currents = setup.electric_currents
         self._draws = [
-            (currents[curve.name], layout.gains[thruster])
+            (current, layout.gains[thruster])
             for thruster, curve in layout.curve_of.items()
-            if curve.name in currents
+            if (current := curve.electric_current)
         ]
         self.log = Log(setup, most_rows) if setup.log and most_rows else None
 

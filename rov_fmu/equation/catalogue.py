@@ -12,7 +12,7 @@ which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the c
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, inf, pi
 
 from .attitude import INITIAL, QUATERNION
@@ -144,7 +144,7 @@ def cross_declaration(key: str, *velocities: str) -> "Declaration":
     first, *others = (axes[velocity] for velocity in velocities)
     rotations = sum(axis.is_rotation for axis in (first, *others))
     lengths = ".".join(axis.position_unit for axis in others)
-    return CROSS[key].declaration(
+    return CROSS[key].filled(
         inertia=("kg", "kg.m", "kg.m2")[min(rotations, 2)],
         load=first.load,
         axis=first.name,
@@ -177,7 +177,10 @@ DISPLAYS = {
 
 @dataclass(frozen=True)
 class Declaration:
-    """The declaration of a coefficient or a variable: SI unit, description, bounds (included), and a typical size."""
+    """The declaration of a coefficient or a variable: SI unit, description, bounds (included), and a typical size.
+
+    That of a kind of coefficient has fields {...} in its texts, which `filled` fills for one axis, curve or fin.
+    """
 
     unit: str
     description: str
@@ -190,122 +193,100 @@ class Declaration:
     is_share: bool = False
     """True for a share of a largest value, such as a command, which is shown in %. Other numbers without a unit, such
     as the parts of a quaternion, are not."""
+    needed: bool = True
+    """False for a coefficient that a vehicle need not have."""
 
     @property
     def display_unit(self) -> str | None:
         """The unit in which people read the quantity, or None if that is its own unit."""
         return None if self.unit == "1" and not self.is_share else DISPLAYS.get(self.unit, (None,))[0]
 
-
-@dataclass(frozen=True)
-class CoefficientKind:
-    """A kind of coefficient.
-
-    `unit` and `words` are templates. Their fields {...} are filled with the texts of an axis or a curve.
-    """
-
-    unit: str
-    words: str
-    minimum: float
-    maximum: float
-    needed: bool = True
-    tunable: bool = False
-
-    def declaration(self, **of: str) -> Declaration:
-        """Return the declaration of this coefficient for one axis or curve. `of` has the texts for the fields."""
-        words = self.words.format(**of)
-        return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
+    def filled(self, **texts: str) -> "Declaration":
+        """Return the declaration with its fields replaced by texts: {axis} by "surge"."""
+        return replace(self, unit=self.unit.format(**texts), description=self.description.format(**texts))
 
 
 BODY = {
-    "m_rov": CoefficientKind("kg", "Mass m_rov", 1e-3, 1e6),
-    "I_p": CoefficientKind("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
-    "I_q": CoefficientKind("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
-    "I_r": CoefficientKind("kg.m2", "Moment of inertia about the vertical axis I_r", 1e-6, 1e6),
+    "m_rov": Declaration("kg", "Mass m_rov", 1e-3, 1e6),
+    "I_p": Declaration("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
+    "I_q": Declaration("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
+    "I_r": Declaration("kg.m2", "Moment of inertia about the vertical axis I_r", 1e-6, 1e6),
 }
 RESTORING = {
-    "W": CoefficientKind("N", "Weight W", 0.0, 1e8),
-    "B": CoefficientKind("N", "Buoyancy B", 0.0, 1e8),
-    "x_G": CoefficientKind("m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False),
-    "y_G": CoefficientKind("m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False),
-    "z_G": CoefficientKind("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False),
-    "x_B": CoefficientKind("m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False),
-    "y_B": CoefficientKind("m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False),
-    "z_B": CoefficientKind("m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False),
+    "W": Declaration("N", "Weight W", 0.0, 1e8),
+    "B": Declaration("N", "Buoyancy B", 0.0, 1e8),
+    "x_G": Declaration("m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False),
+    "y_G": Declaration("m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False),
+    "z_G": Declaration("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False),
+    "x_B": Declaration("m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False),
+    "y_B": Declaration("m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False),
+    "z_B": Declaration("m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False),
 }
 """The weight and the buoyancy of a vehicle, with their centres."""
 CROSS = {
-    "m_a": CoefficientKind("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
-    "b_d": CoefficientKind("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),
-    "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic damping a_d in {axis} by {other}", -1e6, 1e6),
-    "lift": CoefficientKind("{load}.s2/{lengths}", "Lift in {axis} by {axes}", -1e6, 1e6),
+    "m_a": Declaration("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
+    "b_d": Declaration("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),
+    "a_d": Declaration("{load}.s2/{length}2", "Quadratic damping a_d in {axis} by {other}", -1e6, 1e6),
+    "lift": Declaration("{load}.s2/{lengths}", "Lift in {axis} by {axes}", -1e6, 1e6),
 }
 """The coefficients of two or three axes.
 
 Their names end in the velocities, as in m_a_uq. The name of a lift begins with the letter of the force, as in Y_ur."""
-COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
+COMMANDS = {"T_d": Declaration("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
 """The coefficients of all commands together."""
 _QUARTER = 1.5708
 """A quarter of a turn, rad. It is rounded up, because a file may have 1.5708."""
 ARM = {
-    "R": CoefficientKind("m", "Distance from the centre of mass to a rear thruster R", 0.0, 100.0),
-    "gamma": CoefficientKind("rad", "Angle of the rear thrusters' force about the centre of mass γ", 0.0, _QUARTER),
+    "R": Declaration("m", "Distance from the centre of mass to a rear thruster R", 0.0, 100.0),
+    "gamma": Declaration("rad", "Angle of the rear thrusters' force about the centre of mass γ", 0.0, _QUARTER),
 }
 FIN = {
-    "lift": CoefficientKind("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
-    "drag": CoefficientKind(
-        "N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, needed=False
-    ),
-    "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
+    "lift": Declaration("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
+    "drag": Declaration("N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, needed=False),
+    "angle_max": Declaration("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
 }
 """The coefficients of a control surface."""
 CURVE = {
-    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
-    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
-    "n_V": CoefficientKind(
+    "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
+    "V_0": Declaration("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
+    "n_V": Declaration(
         "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False
     ),
-    "a_t": CoefficientKind("N", "Quadratic thrust coefficient a_t of the {curve}{equation}", -1e6, 1e6),
-    "b_t": CoefficientKind("N", "Linear thrust coefficient b_t of the {curve}{equation}", -1e6, 1e6),
-    "a_t_reverse": CoefficientKind(
+    "a_t": Declaration("N", "Quadratic thrust coefficient a_t of the {curve}{equation}", -1e6, 1e6),
+    "b_t": Declaration("N", "Linear thrust coefficient b_t of the {curve}{equation}", -1e6, 1e6),
+    "a_t_reverse": Declaration(
         "N", "Quadratic thrust coefficient a_t of the {curve} in reverse", -1e6, 1e6, needed=False
     ),
-    "b_t_reverse": CoefficientKind(
-        "N", "Linear thrust coefficient b_t of the {curve} in reverse", -1e6, 1e6, needed=False
-    ),
-    "c_0": CoefficientKind(
-        "1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False
-    ),
-    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
-    "d": CoefficientKind(
+    "b_t_reverse": Declaration("N", "Linear thrust coefficient b_t of the {curve} in reverse", -1e6, 1e6, needed=False),
+    "c_0": Declaration("1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False),
+    "c_0_reverse": Declaration("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
+    "d": Declaration(
         "N.s/m", "Loss of thrust d of the {curve} per speed of advance at full command", 0.0, 1e6, needed=False
     ),
-    "d_reverse": CoefficientKind(
+    "d_reverse": Declaration(
         "N.s/m", "Loss of thrust d of the {curve} per speed of advance in reverse", 0.0, 1e6, needed=False
     ),
-    "T": CoefficientKind(
-        "s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False
-    ),
+    "T": Declaration("s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False),
 }
 REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
 """The keys of CURVE that a curve with measured forces does not have."""
 AXIS = {
-    "m_a": CoefficientKind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
-    "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}", 0.0, 1e6),
-    "b_d": CoefficientKind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}", 0.0, 1e6),
-    "a_d_reverse": CoefficientKind(
+    "m_a": Declaration("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
+    "a_d": Declaration("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}", 0.0, 1e6),
+    "b_d": Declaration("{load}.s/{length}", "Linear drag coefficient b_d of {axis}", 0.0, 1e6),
+    "a_d_reverse": Declaration(
         "{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6, needed=False
     ),
-    "b_d_reverse": CoefficientKind(
+    "b_d_reverse": Declaration(
         "{load}.s/{length}", "Linear drag coefficient b_d of {axis} {negative}", 0.0, 1e6, needed=False
     ),
-    "F_0": CoefficientKind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
+    "F_0": Declaration("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
 AT_ZERO = "; at 0 the velocity never changes"
 """The end of the description of β for the axes whose β may be 0."""
 TUNING = {
-    "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}", 0.0, 1e3, needed=False, tunable=True),
-    "beta": CoefficientKind(
+    "alpha": Declaration("1", "Tuning α_{velocity}: scales {push} in {axis}", 0.0, 1e3, needed=False, tunable=True),
+    "beta": Declaration(
         "1",
         "Tuning β_{velocity}: scales acceleration in {axis}" + AT_ZERO,
         0.0,
@@ -319,9 +300,9 @@ LEAST_BETA = 1e-3
 """The least β of coupled axes."""
 
 
-def declarations_of(axis: Axis) -> dict[str, Declaration]:
-    """Return the declarations of all coefficients that an axis can have, by their keys."""
-    words = {
+def axis_words(axis: Axis) -> dict[str, str]:
+    """Return the texts of an axis for the fields of AXIS and TUNING."""
+    return {
         "axis": axis.name,
         "velocity": axis.velocity,
         "push": axis.push,
@@ -332,7 +313,11 @@ def declarations_of(axis: Axis) -> dict[str, Declaration]:
         "positive": axis.positive,
         "negative": axis.negative,
     }
-    return {key: kind.declaration(**words) for key, kind in (AXIS | TUNING).items()}
+
+
+def declarations_of(axis: Axis) -> dict[str, Declaration]:
+    """Return the declarations of all coefficients that an axis can have, by their keys."""
+    return {key: kind.filled(**axis_words(axis)) for key, kind in (AXIS | TUNING).items()}
 
 
 # ---- Kinds of variables ----------------------------------------------------------------------------------------------

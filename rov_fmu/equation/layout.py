@@ -2,14 +2,18 @@
 
 A layout does not contain the values of the coefficients. `catalogue.py` declares the kinds of coefficients and
 variables. Standard library only.
+
+Two layouts are equal if the same compiled equation serves both. What a part only carries along, such as the source of a
+direction, is not compared.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, sin
-from typing import TypeVar
+from pathlib import Path
+from typing import NamedTuple, TypeVar
 
 from .catalogue import (
     ANGLES,
@@ -38,12 +42,12 @@ from .catalogue import (
     YAW,
     Axis,
     Declaration,
+    axis_words,
     cited,
     coefficient_name,
     command_declaration,
     cross_declaration,
     cross_name,
-    declarations_of,
     delayed_declaration,
     delayed_name,
     load_declaration,
@@ -67,6 +71,8 @@ class ThrustTable:
     """The derivative of the force with respect to the command, at each command, N."""
     voltage: float = 0.0
     """The voltage at which the table was measured, V; 0 if the curve has only this table."""
+    path: Path | None = field(default=None, compare=False)
+    """The file with the table."""
 
     @property
     def function(self) -> str:
@@ -80,25 +86,47 @@ class ThrustTable:
         """
         return float(interpolated(command, (self.commands, self.forces, self.slopes)))
 
-    def slope(self, command: float) -> float:
-        """Return the derivative of `force` with respect to the command."""
-        f, g, a, b, h, t = self._interval(command)
-        return (a + t * (2.0 * (3.0 * (g - f) - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * (g - f)))) / h
 
-    def _interval(self, command: float) -> tuple[float, float, float, float, float, float]:
-        """Return the interval of a command.
+@dataclass(frozen=True)
+class CurrentTable:
+    """The electric current of one thruster over its command, measured at one voltage."""
 
-        It has the forces at its ends, the slopes there times its length, its length, and the share of it that lies
-        below the command.
-        """
-        n = min(max(bisect_right(self.commands, command) - 1, 0), len(self.commands) - 2)
-        h = self.commands[n + 1] - self.commands[n]
-        t = (command - self.commands[n]) / h
-        return self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1], h, t
+    path: Path
+    commands: tuple[float, ...]
+    """The commands, from -1 to 1 in rising order."""
+    currents: tuple[float, ...]
+    """The current at each command, A."""
+    voltage: float = 0.0
+    """The voltage at which the currents were measured, V."""
+
+    def current(self, command: float) -> float:
+        """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
+        n = bisect_right(self.commands, command)
+        if n in (0, len(self.commands)):
+            return self.currents[min(n, len(self.commands) - 1)]
+        low, high = self.commands[n - 1 : n + 1]
+        return self.currents[n - 1] + (command - low) / (high - low) * (self.currents[n] - self.currents[n - 1])
+
+
+class Part:
+    """A part of a layout with optional coefficients: a thrust curve or an axis."""
+
+    keys: tuple[str, ...]
+    others: tuple[tuple[str, str], ...]
+
+    @property
+    def owner(self) -> str:
+        """The end of the names of its coefficients."""
+        raise NotImplementedError
+
+    def coefficient(self, key: str) -> str:
+        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
+        key = key if key in self.keys else key.removesuffix(REVERSE)
+        return dict(self.others).get(key) or coefficient_name(key, self.owner)
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(Part):
     """A thrust curve.
 
     For c > 0, the force of `together` thrusters is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
@@ -114,12 +142,15 @@ class Curve:
     """Where the curve is published: the number of an equation of the paper, or another source."""
     tables: tuple[ThrustTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
+    electric_current: CurrentTable | None = field(default=None, compare=False)
+    """The current of one thruster. All curves of a vehicle have it, or none."""
     others: tuple[tuple[str, str], ...] = ()
     """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
 
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        return _coefficient(self, key, self.name)
+    @property
+    def owner(self) -> str:
+        """The name of the curve."""
+        return self.name
 
     @property
     def has_lag(self) -> bool:
@@ -157,6 +188,8 @@ class Thruster:
     arm: int = 0
     """1 on the port side, where a force ahead turns the bow to starboard; -1 on the starboard side; 0 without arm."""
     description: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict, compare=False)
+    """The sources of `direction` and `position`."""
 
     def effect(self, axis: Axis) -> float:
         """Return the force along an axis, or the torque about it, of a thrust of 1 N.
@@ -179,6 +212,8 @@ class Fin:
     """The position relative to the centre of mass, m."""
     has_drag: bool = False
     description: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict, compare=False)
+    """The sources of `direction` and `position`."""
 
     def effect(self, axis: Axis) -> float:
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
@@ -191,7 +226,7 @@ class Fin:
 
 
 @dataclass(frozen=True)
-class VehicleAxis:
+class VehicleAxis(Part):
     """An axis of a vehicle."""
 
     axis: Axis
@@ -200,17 +235,25 @@ class VehicleAxis:
     others: tuple[tuple[str, str], ...] = ()
     """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
 
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        return _coefficient(self, key, self.axis.velocity)
-
-
-def _coefficient(part: Curve | VehicleAxis, key: str, owner: str) -> str:
-    key = key if key in part.keys else key.removesuffix(REVERSE)
-    return dict(part.others).get(key) or coefficient_name(key, owner)
+    @property
+    def owner(self) -> str:
+        """The velocity along the axis."""
+        return self.axis.velocity
 
 
 _Part = TypeVar("_Part", Curve, VehicleAxis)
+
+
+class Owner(NamedTuple):
+    """A table of the vehicle file with coefficients."""
+
+    place: tuple[str, ...]
+    """The tables around it, and its own name."""
+    names: Mapping[str, str]
+    """The names of its coefficients, by key."""
+    kinds: Mapping[str, Declaration]
+    words: Mapping[str, str]
+    """What fills the fields in the texts of `kinds`."""
 
 
 @dataclass(frozen=True)
@@ -239,6 +282,8 @@ class Layout:
     """The usual voltage of the battery, V, if the thrust depends on it."""
     pulse: tuple[float, float, float] | None = None
     """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
+    voltage_source: str = field(default="", compare=False)
+    """The source of `voltage`."""
 
     def __post_init__(self) -> None:
         """Name the coefficients. The curves main and main_reverse would both have a coefficient d_main_reverse.
@@ -247,30 +292,34 @@ class Layout:
         """
         taken = {*(f"F_{thruster.name}" for thruster in self.thrusters), *(COMMANDS if self.has_dead_time else ())}
 
-        def named(part: _Part, owner: str) -> _Part:
+        def named(part: _Part) -> _Part:
             others = []
             for key in part.keys:
-                name = coefficient_name(key, owner)
+                name = coefficient_name(key, part.owner)
                 found = unused(name, taken)
                 taken.add(found)
                 others += [(key, found)] if found != name else []
             return replace(part, others=tuple(others)) if others or part.others else part
 
-        object.__setattr__(self, "axes", tuple(named(form, form.axis.velocity) for form in self.axes))
-        object.__setattr__(self, "curves", tuple(named(curve, curve.name) for curve in self.curves))
+        object.__setattr__(self, "axes", tuple(map(named, self.axes)))
+        object.__setattr__(self, "curves", tuple(map(named, self.curves)))
+
+    def with_keys(self, has: Callable[[Part, str], bool]) -> "Layout":
+        """Return the layout whose curves and axes have just the coefficients for which `has(part, key)` is true."""
+
+        def keys(part: Part, kinds: Iterable[str]) -> tuple[str, ...]:
+            return tuple(key for key in kinds if has(part, key))
+
+        return replace(
+            self,
+            axes=tuple(replace(form, keys=keys(form, AXIS)) for form in self.axes),
+            curves=tuple(replace(curve, keys=keys(curve, CURVE)) for curve in self.curves),
+        )
 
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
         wanted = set(names) - self.coefficients.keys()
-
-        def keys(kinds: Iterable[str], has: tuple[str, ...], of: str) -> tuple[str, ...]:
-            return tuple(key for key in kinds if key in has or coefficient_name(key, of) in wanted)
-
-        return replace(
-            self,
-            axes=tuple(replace(form, keys=keys(AXIS, form.keys, form.axis.velocity)) for form in self.axes),
-            curves=tuple(replace(curve, keys=keys(CURVE, curve.keys, curve.name)) for curve in self.curves),
-        )
+        return self.with_keys(lambda part, key: key in part.keys or coefficient_name(key, part.owner) in wanted)
 
     # -- lookup --
 
@@ -350,30 +399,39 @@ class Layout:
     # -- declarations --
 
     @cached_property
-    def coefficients(self) -> dict[str, Declaration]:
-        """The coefficients, in the order of the FMU's variables."""
+    def owners(self) -> tuple[Owner, ...]:
+        """The tables of the vehicle file with coefficients, in the order of the FMU's variables, except [cross]."""
         inertias = {form.axis.inertia for form in self.axes}
-        found = {name: kind.declaration() for name, kind in BODY.items() if name in inertias}
-        found |= {key: RESTORING[key].declaration() for key in self.restoring}
-        if self.has_arm:
-            found |= {key: kind.declaration() for key, kind in ARM.items()}
-        if self.has_dead_time:
-            found |= {key: kind.declaration() for key, kind in COMMANDS.items()}
+        dead_time = COMMANDS if self.has_dead_time else {}
+        found = [
+            Owner(("body",), {key: key for key in BODY if key in inertias}, BODY, {}),
+            Owner(("body",), {key: key for key in self.restoring}, RESTORING, {}),
+            Owner(("arm",), {key: key for key in ARM if self.has_arm}, ARM, {}),
+            Owner(("commands",), {key: key for key in dead_time}, COMMANDS, {}),
+        ]
         for curve in self.curves:
             words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-            found |= {
-                curve.coefficient(key): kind.declaration(**words) for key, kind in CURVE.items() if key in curve.keys
-            }
+            names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
+            found.append(Owner(("curves", curve.name), names, CURVE, words))
         for fin in self.fins:
-            fins = {"fin": fin.description or f"fin {fin.name}"}
-            keys = (key for key in FIN if key != "drag" or fin.has_drag)
-            found |= {fin.coefficient(key): FIN[key].declaration(**fins) for key in keys}
-        for form in self.axes:
-            declared = declarations_of(form.axis)
-            found |= {form.coefficient(key): declared[key] for key in AXIS if key in form.keys}
-        for form in self.axes:
-            declared = declarations_of(form.axis)
-            found |= {form.axis.coefficient(key): declared[key] for key in TUNING}
+            names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
+            found.append(Owner(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"}))
+        for kinds in (AXIS, TUNING):
+            for form in self.axes:
+                names = {key: form.coefficient(key) for key in kinds if kinds is TUNING or key in form.keys}
+                found.append(Owner(("axes", form.axis.name), names, kinds, axis_words(form.axis)))
+        return tuple(found)
+
+    @cached_property
+    def keys_in_file(self) -> dict[str, tuple[str, ...]]:
+        """The tables and the key of each coefficient in the vehicle file, by its name in the FMU."""
+        found = {name: (*one.place, key) for one in self.owners for key, name in one.names.items()}
+        return found | {name: ("cross", name) for name in (cross_name(*row) for row in self.cross)}
+
+    @cached_property
+    def coefficients(self) -> dict[str, Declaration]:
+        """The coefficients, in the order of the FMU's variables."""
+        found = {name: one.kinds[key].filled(**one.words) for one in self.owners for key, name in one.names.items()}
         for key, *velocities in self.cross:
             found[cross_name(key, *velocities)] = cross_declaration(key, *velocities)
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite

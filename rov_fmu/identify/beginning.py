@@ -304,8 +304,8 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
             measured_at = tests.given.description.measured_at.get(curve.name, mean)
             more[coefficient_name("V_0", curve.name)] = base.get(coefficient_name("V_0", curve.name), measured_at)
             more[coefficient_name("n_V", curve.name)] = USUAL_EXPONENT if is_exact else 0.0
-    powered = Vehicle(replace(vehicle.layout, voltage=round(mean, 3)), vehicle.coefficients)
-    return powered.extended(more)
+    layout = replace(vehicle.layout, voltage=round(mean, 3), voltage_source="Mean voltage of the logs")
+    return Vehicle(layout, vehicle.coefficients).extended(more)
 
 
 def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:

@@ -13,10 +13,9 @@ from rov_fmu.equation.catalogue import (
     REVERSE,
     YAW,
     Axis,
-    CoefficientKind,
     coefficient_name,
 )
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout, Part
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.description import Description, Requests
@@ -43,8 +42,6 @@ class GivenVehicle:
     needs. The fits add reverse thrust, dead band, lag and load if they find them."""
     known: Mapping[str, Quantity]
     """The coefficients that are given, not identified."""
-    thruster_sources: Mapping[str, Mapping[str, str]]
-    """The sources of each thruster's direction and position."""
     base: Mapping[str, float]
     """The coefficients of the base and those that are known: the centre of the prior."""
     requests: Requests
@@ -113,7 +110,6 @@ def _given(description: Description, head: Head, layout: Layout, known: Mapping[
         head=head,
         vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
-        thruster_sources={one.name: description.thruster_sources[one.name] for one in layout.driven},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
         requests=description.requests.of({curve.name for curve in layout.curves}),
     )
@@ -149,25 +145,20 @@ def _kept_from_base(description: Description, tested: TestContents) -> dict[str,
 
 def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
     """Drop the coefficients that a vehicle need not have, unless they are known."""
-
-    def remaining(keys: tuple[str, ...], kinds: Mapping[str, CoefficientKind], owner: str) -> tuple[str, ...]:
-        return tuple(key for key in keys if kinds[key].needed or coefficient_name(key, owner) in known)
-
-    axes = tuple(replace(form, keys=remaining(form.keys, AXIS, form.axis.velocity)) for form in layout.axes)
-    curves = tuple(replace(curve, keys=remaining(curve.keys, CURVE, curve.name)) for curve in layout.curves)
-    return replace(layout, axes=axes, curves=curves)
+    kinds = AXIS | CURVE
+    return layout.with_keys(
+        lambda part, key: key in part.keys and (kinds[key].needed or coefficient_name(key, part.owner) in known)
+    )
 
 
 def _with_every_effect(layout: Layout, requests: Requests) -> Layout:
     """Return the layout with all coefficients that the fits may add, so that their names can be checked beforehand."""
     asked: dict[str, tuple[str, ...]] = {"T": requests.lag, "d": (), "d_reverse": ()}
 
-    def keys(curve: Curve) -> tuple[str, ...]:
-        return tuple(key for key in CURVE if key in curve.keys or curve.name in asked.get(key, (curve.name,)))
+    def has(part: Part, key: str) -> bool:
+        return key not in asked or key in part.keys or part.owner in asked[key]
 
-    axes = tuple(replace(form, keys=tuple(AXIS)) for form in layout.axes)
-    curves = tuple(replace(curve, keys=keys(curve)) for curve in layout.curves)
-    return replace(layout, axes=axes, curves=curves, has_dead_time=True)
+    return replace(layout.with_keys(has), has_dead_time=True)
 
 
 def _is_tested_or_known(axis: Axis, tested: TestContents, known: Collection[str]) -> bool:

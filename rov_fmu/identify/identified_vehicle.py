@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from rov_fmu import __version__
-from rov_fmu.equation.catalogue import REVERSE, Axis
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.catalogue import REVERSE
+from rov_fmu.equation.layout import Curve, Layout, Part, VehicleAxis
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.likelihood.curves import fitted
 from rov_fmu.identify.likelihood.fit import Fit
@@ -83,8 +83,6 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         estimates=estimates,
         provenance=made,
         measured_from=_data(fit),
-        voltage_source="" if layout.voltage is None else "Mean voltage of the logs",
-        thruster_sources=given.thruster_sources,
     )
     return vehicle, coefficients
 
@@ -155,40 +153,31 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     base, own = tests.given.base, tests.given.description.known
     coefficients = table.coefficients(fit.kept.z.tolist())
 
-    def has_axis_key(axis: Axis, key: str) -> bool:
-        if axis.coefficient(key) in own:
-            return True
-        if key == "F_0":
-            return coefficients[axis.coefficient(key)] != 0.0
-        if key.endswith(REVERSE):
-            return axis.coefficient(key) in base or ("drag astern", axis.name) in present
-        return True
-
-    def has_curve_key(curve: Curve, key: str) -> bool:
-        if curve.coefficient(key) in own:
-            return True
-        if key.startswith("c_0"):
-            return coefficients[curve.coefficient(key)] > 0.0
+    def has(part: Part, key: str) -> bool:
+        name = part.coefficient(key)
+        if key not in part.keys or name in own:
+            return key in part.keys
         if key in ("V_0", "n_V"):
             return with_voltage
-        if key == "T":
-            return coefficients[curve.coefficient(key)] > LEAST_LAG * 1.0001
-        if key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
-            is_measured = curve.coefficient(key) in tests.given.known or _has_backward_rows(tests, curve)
-            return curve.coefficient(key) in base or is_measured or ("reverse thrust", curve.name) in present
+        if key in ("F_0", "T") or key.startswith("c_0"):
+            value = coefficients[name]
+            return {"F_0": value != 0.0, "T": value > LEAST_LAG * 1.0001}.get(key, value > 0.0)
+        if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
+            return name in base or ("drag astern", part.axis.name) in present
+        if isinstance(part, Curve) and key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
+            is_measured = name in tests.given.known or _has_backward_rows(tests, part)
+            return name in base or is_measured or ("reverse thrust", part.name) in present
         return True
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
     with_voltage = tests.given.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
     return replace(
-        layout,
+        layout.with_keys(has),
         voltage=layout.voltage if with_voltage else None,
         mix=tests.given.vehicle.layout.mix,
         pulse=tests.given.vehicle.layout.pulse,
         has_dead_time=tests.given.vehicle.layout.has_dead_time,
-        axes=tuple(replace(f, keys=tuple(k for k in f.keys if has_axis_key(f.axis, k))) for f in layout.axes),
-        curves=tuple(replace(c, keys=tuple(k for k in c.keys if has_curve_key(c, k))) for c in layout.curves),
     )
 
 

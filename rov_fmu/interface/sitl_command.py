@@ -97,8 +97,7 @@ def _setup(path: Path, options: Options) -> Setup:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = {name: float(value) for name, value in inputs.items()} | given.start
-    currents, interval = vehicle.electric_currents, 1.0 / options.log_rate
-    return Setup(vehicle, servos, start, currents, options.bottom, options.log, interval, options.force)
+    return Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.equation.catalogue import AXES, AXIS, CURVE, PITCH, REVERSE, ROLL, Declaration, coefficient_name
+from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Declaration, coefficient_name
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -27,15 +27,14 @@ from rov_fmu.io.toml_file import (
     key_line,
     problem_lines,
     read_toml,
-    validate,
 )
 from rov_fmu.tank.commands import LogKeys
-from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
+from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Finite, Quantity
-from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, keys_in_file, with_missing_keys
-from rov_fmu.vehicle.shipped import PAPER, PAPER_SOURCES, SHIPPED
+from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, read_tables
+from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
@@ -219,8 +218,6 @@ class Description:
     """The names of all coefficients in the file, including those whose entry has a mistake."""
     base_quantities: Mapping[str, Quantity]
     """The coefficients that the base gives; tests replace them."""
-    thruster_sources: Mapping[str, Mapping[str, str]]
-    """The sources of each thruster's direction and position."""
     requests: Requests
     """What is fitted on request, with the names of the curves."""
     measured_at: Mapping[str, float]
@@ -233,7 +230,7 @@ class Description:
     @property
     def has_hardware_tables(self) -> bool:
         """True if the file itself describes the thrusters; otherwise they are those of the base or of the paper."""
-        return not self.base_name and self.thruster_sources is not PAPER_SOURCES
+        return not self.base_name and bool(self.tables.thruster)
 
     @property
     def logged(self) -> Layout:
@@ -268,9 +265,7 @@ NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
 def read_description(path: Path) -> RovFile:
     """Read rov.toml. Raises VehicleFileError where there is no such file, or where it is not TOML."""
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
-    _, problems = validate(data, RovTables, **context)
-    problems = with_missing_keys(problems, data, RovTables, ("vehicle",), ("fin",))
-    file, lost = readable_parts(data, problems, context, RovTables)
+    file, problems, lost = read_tables(data, RovTables, context, ("vehicle",), ("fin",))
     base, base_mistakes = _load_base(file)
     mistakes = [*_hardware_mistakes(file, lost, data)]
     description, of_hardware = None, {"base", "axes", *_HARDWARE_TABLES}
@@ -323,7 +318,7 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
 def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> Description:
     """Put together the description from the parts of the file and the base."""
     own_layout = file.layout
-    start, thruster_sources, limits = _start(file, base)
+    start = base.layout if base else file.layout if file.thruster else PAPER
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
     # With `[fit] voltage`, V_0 belongs to the effect that is fitted.
     names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
@@ -339,22 +334,11 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
         base_quantities=_quantities(base) if base else {},
-        thruster_sources=thruster_sources,
         requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
         measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
-        limits=limits,
+        limits=file.validity.limits if file.validity else base.limits if base else (),
         base_name=data.get("base", ""),
     )
-
-
-def _start(file: RovTables, base: Vehicle | None) -> tuple[Layout, Mapping[str, Mapping[str, str]], tuple[str, ...]]:
-    """Return the layout to begin with, the sources of its thrusters, and the limits of the vehicle."""
-    limits = file.validity.limits if file.validity else base.limits if base else ()
-    if base:
-        return base.layout, base.thruster_sources, limits
-    if file.thruster:
-        return file.layout, file.thruster_sources, limits
-    return PAPER, PAPER_SOURCES, limits
 
 
 def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
@@ -446,7 +430,7 @@ def _mistakes_in_known(file: RovTables, description: Description) -> Iterator[st
     for _ in unknown[MOST:]:
         yield ""  # is only counted
     yield from check_quantities("known", {name: q for name, q in file.known.items() if name in possible}, possible)
-    tables = dict(keys_in_file(description.layout))
+    tables = description.layout.keys_in_file
     for name, quantity in file.quantities(description.layout).items():
         if quantity and name in file.known:
             yield key_line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
@@ -454,16 +438,12 @@ def _mistakes_in_known(file: RovTables, description: Description) -> Iterator[st
 
 def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:
     """Return every coefficient that a vehicle with these axes and curves could have."""
-    return replace(
-        layout,
-        axes=tuple(VehicleAxis(form.axis, tuple(AXIS)) for form in layout.axes),
-        curves=tuple(replace(curve, keys=tuple(CURVE)) for curve in layout.curves),
-    ).coefficients
+    return layout.with_keys(lambda *_: True).coefficients
 
 
 def _missing_halves(file: RovTables, description: Description) -> Iterator[str]:
     """Yield a line for each coefficient without its partner, unless check_names_and_keys reports it already."""
-    given, tables = {*description.base_quantities, *description.known}, dict(keys_in_file(description.layout))
+    given, tables = {*description.base_quantities, *description.known}, description.layout.keys_in_file
     layout = description.layout
     for owner in (*(curve.name for curve in layout.curves), *(form.axis.velocity for form in layout.axes)):
         for keys in _PAIRS:

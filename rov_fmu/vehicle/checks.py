@@ -2,9 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import sin
-from typing import Any, TypeVar
-
-from pydantic_core import ErrorDetails
 
 from rov_fmu.equation.catalogue import (
     ARM,
@@ -23,7 +20,6 @@ from rov_fmu.equation.catalogue import (
     SURGE,
     YAW,
     Axis,
-    CoefficientKind,
     Declaration,
     cross_declaration,
     cross_name,
@@ -31,34 +27,10 @@ from rov_fmu.equation.catalogue import (
 )
 from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.io.messages import did_you_mean, listed, only, shown
-from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
+from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, File, Tables, given_quantities
-
-_Model = TypeVar("_Model", bound=Tables)
-_TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
-"""If an entry of one of these tables has a mistake, the other entries can still be checked."""
-
-
-def readable_parts(
-    data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object], model: type[_Model]
-) -> tuple[_Model, set[str]]:
-    """Return the file without the tables that could not be read, and the names of the top-level tables among these."""
-    parts: dict[str, Any] = dict(data)
-    wrong: dict[str, set[int | str | None]] = {}
-    for place in (problem["loc"] for problem in problems):
-        wrong.setdefault(str(place[0]), set()).add(place[1] if len(place) > 1 else None)
-    for name, wrong_entries in wrong.items():
-        table = parts.pop(name, None)
-        if name in _TABLES_OF_TABLES and None not in wrong_entries:
-            if isinstance(table, list):
-                parts[name] = [entry for n, entry in enumerate(table) if n not in wrong_entries]
-            elif isinstance(table, dict):
-                parts[name] = {key: entry for key, entry in table.items() if key not in wrong_entries}
-    readable, _ = validate(parts, model, **context)
-    assert readable is not None, "every table with a mistake is left out"
-    return readable, {*wrong}
 
 
 def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
@@ -217,7 +189,7 @@ def _check_tables_of_thrust(parts: File) -> Iterator[str]:
 
 def _check_electric_currents(parts: File) -> Iterator[str]:
     """Check that all curves have the electric current at one voltage, or none has it."""
-    given = parts.electric_currents
+    given = {name: current for name, curve in parts.curves.items() if (current := curve.electric_current)}
     if not given:
         return
     first, known = next(iter(given.items()))
@@ -287,7 +259,7 @@ def no_thrust(curve: Curve, values: Mapping[str, float], place: str) -> Iterator
 
 
 def _check_needed_keys(
-    name: str, table: Strict, kinds: Mapping[str, CoefficientKind], needed: Mapping[str, Axis]
+    name: str, table: Strict, kinds: Mapping[str, Declaration], needed: Mapping[str, Axis]
 ) -> Iterator[str]:
     """Check that a table has the coefficients that are needed, each by an axis, and no others."""
     quantities = given_quantities(table, kinds)

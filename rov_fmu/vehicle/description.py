@@ -91,6 +91,7 @@ class FileHead(Head):
     from their geometry."""
 
 
+_Sentences = Annotated[tuple[Text, ...], BeforeValidator(as_tuple)]
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -108,7 +109,7 @@ class Validity(Strict):
     """The strongest thruster command for which the model was identified, as a fraction of the full command."""
     command_min: Annotated[_Command, AfterValidator(_below_maximum)]
     """The weakest thruster command for which the model was identified."""
-    limits: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    limits: _Sentences = ()
     """Known effects on this vehicle that the model leaves out, in sentences. They appear in the FMU's documentation."""
 
     @property
@@ -136,17 +137,17 @@ class Provenance(Strict):
     """The tool that made the file."""
     method: Text
     """How the tool made the file."""
-    inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
-    """The SHA-256 of every input file, by file name."""
-    warnings: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """What the data do not determine, and what speaks against the model, in sentences."""
-    facts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """What was found, and what was done with the data, in sentences."""
-    verdicts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """Whether the model of each axis may be trusted, with the reasons."""
-    errors: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """The errors of predictions of unseen data."""
-    tested: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`."""
     report: Annotated[Path, BeforeValidator(_report), _NAME_OF_REPORT] | None = None
     """The name of the report, a file beside this one. A build puts it into the FMU."""
+    verdicts: _Sentences = ()
+    """Whether the model of each axis may be trusted, with the reasons."""
+    errors: _Sentences = ()
+    """The errors of predictions of unseen data."""
+    tested: _Sentences = ()
+    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`."""
+    warnings: _Sentences = ()
+    """What the data do not determine, and what speaks against the model, in sentences."""
+    facts: _Sentences = ()
+    """What was found, and what was done with the data, in sentences."""
+    inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
+    """The SHA-256 of every input file, by file name."""

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 from math import hypot
 from pathlib import Path
@@ -23,18 +24,15 @@ from rov_fmu.equation.catalogue import (
     FIN,
     REPLACED_BY_TABLE,
     RESTORING,
-    TUNING,
     Axis,
-    CoefficientKind,
     Declaration,
-    cross_name,
     cross_of,
     declarations_of,
 )
-from rov_fmu.equation.layout import Layout, ThrustTable, VehicleAxis
+from rov_fmu.equation.layout import CurrentTable, Layout, ThrustTable, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.paths import inside_or_shipped
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, as_tuple, folder_of, table_of
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, as_tuple, folder_of, table_of, validate
 from rov_fmu.vehicle.description import FileHead, Provenance, Validity
 from rov_fmu.vehicle.quantity import (
     CrossSymbol,
@@ -48,7 +46,7 @@ from rov_fmu.vehicle.quantity import (
     not_blank,
     quantity,
 )
-from rov_fmu.vehicle.thrust_table import CurrentTable, ThrustFile, read_current, read_thrust
+from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 
 FORMAT = 2
 UNTUNED = 1.0
@@ -65,29 +63,29 @@ _MOST_COEFFICIENTS = 1000
 def _coefficients(
     name: str,
     declarations: Mapping[str, Declaration],
-    kinds: Mapping[str, CoefficientKind] = _NONE,
     words: str = "",
     negative: Mapping[str, str] = _NONE,
+    needed: bool = True,
 ) -> Any:
     """Return a table with a key for each coefficient, of which any may be missing.
 
-    Editors are told which a vehicle file must have: the needed ones of `kinds`. `negative` says, by the key, what to
-    give instead of a negative value.
+    Editors are told which a vehicle file must have, unless it depends on other tables which are `needed`. `negative`
+    says, by the key, what to give instead of a negative value.
     """
     fields: dict[str, Any] = {}
     for key, declaration in declarations.items():
         one = quantity(f"{name}_{key}", declaration, negative.get(key, ""))
         fields[key] = (one | None, Field(None, description=declaration.description))
-    needed = [key for key, kind in kinds.items() if kind.needed]
-    return table_of(f"_{name}", Strict, fields, words, needed)
+    told = [key for key, declaration in declarations.items() if needed and declaration.needed]
+    return table_of(f"_{name}", Strict, fields, words, told)
 
 
-def given_quantities(table: Strict, kinds: Mapping[str, CoefficientKind]) -> dict[str, Quantity]:
+def given_quantities(table: Strict, kinds: Mapping[str, Declaration]) -> dict[str, Quantity]:
     """Return the coefficients that a table of the file gives, by key."""
     return {key: q for key in kinds if (q := getattr(table, key)) is not None}
 
 
-def _coefficient_keys(table: Strict, kinds: Mapping[str, CoefficientKind]) -> tuple[str, ...]:
+def _coefficient_keys(table: Strict, kinds: Mapping[str, Declaration]) -> tuple[str, ...]:
     """Return the keys of the coefficients that the vehicle has: those that are required, and those that are given."""
     quantities = given_quantities(table, kinds)
     return tuple(key for key, kind in kinds.items() if key in quantities or kind.needed)
@@ -96,7 +94,7 @@ def _coefficient_keys(table: Strict, kinds: Mapping[str, CoefficientKind]) -> tu
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
 
 
-class Body(_coefficients("Body", {key: kind.declaration() for key, kind in (BODY | RESTORING).items()})):  # type: ignore[misc]
+class Body(_coefficients("Body", BODY | RESTORING, needed=False)):  # type: ignore[misc]
     """The mass, needed for surge, sway and heave; the moments of inertia about the origin, needed for roll, pitch and
     yaw; weight and buoyancy with their centres, which act in roll and pitch."""
 
@@ -125,7 +123,7 @@ def _pulses(given: object) -> tuple[float, ...]:
     return tuple(usable)
 
 
-class Commands(_coefficients("Commands", {key: kind.declaration() for key, kind in COMMANDS.items()})):  # type: ignore[misc]
+class Commands(_coefficients("Commands", COMMANDS)):  # type: ignore[misc]
     """The form of the commands, and their way to the thrusters and fins."""
 
     model_config = DOCUMENTED
@@ -142,20 +140,17 @@ class Commands(_coefficients("Commands", {key: kind.declaration() for key, kind 
     commands of the FMU are pulse widths in µs instead of fractions from -1 to 1."""
 
 
-class Arm(_coefficients("Arm", {key: kind.declaration() for key, kind in ARM.items()}, ARM)):  # type: ignore[misc]
+class Arm(_coefficients("Arm", ARM)):  # type: ignore[misc]
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.declaration(curve="curve", equation="") for key, kind in CURVE.items()}
+_CURVE = {key: kind.filled(curve="curve", equation="") for key, kind in CURVE.items()}
 
 
-_Read = TypeVar("_Read", ThrustFile, CurrentTable)
-
-
-def _file_read_by(read: Callable[[Path], _Read]) -> BeforeValidator:
+def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
     """Return the validator of the name of a CSV file beside the vehicle file, which it reads."""
 
-    def read_file(name: object, info: ValidationInfo) -> _Read:
+    def read_file(name: object, info: ValidationInfo) -> object:
         if not isinstance(name, str):
             raise ValueError("must be text in quotes")
         path = inside_or_shipped(folder_of(info), name)
@@ -170,7 +165,7 @@ def _file_read_by(read: Callable[[Path], _Read]) -> BeforeValidator:
 
 
 _TEXT = WithJsonSchema({"type": "string"})
-_Thrust = Annotated[InstanceOf[ThrustFile], _file_read_by(read_thrust), _TEXT]
+_Thrust = Annotated[InstanceOf[ThrustTable], _file_read_by(read_thrust), _TEXT]
 _Current = Annotated[InstanceOf[CurrentTable], _file_read_by(read_current), _TEXT]
 
 
@@ -201,15 +196,15 @@ def _rising(tables: list[TableAtVoltage]) -> list[TableAtVoltage]:
     return tables
 
 
-class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
+class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     """A thrust curve: a_t m² + b_t m, where m is the command beyond the dead band, or a measured table. In reverse the
     coefficients hold as ahead, unless the curve has its own there."""
 
     model_config = DOCUMENTED
 
-    description: Name | None = None
+    description: Name = ""
     """A short description of the thrusters with this curve, for example "rear pair"."""
-    equation: Name | None = None
+    equation: Name = ""
     """The equation or table in which the curve is published. A bare number, (9), is of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
     """The number of thrusters that gave the force together when the curve was measured."""
@@ -221,32 +216,24 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
 
     electric_current: ElectricCurrent | None = None
 
-    @property
-    def measured_current(self) -> CurrentTable | None:
-        """The current of one thruster, with its voltage."""
-        given = self.electric_current
-        return replace(given.table, voltage=given.voltage) if given else None
-
-    @property
-    def thrust_files(self) -> tuple[Path, ...]:
-        """The paths of the tables."""
-        if self.table:
-            return (self.table.path,)
-        return tuple(row.table.path for row in self.tables or ())
-
     def for_model(self, name: str) -> layout.Curve:
         """Return the curve of the model."""
-        keys = _coefficient_keys(self, CURVE)
-        measured: tuple[ThrustTable, ...] = ()
-        if self.table:
-            measured = (self.table.table(f"0_{name}"),)
-        elif self.tables:
-            rows = enumerate(self.tables, 1)
-            measured = tuple(row.table.table(f"{n}_{name}", row.voltage) for n, row in rows)
+        keys, current = _coefficient_keys(self, CURVE), self.electric_current
+        measured = [replace(self.table, name=f"0_{name}")] if self.table else []
+        if not measured:
+            rows = enumerate(self.tables or (), 1)
+            measured = [replace(row.table, name=f"{n}_{name}", voltage=row.voltage) for n, row in rows]
         if measured:
             keys = ("k_t", *(key for key in keys if key not in ("k_t", *REPLACED_BY_TABLE)))
-        words = self.description or ""
-        return layout.Curve(name, keys, self.together, words, self.equation or "", measured)
+        return layout.Curve(
+            name,
+            keys,
+            self.together,
+            self.description,
+            self.equation,
+            tuple(measured),
+            replace(current.table, voltage=current.voltage) if current else None,
+        )
 
 
 _AXIS_DESCRIPTION = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
@@ -254,7 +241,6 @@ _tables = {
     axis.name: _coefficients(
         axis.name.capitalize(),
         declarations_of(axis),
-        AXIS,
         _AXIS_DESCRIPTION.format(axis),
         {key: f"; give -{derivative(key, axis)} as a positive {key}" for key in ("m_a", "a_d", "b_d")},
     )
@@ -337,7 +323,7 @@ class Thruster(Strict):
 
     name: Symbol
     """The name. The FMU's variables for the command and the force contain it: `u_<name>`, `F_<name>`."""
-    description: Name | None = None
+    description: Name = ""
     """A short description, for example "left thruster"."""
     curve: str
     """The name of the thrust curve."""
@@ -348,17 +334,12 @@ class Thruster(Strict):
 
     def for_model(self) -> layout.Thruster:
         """Return the thruster of the model, with a unit vector as its direction."""
-        return layout.Thruster(
-            self.name,
-            self.curve,
-            _unit_vector(self.direction.value),
-            self.position.value if self.position else None,
-            {None: 0, "port": 1, "starboard": -1}[self.arm],
-            self.description or "",
-        )
+        arm = {None: 0, "port": 1, "starboard": -1}[self.arm]
+        position = self.position.value if self.position else None
+        return layout.Thruster(self.name, self.curve, position=position, arm=arm, **_driven(self))
 
 
-class Fin(_coefficients("Fin", {key: kind.declaration(fin="fin") for key, kind in FIN.items()}, FIN)):  # type: ignore[misc]
+class Fin(_coefficients("Fin", {key: kind.filled(fin="fin") for key, kind in FIN.items()})):  # type: ignore[misc]
     """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
     command."""
 
@@ -366,7 +347,7 @@ class Fin(_coefficients("Fin", {key: kind.declaration(fin="fin") for key, kind i
 
     name: Symbol
     """The name. The FMU's variable for the command contains it: `u_<name>`."""
-    description: Name | None = None
+    description: Name = ""
     """A short description, for example "rudder"."""
     direction: Direction
     """The direction of the lift at a positive command while the vehicle moves ahead."""
@@ -374,8 +355,18 @@ class Fin(_coefficients("Fin", {key: kind.declaration(fin="fin") for key, kind i
 
     def for_model(self) -> layout.Fin:
         """Return the fin of the model, with a unit vector as its direction."""
-        unit = _unit_vector(self.direction.value)
-        return layout.Fin(self.name, unit, self.position.value, self.drag is not None, self.description or "")
+        has_drag = self.drag is not None
+        return layout.Fin(self.name, position=self.position.value, has_drag=has_drag, **_driven(self))
+
+
+def _driven(one: Thruster | Fin) -> dict[str, Any]:
+    """Return the direction of a thruster or a fin, its description, and the sources of its direction and position."""
+    given = {"direction": one.direction, "position": one.position}
+    return {
+        "direction": _unit_vector(one.direction.value),
+        "description": one.description,
+        "sources": {key: place.source for key, place in given.items() if place},
+    }
 
 
 class Battery(Strict):
@@ -450,7 +441,7 @@ class Tables(Strict):
         """The table of each axis that the vehicle has."""
         return {axis: table for name, axis in AXES.items() if (table := getattr(self.axes, name, None)) is not None}
 
-    @property
+    @cached_property
     def layout(self) -> Layout:
         """The layout of the vehicle, for the model."""
         axes = tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items())
@@ -458,43 +449,26 @@ class Tables(Strict):
         coupled = bool(self.body and self.body.coupling)
         thrusters = tuple(t.for_model() for t in self.thruster)
         cross = tuple(filter(None, map(cross_of, self.cross)))
-        restoring = tuple(key for key in RESTORING if self.body and getattr(self.body, key) is not None)
+        restoring = tuple(given_quantities(self.body, RESTORING)) if self.body else ()
         fins = tuple(fin.for_model() for fin in self.fin)
+        has_dead_time = bool(self.commands and self.commands.T_d)
         voltage = self.battery.voltage.value if self.battery else None
+        source = self.battery.voltage.source if self.battery else ""
         pulse = self.commands.pulse if self.commands else None
         return Layout(
-            axes, curves, thrusters, self.inputs, coupled, cross, restoring, fins, self.has_dead_time, voltage, pulse
+            axes, curves, thrusters, self.inputs, coupled, cross, restoring, fins, has_dead_time, voltage, pulse, source
         )
-
-    @property
-    def has_dead_time(self) -> bool:
-        """True when the file gives a dead time."""
-        return bool(self.commands and self.commands.T_d)
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
         """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
         found: dict[str, Quantity | None] = {}
         fins = {fin.name: fin for fin in self.fin}
-        for name, (first, *keys) in keys_in_file(of):
+        for name, (first, *keys) in of.keys_in_file.items():
             table: Any = fins if first == "fin" else getattr(self, first)
             for key in keys:
                 table = table.get(key) if isinstance(table, dict) else getattr(table, key, None)
             found[name] = table
         return found
-
-    @property
-    def electric_currents(self) -> dict[str, CurrentTable]:
-        """The current of one thruster, by curve."""
-        return {name: current for name, curve in self.curves.items() if (current := curve.measured_current)}
-
-    @property
-    def thruster_sources(self) -> dict[str, dict[str, str]]:
-        """The sources of `direction` and `position`, by the name of the thruster or the fin."""
-        driven: list[Thruster | Fin] = [*self.thruster, *self.fin]
-        return {
-            t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
-            for t in driven
-        }
 
 
 class _Head(Strict):
@@ -520,7 +494,7 @@ def _needed_in_file(schema: dict[str, Any]) -> None:
 class File(Tables, _Head, json_schema_extra=_needed_in_file):
     """A vehicle file (TOML): an ROV with any thrusters, axes and curves."""
 
-    # Any table may be missing, so that others are read where one has a mistake. with_missing_keys tells what lacks.
+    # Any table may be missing, so that others are read where one has a mistake. read_tables tells what lacks.
 
     alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
     """Other sets of published coefficients, by a name for each set."""
@@ -530,17 +504,47 @@ class File(Tables, _Head, json_schema_extra=_needed_in_file):
     provenance: Provenance | None = None
 
 
-def with_missing_keys(
-    problems: Iterable[ErrorDetails],
+_TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
+"""If an entry of one of these tables has a mistake, the other entries can still be checked."""
+_Model = TypeVar("_Model", bound=Tables)
+
+
+def read_tables(
     data: Toml,
-    model: type[Strict],
+    model: type[_Model],
+    context: Mapping[str, object],
     needed: Iterable[str] = NEEDED,
-    within: Container[str] = ("arm", "fin", "axes"),
+    complete: Container[str] = ("arm", "fin", "axes"),
+) -> tuple[_Model, list[ErrorDetails], set[str]]:
+    """Return what could be read of a file, the problems with the rest, and the top-level tables with a problem.
+
+    `needed` are the tables that must be there, and `complete` those whose coefficients must be complete.
+    """
+    file, problems = validate(data, model, **context)
+    problems = _with_missing_keys(problems, model, _missing_keys(data, needed, complete))
+    wrong: dict[str, set[int | str | None]] = {}
+    for place in (problem["loc"] for problem in problems):
+        wrong.setdefault(str(place[0]), set()).add(place[1] if len(place) > 1 else None)
+    if file is None:
+        parts: dict[str, Any] = dict(data)
+        for name, entries in wrong.items():
+            table = parts.pop(name, None)
+            if name in _TABLES_OF_TABLES and None not in entries:
+                if isinstance(table, list):
+                    parts[name] = [entry for n, entry in enumerate(table) if n not in entries]
+                elif isinstance(table, dict):
+                    parts[name] = {key: entry for key, entry in table.items() if key not in entries}
+        file, _ = validate(parts, model, **context)
+    assert file, "every table with a mistake is left out"
+    return file, problems, {*wrong}
+
+
+def _with_missing_keys(
+    problems: Iterable[ErrorDetails], model: type[Strict], missing_keys: Iterable[ErrorDetails]
 ) -> list[ErrorDetails]:
     """Return the problems with a file and those that keys are missing, in the order of the tables of its model.
 
-    `needed` are the tables that must be there, and `within` those whose coefficients must be complete. Unknown keys
-    come last in a table, because one of them may be a missing key, misspelt.
+    Unknown keys come last in a table, because one of them may be a missing key, misspelt.
     """
     order = [*model.model_fields]
 
@@ -553,12 +557,12 @@ def with_missing_keys(
         return is_unknown or table(other) > table(missing)
 
     found = [*problems]
-    for missing in _missing_keys(data, needed, within):
+    for missing in missing_keys:
         found.insert(next((n for n, other in enumerate(found) if comes_later(other, missing)), len(found)), missing)
     return found
 
 
-def _missing_keys(data: Toml, needed: Iterable[str], within: Container[str]) -> Iterator[ErrorDetails]:
+def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -> Iterator[ErrorDetails]:
     """Yield a problem, as pydantic reports it, for each key that is needed and missing."""
     for name in needed:
         if name not in data:
@@ -566,12 +570,12 @@ def _missing_keys(data: Toml, needed: Iterable[str], within: Container[str]) -> 
         elif data[name] in ({}, []) and name in ("curves", "thruster"):
             reason = "must have at least 1 item, not 0"
             yield {"type": "too_short", "loc": (name,), "msg": reason, "input": data[name]}
-    places: list[tuple[Mapping[str, CoefficientKind], tuple[int | str, ...]]] = [(ARM, ("arm",))]
+    places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",))]
     places += [(FIN, ("fin", n)) for n in range(len(data.get("fin", ())))]
     places += [(AXIS, ("axes", name)) for name in AXES]
     for kinds, place in places:
         table = _table_at(data, place)
-        if place[0] in within and isinstance(table, dict):
+        if place[0] in complete and isinstance(table, dict):
             yield from (_missing(table, *place, key) for key, kind in kinds.items() if kind.needed and key not in table)
 
 
@@ -588,19 +592,3 @@ def _table_at(data: Any, place: tuple[int | str, ...]) -> Any:
 def _missing(table: Toml, *place: int | str) -> ErrorDetails:
     """Return the problem that a key is missing in a table."""
     return {"type": "missing", "loc": place, "msg": "Field required", "input": table}
-
-
-def keys_in_file(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the name of each coefficient in the FMU, and its tables and its key in the vehicle file."""
-    yield from ((key, ("body", key)) for key in (*BODY, *RESTORING) if key in of.coefficients)
-    yield from ((key, ("arm", key)) for key in ARM if key in of.coefficients)
-    yield from ((key, ("commands", key)) for key in COMMANDS if key in of.coefficients)
-    for curve in of.curves:
-        yield from ((curve.coefficient(key), ("curves", curve.name, key)) for key in CURVE if key in curve.keys)
-    for fin in of.fins:
-        yield from ((fin.coefficient(key), ("fin", fin.name, key)) for key in FIN if key != "drag" or fin.has_drag)
-    for keys in (AXIS, TUNING):
-        for vehicle_axis in of.axes:
-            present = keys if keys is TUNING else (key for key in keys if key in vehicle_axis.keys)
-            yield from ((vehicle_axis.coefficient(key), ("axes", vehicle_axis.axis.name, key)) for key in present)
-    yield from ((name, ("cross", name)) for name in (cross_name(*row) for row in of.cross))

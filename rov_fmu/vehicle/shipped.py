@@ -12,6 +12,7 @@ SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODE
 """The vehicle files that ship, by name."""
 VIDEORAY = SHIPPED["videoray"]
 
+_SOURCES = {"direction": "the form of the paper's vehicle: two rear thrusters ahead, one down"}
 PAPER = Layout(
     axes=(VehicleAxis(SURGE), VehicleAxis(HEAVE), VehicleAxis(YAW)),
     curves=(
@@ -19,15 +20,12 @@ PAPER = Layout(
         Curve("top", description="top thruster", equation="(10)"),
     ),
     thrusters=(
-        Thruster("l", "rear", (1.0, 0.0, 0.0), arm=1, description="left thruster"),
-        Thruster("r", "rear", (1.0, 0.0, 0.0), arm=-1, description="right thruster"),
-        Thruster("t", "top", (0.0, 0.0, 1.0), description="top thruster"),
+        Thruster("l", "rear", (1.0, 0.0, 0.0), arm=1, description="left thruster", sources=_SOURCES),
+        Thruster("r", "rear", (1.0, 0.0, 0.0), arm=-1, description="right thruster", sources=_SOURCES),
+        Thruster("t", "top", (0.0, 0.0, 1.0), description="top thruster", sources=_SOURCES),
     ),
 )
 """The layout of the paper's vehicle: surge, heave and yaw, a pair of rear thrusters and one on top."""
-_SOURCE = "the form of the paper's vehicle: two rear thrusters ahead, one down"
-PAPER_SOURCES = {thruster.name: {"direction": _SOURCE} for thruster in PAPER.thrusters}
-"""The sources of the thrusters' directions, by the name of the thruster."""
 
 
 def find_vehicle(given: str | Path) -> Path:

@@ -2,11 +2,10 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 
-from rov_fmu.equation.layout import ThrustTable
+from rov_fmu.equation.layout import CurrentTable, ThrustTable
 from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, DataFileError, pulses, read_columns
 
 _COMMAND = Column(
@@ -19,59 +18,10 @@ _WIDEST = 0.05
 """The largest part of the commands that a table may leave out at each end."""
 
 
-@dataclass(frozen=True)
-class ThrustFile:
-    """The points of a table of thrust."""
-
-    path: Path
-    commands: tuple[float, ...]
-    forces: tuple[float, ...]
-    """The force at each command, N."""
-
-    def table(self, name: str, voltage: float = 0.0) -> ThrustTable:
-        """Return the table for the model: a monotone cubic between the points (Fritsch and Butland 1984).
-
-        Beyond the outermost points, the thrust continues with their slopes to the commands -1 and 1.
-        """
-        from scipy.interpolate import PchipInterpolator  # takes long to import, and few vehicles have tables
-
-        slopes = map(float, PchipInterpolator(self.commands, self.forces).derivative()(self.commands))
-        points = [*zip(self.commands, self.forces, slopes, strict=True)]
-        ends = [
-            (end, force + slope * (end - command), slope)
-            for end, (command, force, slope) in ((-1.0, points[0]), (1.0, points[-1]))
-            if command != end
-        ]
-        points = sorted(points + ends)
-        commands, forces, steepness = zip(*points, strict=True)
-        return ThrustTable(name, commands, forces, steepness, voltage)
-
-
-@dataclass(frozen=True)
-class CurrentTable:
-    """The electric current of one thruster over its command, measured at one voltage."""
-
-    path: Path
-    commands: tuple[float, ...]
-    """The commands, from -1 to 1 in rising order."""
-    currents: tuple[float, ...]
-    """The current at each command, A."""
-    voltage: float = 0.0
-    """The voltage at which the currents were measured, V."""
-
-    def current(self, command: float) -> float:
-        """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
-        n = bisect_right(self.commands, command)
-        if n in (0, len(self.commands)):
-            return self.currents[min(n, len(self.commands) - 1)]
-        low, high = self.commands[n - 1 : n + 1]
-        return self.currents[n - 1] + (command - low) / (high - low) * (self.currents[n] - self.currents[n - 1])
-
-
-def read_thrust(path: Path) -> ThrustFile:
+def read_thrust(path: Path) -> ThrustTable:
     """Read a CSV file with the columns command [1], [%] or [us], and thrust [N], [kgf] or [lbf]. Raises DataFileError.
 
-    Rows with equal commands become one point with their mean thrust.
+    Rows with equal commands become one point with their mean thrust. The table has no name yet.
     """
 
     def check(command: float, force: float) -> str | None:
@@ -80,7 +30,25 @@ def read_thrust(path: Path) -> ThrustFile:
     commands, forces = _points(path, "thrust", _THRUST, check)
     if reason := _why_incomplete(commands) or _why_no_curve(commands, forces):
         raise DataFileError(f"{path}: {reason}")
-    return ThrustFile(path, commands, forces)
+    return thrust_table(commands, forces, path)
+
+
+def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path | None = None) -> ThrustTable:
+    """Return the table with a force (N) at each command: a monotone cubic between them (Fritsch and Butland 1984).
+
+    Beyond the outermost points, the thrust continues with their slopes to the commands -1 and 1.
+    """
+    from scipy.interpolate import PchipInterpolator  # takes long to import, and few vehicles have tables
+
+    slopes = map(float, PchipInterpolator(points, at_points).derivative()(points))
+    rows = [*zip(points, at_points, slopes, strict=True)]
+    ends = [
+        (end, force + slope * (end - command), slope)
+        for end, (command, force, slope) in ((-1.0, rows[0]), (1.0, rows[-1]))
+        if command != end
+    ]
+    commands, forces, steepness = zip(*sorted(rows + ends), strict=True)
+    return ThrustTable("", commands, forces, steepness, path=path)
 
 
 def read_current(path: Path) -> CurrentTable:

@@ -21,13 +21,12 @@ from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, one_line, shown
-from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
-from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
+from rov_fmu.io.toml_file import key_line, problem_lines, read_toml
+from rov_fmu.vehicle.checks import check_parts, no_thrust
 from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, with_missing_keys
-from rov_fmu.vehicle.thrust_table import CurrentTable
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, read_tables
 
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
@@ -103,14 +102,6 @@ class Vehicle:
     provenance: Provenance | None = None
     measured_from: str = field(default="measurements", compare=False)
     """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
-    voltage_source: str = ""
-    """The source of the battery's voltage."""
-    thrust_files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
-    """The files of the thrust tables, by curve, in the order of the curve's tables."""
-    electric_currents: Mapping[str, CurrentTable] = field(default_factory=dict)
-    """The current of one thruster, by curve, for all curves or none."""
-    thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """The sources of `direction` and `position`, by the name of the thruster."""
 
     def __getitem__(self, name: str) -> float:
         """Return a coefficient."""
@@ -173,8 +164,8 @@ class Vehicle:
         """The existing files that belong to the vehicle file: its tables, pictures and report."""
         report = self.provenance.report if self.provenance else None
         tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
-        tables += [path for paths in self.thrust_files.values() for path in paths]
-        tables += [table.path for table in self.electric_currents.values()]
+        measured = [table for curve in self.layout.curves for table in (*curve.tables, curve.electric_current)]
+        tables += [table.path for table in measured if table and table.path]
         pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
         return [path for path in (*tables, *pictures, report) if path and path.is_file()]
 
@@ -359,16 +350,12 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     if data["format"] != FORMAT:  # the rest of the file may have another meaning
         reason = f"must be {FORMAT}, the only version of the vehicle file"
         raise VehicleFileError(f"{path}: {key_line('format', reason, data['format'])}")
-    context = {"folder": path.parent, "coming": coming}
-    file, problems = validate(data, File, **context)
-    problems = with_missing_keys(problems, data, File)
-    readable, lost = readable_parts(data, problems, context, File)
-    mistakes = [*problem_lines(problems, data, File), *check_parts(readable, lost, data)]
-    if file is None or mistakes:
+    file, problems, lost = read_tables(data, File, {"folder": path.parent, "coming": coming})
+    if mistakes := [*problem_lines(problems, data, File), *check_parts(file, lost, data)]:
         raise VehicleFileError(*lines_on(path, mistakes))
     head, validity, layout = file.vehicle, file.validity, file.layout
-    assert head, "with_missing_keys tells that it is missing"
-    assert validity, "with_missing_keys tells that it is missing"
+    assert head, "read_tables tells that it is missing"
+    assert validity, "read_tables tells that it is missing"
     found = file.quantities(layout)
     coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
     if mistakes := [*check_mass(layout, coefficients)]:
@@ -386,8 +373,4 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=file.estimates,
         provenance=file.provenance,
-        voltage_source=file.battery.voltage.source if file.battery else "",
-        thrust_files={name: curve.thrust_files for name, curve in file.curves.items() if curve.thrust_files},
-        electric_currents=file.electric_currents,
-        thruster_sources=file.thruster_sources,
     )

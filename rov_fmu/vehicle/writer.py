@@ -1,32 +1,31 @@
 """Writing vehicle files (TOML), completely or not at all."""
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import Array, InlineTable, Item
+from tomlkit.items import InlineTable
 
-from rov_fmu.equation.catalogue import Declaration
 from rov_fmu.equation.layout import Curve, Fin, Thruster
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.vehicle.description import Head
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Alternative, Estimated, keys_in_file
-from rov_fmu.vehicle.thrust_table import CurrentTable
+from rov_fmu.vehicle.description import FileHead
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
-_TOLD = ("verdicts", "errors", "tested", "warnings", "facts")
-"""The lists of sentences in [provenance]."""
 _DECIMALS = 6
 """The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
 _DIGITS = 6
 """The significant digits of a number: more than any tank test gives, but few enough to be equal on every machine."""
+_DEPTHS = {"curves": 2, "axes": 2, "alternatives": 2, "provenance": 2}
+"""How deep the tables in some tables of a file are written with headings; in the others, one deep. Those inside are
+written in one line."""
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
@@ -38,99 +37,94 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     if made := vehicle.provenance:
         comment = f"Made from {vehicle.measured_from}: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(comment)).add(tomlkit.nl())
-    low, high = map(_rounded, vehicle.command_range)
-    paths = {"data": vehicle.data, "pictures": vehicle.pictures}
-    folders = {key: name_of(path, folder) for key, path in paths.items() if path}
     document["format"] = FORMAT
-    document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields} | folders
-    document["validity"] = {"command_min": low, "command_max": high} | _texts("limits", vehicle.limits)
-    quantities = {name: _quantity(vehicle, name) for name, source in vehicle.sources.items() if source != NOT_GIVEN}
-    for key, table in _hardware(vehicle, quantities, folder).items():
-        document[key] = table
-    if vehicle.alternatives:
-        document["alternatives"] = {name: _alternative(one) for name, one in vehicle.alternatives.items()}
-    if vehicle.estimates:
-        document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
-    if made:
-        report = {"report": name_of(made.report, folder)} if made.report else {}
-        told = {key: value for name in _TOLD for key, value in _texts(name, getattr(made, name)).items()}
-        head = {"tool": made.tool, "method": made.method} | report | told
-        document["provenance"] = {**head, "inputs": dict(made.inputs)}
+    for name, table in _tables(vehicle).items():
+        if table:
+            document[name] = _item(table, folder, _DEPTHS.get(name, 1))
     text: str = tomlkit.dumps(document)
     return sealed(text, "# {}") if made else text
 
 
-def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) -> dict[str, Any]:
-    """Return the tables of the body, the curves, the thrusters, the fins, the axes and the inputs."""
-    layout = vehicle.layout
-    tables: dict[str, Any] = {"body": {"coupling": True} if layout.coupled else {}}
-    if layout.has_arm:
-        tables["arm"] = {}
-    if layout.has_dead_time or layout.pulse:
-        tables["commands"] = {"pulse": [*layout.pulse]} if layout.pulse else {}
-    if layout.voltage is not None:
-        tables["battery"] = {
-            "voltage": _inline_table({"value": layout.voltage, "unit": "V", "source": vehicle.voltage_source})
-        }
-    tables["curves"] = {
-        curve.name: _curve(curve)
-        | _thrust_tables(curve, vehicle.thrust_files.get(curve.name, ()), folder)
-        | _electric_current(vehicle.electric_currents.get(curve.name), folder)
-        for curve in layout.curves
+def _tables(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the tables of the file. Those that the vehicle does not have are empty."""
+    layout, made = vehicle.layout, vehicle.provenance
+    low, high = map(_rounded, vehicle.command_range)
+    voltage = {"value": layout.voltage, "unit": "V", "source": layout.voltage_source}
+    tables: dict[str, Any] = {
+        "vehicle": {key: getattr(vehicle, key) for key in FileHead.model_fields},
+        "validity": {"command_min": low, "command_max": high, "limits": vehicle.limits},
+        "body": {"coupling": True} if layout.coupled else {},
+        "arm": {},
+        "commands": {"pulse": layout.pulse} if layout.pulse else {},
+        "battery": {} if layout.voltage is None else {"voltage": voltage},
+        "curves": {curve.name: _curve(curve) for curve in layout.curves},
+        "thruster": [_driven(thruster) for thruster in layout.thrusters],
+        "fin": [_driven(fin) for fin in layout.fins],
+        "axes": {name: {} for name in layout.kinds},
+        "cross": {},
+        "inputs": layout.mix,
+        "alternatives": {name: one.model_dump(exclude_none=True) for name, one in vehicle.alternatives.items()},
+        "estimates": {name: _estimated(row) for name, row in vehicle.estimates.items()},
+        "provenance": made.model_dump(exclude_none=True) if made else {},
     }
-    tables["thruster"] = tomlkit.aot()
-    for thruster in layout.thrusters:
-        tables["thruster"].append(tomlkit.item(_thruster(thruster, vehicle.thruster_sources[thruster.name])))
-    fins = {fin.name: tomlkit.item(_fin(fin, vehicle.thruster_sources[fin.name])) for fin in layout.fins}
-    if fins:
-        tables["fin"] = tomlkit.aot()
-        for fin in fins.values():
-            tables["fin"].append(fin)
-    tables["axes"] = {vehicle_axis.axis.name: {} for vehicle_axis in layout.axes}
-    if layout.cross:
-        tables["cross"] = {}
-    if layout.mix:
-        tables["inputs"] = {name: _inline_table(gains) for name, gains in layout.mix.items()}
-    for name, (*above, key) in keys_in_file(layout):
-        if name in quantities:
-            table = fins[above[1]] if above[0] == "fin" else _table_at(tables, above)
-            table[key] = quantities[name]
+    for name, (*above, key) in layout.keys_in_file.items():
+        if vehicle.sources.get(name, NOT_GIVEN) != NOT_GIVEN:
+            _table_at(tables, above)[key] = _quantity(vehicle, name)
     return tables
 
 
-def _thrust_tables(curve: Curve, files: Sequence[Path], folder: Path) -> dict[str, Any]:
-    """Return the keys that name the thrust tables of a curve. Raises ValueError."""
-    names = [name_of(file, folder) for file in files]
-    if not names:
-        return {}
-    if not curve.tables[0].voltage:
-        return {"table": names[0]}
-    rows = zip(curve.tables, names, strict=True)
-    return {"tables": [_inline_table({"voltage": table.voltage, "table": name}) for table, name in rows]}
+def _item(value: Any, folder: Path, depth: int) -> Any:
+    """Return a value as TOML has it, without keys that are not given. Raises ValueError.
+
+    Tables below `depth` are written in one line, and a path is written as a name in the folder.
+    """
+    if isinstance(value, Mapping):
+        entries = {key: _item(one, folder, depth - 1) for key, one in value.items() if one not in (None, "", ())}
+        return entries if depth > 0 else _inline_table(entries)
+    if isinstance(value, list) and depth > 0:
+        tables = tomlkit.aot()
+        for one in value:
+            tables.append(tomlkit.item(_item(one, folder, depth)))
+        return tables
+    if isinstance(value, list | tuple):
+        lines = tomlkit.array().multiline(isinstance(value[0], str))
+        lines.extend(_item(one, folder, 0) for one in value)
+        return lines
+    return name_of(value, folder) if isinstance(value, Path) else value
 
 
-def _electric_current(table: CurrentTable | None, folder: Path) -> dict[str, Any]:
-    """Return the key with the electric current of a curve. Raises ValueError."""
-    if table is None:
-        return {}
-    return {"electric_current": _inline_table({"voltage": table.voltage, "table": name_of(table.path, folder)})}
-
-
-def _fin(fin: Fin, sources: Mapping[str, str]) -> dict[str, Any]:
-    """Return the table of a fin, without its coefficients."""
-    words = {"description": fin.description} if fin.description else {}
+def _curve(curve: Curve) -> dict[str, Any]:
+    """Return the keys of a curve without its coefficients."""
+    tables = [{"voltage": table.voltage, "table": table.path} for table in curve.tables]
+    current = curve.electric_current
     return {
-        "name": fin.name,
-        **words,
-        "direction": _inline_table({"value": [*fin.direction], "source": sources["direction"]}),
-        "position": _inline_table({"value": [*fin.position], "unit": "m", "source": sources["position"]}),
+        "description": curve.description,
+        "equation": curve.equation,
+        "together": curve.together if curve.together != 1 else None,
+        "table": tables[0]["table"] if len(tables) == 1 else None,
+        "tables": tables if len(tables) > 1 else None,
+        "electric_current": {"voltage": current.voltage, "table": current.path} if current else None,
+    }
+
+
+def _driven(driven: Thruster | Fin) -> dict[str, Any]:
+    """Return the keys of a thruster or a fin without its coefficients."""
+    position = {"value": driven.position, "unit": "m", "source": driven.sources.get("position")}
+    arm = getattr(driven, "arm", 0)
+    return {
+        "name": driven.name,
+        "description": driven.description,
+        "curve": getattr(driven, "curve", None),
+        "direction": {"value": driven.direction, "source": driven.sources["direction"]},
+        "position": position if driven.position else None,
+        "arm": {0: None, 1: "port", -1: "starboard"}[arm],
     }
 
 
 def _table_at(tables: Any, path: Iterable[str]) -> Any:
-    """Return a table inside others."""
+    """Return a table inside others. One of a list is found by its name."""
     for key in path:
-        tables = tables[key]
+        tables = next(one for one in tables if one["name"] == key) if isinstance(tables, list) else tables[key]
     return tables
 
 
@@ -164,24 +158,19 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
     VehicleFileError or OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
-    places = dict(keys_in_file(vehicle.layout))
     for name, exact in values.items():
         if (value := _rounded(exact)) == _rounded(vehicle[name]):
             continue
-        *above, key = places[name]
-        table = _fin_of(document, above[1]) if above[0] == "fin" else _table_at(document, above)
+        *above, key = vehicle.layout.keys_in_file[name]
+        table = _table_at(document, above)
         if key in table:
             table[key]["value"], table[key]["source"] = value, reason
             table[key].pop("interval", None)
         else:
-            table[key] = _quantity_table(value, vehicle.layout.coefficients[name], reason)
+            unit = vehicle.layout.coefficients[name].unit
+            table[key] = _inline_table({"value": value, "unit": unit, "source": reason})
         _remove_estimate(document, name)
     write_whole(_moved(document, source, path))
-
-
-def _fin_of(document: Any, name: str) -> Any:
-    """Return the table of a fin."""
-    return next(fin for fin in document["fin"] if fin["name"] == name)
 
 
 def _remove_estimate(document: Any, name: str) -> None:
@@ -255,56 +244,18 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
         raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
 
 
-def _curve(curve: Curve) -> dict[str, Any]:
-    """Return the keys of a curve that differ from their defaults, without its coefficients."""
-    entries = {key: getattr(curve, key) for key in ("description", "equation", "together")}
-    return {key: entry for key, entry in entries.items() if entry != getattr(Curve, key)}
-
-
-def _thruster(thruster: Thruster, sources: Mapping[str, str]) -> dict[str, Any]:
-    """Return the table of a thruster."""
-    entry: dict[str, Any] = {"name": thruster.name}
-    if thruster.description:
-        entry["description"] = thruster.description
-    entry["curve"] = thruster.curve
-    entry["direction"] = _inline_table({"value": [*thruster.direction], "source": sources["direction"]})
-    if thruster.position:
-        position = {"value": [*thruster.position], "unit": "m", "source": sources["position"]}
-        entry["position"] = _inline_table(position)
-    if thruster.arm:
-        entry["arm"] = "port" if thruster.arm > 0 else "starboard"
-    return entry
-
-
-def _alternative(alternative: Alternative) -> dict[str, Any]:
-    """Return the table of a set of published coefficients that the model does not use."""
-    rows = {name: _inline_table(q.model_dump(exclude_none=True)) for name, q in alternative.quantities.items()}
-    return {"description": alternative.description, **rows}
-
-
-def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
+def _quantity(vehicle: Vehicle, name: str) -> dict[str, Any]:
     """Return the table of a coefficient, with rounded numbers, and an interval that includes the rounded value."""
     value, interval = _rounded(vehicle[name]), vehicle.intervals.get(name)
-    ends = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)] if interval else None
-    return _quantity_table(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
+    ends = (min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)) if interval else None
+    unit = vehicle.layout.coefficients[name].unit
+    return {"value": value, "unit": unit, "interval": ends, "source": vehicle.sources[name]}
 
 
-def _estimated(row: Estimated) -> InlineTable:
+def _estimated(row: Estimated) -> dict[str, Any]:
     """Return the table of a standard error and those correlations that are not rounded to 0."""
     rounded = {name: round(value, _DECIMALS) for name, value in row.correlation.items()}
-    correlation = {name: value for name, value in rounded.items() if value}
-    entry: dict[str, Any] = {"error": _rounded(row.error)}
-    if correlation:
-        entry["correlation"] = _inline_table(correlation)
-    return _inline_table(entry)
-
-
-def _quantity_table(
-    value: float, declaration: Declaration, source: str, interval: list[float] | None = None
-) -> InlineTable:
-    """Return the table of a value with its unit and source."""
-    ends = {"interval": interval} if interval else {}
-    return _inline_table({"value": value, "unit": declaration.unit, **ends, "source": source})
+    return {"error": _rounded(row.error), "correlation": {name: r for name, r in rounded.items() if r} or None}
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
@@ -312,13 +263,6 @@ def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
     table = tomlkit.inline_table()
     table |= dict(entries)
     return cast(InlineTable, tomlkit.value(f"{{ {table.as_string()[1:-1]} }}"))
-
-
-def _texts(key: str, texts: Iterable[str]) -> dict[str, Array]:
-    """Return a key with a list of texts, one on each line, or nothing if there are no texts."""
-    lines = tomlkit.array().multiline(True)
-    lines.extend(texts)
-    return {key: lines} if lines else {}
 
 
 def _rounded(value: float) -> float:

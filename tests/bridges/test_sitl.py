@@ -103,15 +103,14 @@ def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
 
     The file has every third point. Without a current and a voltage, ArduPilot uses its own battery.
     """
-    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
-    setup = replace(setup_of(), electric_currents=heavy.electric_currents)
-    connection, sums = Connection(setup), []
+    connection, sums = Connection(setup_of()), []
     for count, pulses in enumerate(([1500] * 8, [0] * 8, [1896, 1700, 1300, *[1500] * 5])):
         reply = json.loads(connection.answer(packet(400, count, [*pulses, *[0] * 8]), HERE))
         assert reply["battery"]["voltage"] == 16.0
         sums.append(reply["battery"]["current"])
     assert sums == pytest.approx([0.0, 0.0, 23.9 + 4.58 + 4.4], abs=0.1)
-    without = Connection(setup_of())
+    curves = tuple(replace(curve, electric_current=None) for curve in HEAVY.layout.curves)
+    without = Connection(setup_of(replace(HEAVY, layout=replace(HEAVY.layout, curves=curves))))
     assert "battery" not in json.loads(without.answer(packet(400, 0, NEUTRAL), HERE))
     effects = load_vehicle(THRUST_EFFECTS)
     table = {n: name.removeprefix("u_") for n, name in enumerate(effects.layout.commands, 1)}
@@ -129,6 +128,7 @@ def test_replies_are_json_and_as_ardupilot_parses_them() -> None:
             **{key: flat["imu"][key] for key in ("gyro", "accel_body")},
             **{key: flat[key] for key in ("position", "attitude", "velocity")},
             "rng_1": [flat["rng_1"]],
+            **{key: [flat["battery"][key]] for key in ("voltage", "current")},
         }
     assert abs(flat["attitude"][2]) <= pi
 

@@ -441,6 +441,7 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
     assert absent.get(key) not in {effect.kind for effect in found.effects}
     if key == "voltage":
         assert found.vehicle["n_V_top"] == USUAL_EXPONENT
+        assert found.vehicle.layout.voltage_source == "Mean voltage of the logs"
     if key.startswith("slow_"):
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
 

@@ -77,7 +77,7 @@ def test_every_key_is_read(everything: Vehicle) -> None:
     assert set(rov.coefficients) == set(layout.coefficients) == set(everything.sources)
     assert list(layout.mix) == ["surge", "sway", "yaw", "heave", "boost"]
     assert everything.intervals == {"m_rov": (13.0, 14.0)}
-    assert everything.thruster_sources["1"] == {"direction": "A", "position": "A"}
+    assert everything.layout.thrusters[0].sources == {"direction": "A", "position": "A"}
 
 
 def test_a_direction_of_any_length_is_a_unit_vector(everything: Vehicle) -> None:

@@ -22,8 +22,8 @@ def test_the_file_in_the_repository_is_the_schema(capsys: pytest.CaptureFixture[
 def test_it_has_every_kind_of_coefficient_with_unit_and_bounds() -> None:
     tables: dict[str, Any] = json_schema()["$defs"]
     kinds = {
-        "Body": {key: kind.declaration() for key, kind in (BODY | RESTORING).items()},
-        "Curve": {key: kind.declaration(curve="", equation="") for key, kind in CURVE.items()},
+        "Body": BODY | RESTORING,
+        "Curve": {key: kind.filled(curve="", equation="") for key, kind in CURVE.items()},
         **{f"_{axis.name.capitalize()}": declarations_of(axis) for axis in AXIS_KINDS.values()},
     }
     assert {*kinds["_Yaw"]} == {*AXIS, *TUNING}

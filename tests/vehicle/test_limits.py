@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import CurrentTable, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.description import _identifier
@@ -20,7 +20,7 @@ from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_mass, check
 from rov_fmu.vehicle.published import Cell
 from rov_fmu.vehicle.quantity import derivative_hint, within
 from rov_fmu.vehicle.schema import Estimated, _near, _not_zero, _pulses, _rising, _unit_vector
-from rov_fmu.vehicle.thrust_table import CurrentTable, ThrustFile, read_thrust
+from rov_fmu.vehicle.thrust_table import read_thrust, thrust_table
 from rov_fmu.vehicle.uncertainty import (
     Uncertainty,
     _half_width,
@@ -235,7 +235,8 @@ def _file(tmp_path: Path, rows: list[tuple[float, float]]) -> Path:
 
 
 def test_a_table_may_leave_out_a_twentieth_of_the_commands_on_each_side(tmp_path: Path) -> None:
-    assert read_thrust(_file(tmp_path, [(-0.95, -1.0), (0.0, 0.0), (0.95, 2.0)])).commands == (-0.95, 0.0, 0.95)
+    found = read_thrust(_file(tmp_path, [(-0.95, -1.0), (0.0, 0.0), (0.95, 2.0)]))
+    assert found.commands == (-1.0, -0.95, 0.0, 0.95, 1.0)
     for low, high in ((-0.949, 1.0), (-1.0, 0.949)):
         with pytest.raises(DataFileError, match=r"but for 0\.05 on each side"):
             read_thrust(_file(tmp_path, [(low, -1.0), (0.0, 0.0), (high, 2.0)]))
@@ -253,12 +254,12 @@ def test_a_table_has_at_most_two_thousand_points(points: int, is_read: bool, tmp
 
 
 def test_a_table_continues_with_its_last_slope_to_full_thrust() -> None:
-    table = ThrustFile(Path("t"), (-0.96, 0.0, 0.98), (-2.0, 0.0, 3.0)).table("t", 12.0)
-    assert (table.commands, table.voltage) == ((-1.0, -0.96, 0.0, 0.98, 1.0), 12.0)
+    table = thrust_table((-0.96, 0.0, 0.98), (-2.0, 0.0, 3.0))
+    assert table.commands == (-1.0, -0.96, 0.0, 0.98, 1.0)
     assert table.forces[0] == pytest.approx(-2.0 - 0.04 * table.slopes[1], rel=1e-15)
     assert table.forces[-1] == pytest.approx(3.0 + 0.02 * table.slopes[-2], rel=1e-15)
     assert (table.slopes[0], table.slopes[-1]) == (table.slopes[1], table.slopes[-2])
-    whole = ThrustFile(Path("t"), (-1.0, 0.0, 1.0), (-2.0, 0.0, 3.0)).table("t")
+    whole = thrust_table((-1.0, 0.0, 1.0), (-2.0, 0.0, 3.0))
     assert (whole.commands, whole.forces) == ((-1.0, 0.0, 1.0), (-2.0, 0.0, 3.0))
     current = CurrentTable(Path("t"), (-0.9, 0.0, 0.5), (9.0, 1.0, 3.0))
     expected = {-1.0: 9.0, -0.9: 9.0, -0.45: 5.0, 0.0: 1.0, 0.125: 1.5, 0.5: 3.0, 1.0: 3.0}

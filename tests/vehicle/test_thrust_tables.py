@@ -8,14 +8,15 @@ from typing import Any
 import pytest
 
 from rov_fmu.equation.catalogue import COMMANDS, CURVE, FIN
+from rov_fmu.equation.layout import CurrentTable
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.vehicle.test_checks import GONE, changed, quantity
 from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, THRUST_EFFECTS
+from tests.vehicles import EVERYTHING, THRUST_EFFECTS, carried
 
 TEXT = THRUST_EFFECTS.read_text(encoding="utf-8")
 _FILES = ("thrust_12_v.csv", "thrust_16_v.csv")
@@ -39,6 +40,11 @@ def table(folder: Path, text: str) -> Path:
     return path
 
 
+def currents_of(vehicle: Vehicle) -> list[CurrentTable]:
+    """The electric current of each curve. All curves of these vehicles have one."""
+    return [current for curve in vehicle.layout.curves if (current := curve.electric_current)]
+
+
 def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> None:
     found = read_thrust(table(tmp_path, "pulse [us];thrust [kgf]\n1100;-4\n1500;0,0\n1900;5\n1900;5,2\n"))
     assert found.commands == (-1.0, 0.0, 1.0)
@@ -48,7 +54,7 @@ def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> Non
 
 
 def test_the_makers_table_is_continued_to_full_thrust() -> None:
-    found = read_thrust(SHIPPED["bluerov2"].with_name("t200") / "t200_16_v.csv").table("t200")
+    found = read_thrust(SHIPPED["bluerov2"].with_name("t200") / "t200_16_v.csv")
     (first, second, *_), (*_, before, last) = found.commands, found.commands
     assert (first, second, before, last) == (-1.0, -0.99, 0.99, 1.0)
     assert found.force(1.0) == found.forces[-2] + 0.01 * found.slopes[-2]
@@ -95,9 +101,9 @@ def test_all_thrusters_have_their_current_from_one_battery(given: Any, wanted: s
     path = folder / "rov.toml"
     path.write_text(changed(curves, TEXT), encoding="utf-8")
     vehicle = load_vehicle(path)
-    assert {table.current(1.0) for table in vehicle.electric_currents.values()} == {12.0}
+    assert {table.current(1.0) for table in currents_of(vehicle)} == {12.0}
     write_vehicle(vehicle, folder / "again.toml")
-    assert load_vehicle(folder / "again.toml").electric_currents == vehicle.electric_currents
+    assert currents_of(load_vehicle(folder / "again.toml")) == currents_of(vehicle)
     if given:
         curves["curves.bow.electric_current"] = given
     else:
@@ -170,6 +176,11 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     written, tuned = (load_vehicle(folder / f"{name}.toml") for name in ("written", "tuned"))
     assert (written.layout, written.coefficients) == (vehicle.layout, dict(vehicle.coefficients))
     assert written.sources == vehicle.sources
+    assert carried(written) == carried(load_vehicle(here))
+    files = [[table.path.name for table in curve.tables if table.path] for curve in written.layout.curves]
+    assert files == [["thrust_12_v.csv", "thrust_16_v.csv"], ["thrust_16_v.csv"], []]
+    assert [fin.sources.keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(written.layout.fins)
+    assert written.layout.voltage_source == "a battery of four cells"
     assert {name: tuned[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
         "lift_rudder": 10.0,
         "T_d": 0.2,
@@ -182,8 +193,8 @@ def test_the_current_is_read_written_and_moved(folder: Path) -> None:
     write_vehicle(shipped, folder / "written.toml")
     write_tuned(SHIPPED["bluerov2"], folder / "tuned.toml", {"a_d_u": 20.0}, "by hand")
     for name in ("written", "tuned"):
-        assert load_vehicle(folder / f"{name}.toml").electric_currents == shipped.electric_currents
-    (current,) = shipped.electric_currents.values()
+        assert currents_of(load_vehicle(folder / f"{name}.toml")) == currents_of(shipped)
+    (current,) = currents_of(shipped)
     assert current.voltage == 16.0
 
 

@@ -47,7 +47,7 @@ def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
     assert vehicle.layout == PAPER
     assert set(vehicle.sources) == set(TABLE_9)
     assert all("Table 9" in source for source in vehicle.sources.values())
-    assert {name: list(words) for name, words in vehicle.thruster_sources.items()} == {n: ["direction"] for n in "lrt"}
+    assert {one.name: [*one.sources] for one in vehicle.layout.thrusters} == {n: ["direction"] for n in "lrt"}
     assert [a.values for a in vehicle.alternatives.values()] == [{"a_t_rear": 100.3, "b_t_rear": -27.09}]
     assert vehicle.command_range == (0.2, 0.7)
 

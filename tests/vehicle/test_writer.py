@@ -14,7 +14,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT, TESTS
 from tests.vehicle.test_vehicle import check_line, edit, refusal
-from tests.vehicles import EVERYTHING, SIX_AXES
+from tests.vehicles import EVERYTHING, SIX_AXES, carried
 
 TEXT = REFIT.read_text(encoding="utf-8")
 HASH = "0123456789abcdef" * 4
@@ -64,6 +64,7 @@ def test_a_vehicle_with_everything_reads_back(tmp_path: Path) -> None:
     everything, path = load_vehicle(EVERYTHING), tmp_path / "made.toml"
     write_vehicle(everything, path)
     assert load_vehicle(path) == everything
+    assert carried(load_vehicle(path)) == carried(everything)
     text = path.read_text(encoding="utf-8")
     assert text.count("format = 2\n") == 1
     assert text.count("alpha = ") == 1, "what the file does not give is not written"
@@ -73,6 +74,7 @@ def test_a_vehicle_with_six_axes_reads_back(tmp_path: Path) -> None:
     six, path = load_vehicle(SIX_AXES), tmp_path / "made.toml"
     write_vehicle(six, path)
     assert load_vehicle(path) == six
+    assert carried(load_vehicle(path)) == carried(six)
 
 
 @pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY], ids=lambda path: path.stem)
