@@ -169,6 +169,17 @@ class Thruster:
 
 
 @dataclass(frozen=True)
+class BodyForce(Thruster):
+    """The force along one axis of the body, or the moment about it, where logs have a wrench and not thrusters."""
+
+    axis: Axis = SURGE
+
+    def effect(self, axis: Axis) -> float:
+        """Return 1 for its own axis, and 0 for the others."""
+        return float(axis is self.axis)
+
+
+@dataclass(frozen=True)
 class Fin:
     """A control surface. Its lift is proportional to its angle."""
 
@@ -259,6 +270,19 @@ class Layout:
         object.__setattr__(self, "axes", tuple(named(form, form.axis.velocity) for form in self.axes))
         object.__setattr__(self, "curves", tuple(named(curve, curve.name) for curve in self.curves))
 
+    @classmethod
+    def of_wrench(cls, axes: "Iterable[VehicleAxis]") -> "Layout":
+        """Return the layout of a vehicle whose commands are a wrench in the body frame.
+
+        Each axis has a force of its own, which is linear in its command. It has the name of the load from outside.
+        """
+        axes, centre = tuple(axes), (0.0, 0.0, 0.0)
+        forces = []
+        for axis in (form.axis for form in axes):
+            x, y, z = (float(n == axis.place) for n in range(3))
+            forces.append(BodyForce(axis.external, axis.external, (x, y, z), centre, axis=axis))
+        return cls(axes, tuple(Curve(force.name) for force in forces), tuple(forces))
+
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
         wanted = set(names) - self.coefficients.keys()
@@ -304,6 +328,11 @@ class Layout:
         return self.has(YAW) and any(t.position is None and t.arm for t in self.thrusters)
 
     @cached_property
+    def has_wrench(self) -> bool:
+        """True when the commands are forces and moments along the axes of the body, in place of thrusters."""
+        return any(isinstance(thruster, BodyForce) for thruster in self.thrusters)
+
+    @cached_property
     def has_attitude(self) -> bool:
         """True when the vehicle rolls or pitches, so that its attitude is a quaternion."""
         return self.has(ROLL, PITCH)
@@ -346,6 +375,11 @@ class Layout:
     def driving(self, axis: Axis, fraction: float) -> dict[str, float]:
         """Return the commands that drive an axis in its positive direction with a fraction of the full command."""
         return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
+
+    def example(self, axis: Axis) -> dict[str, float]:
+        """Return inputs that drive an axis in its positive direction: 30 % of the command, or 5 N or N.m from outside
+        where nothing drives it."""
+        return self.driving(axis, 0.3) or {axis.external: 5.0}
 
     # -- declarations --
 

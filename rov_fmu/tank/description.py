@@ -14,7 +14,20 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.equation.catalogue import AXES, AXIS, CURVE, PITCH, REVERSE, ROLL, Declaration, coefficient_name
+from rov_fmu.equation.catalogue import (
+    AXES,
+    AXIS,
+    CURVE,
+    HEAVE,
+    PITCH,
+    REVERSE,
+    ROLL,
+    SURGE,
+    SWAY,
+    YAW,
+    Declaration,
+    coefficient_name,
+)
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -312,12 +325,17 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
                 name, "is not allowed together with base, which has its own; coefficients may be given in [known]"
             )
         return
-    for name in ("curves", "thruster") if present else ():
+    for name in ("curves", "thruster") if {*present} - {"body"} else ():
         if name not in data or data[name] in ({}, []):
             form = "[[thruster]]" if name == "thruster" else "[curves.<name>]"
             yield key_line(name, f"this table is missing, and there is {present[0]}: write {form}")
     if {"curves", "thruster"} <= data.keys():
         yield from check_names_and_keys(file, lost, data)
+
+
+def has_wrench(file: RovTables) -> bool:
+    """Return True for a rov.toml with [body] that describes no thrusters: the commands of its logs are a wrench."""
+    return bool(file.body and not (file.base or file.arm or file.thruster or file.curves or file.inputs or file.fin))
 
 
 def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> Description:
@@ -352,9 +370,17 @@ def _start(file: RovTables, base: Vehicle | None) -> tuple[Layout, Mapping[str, 
     limits = file.validity.limits if file.validity else base.limits if base else ()
     if base:
         return base.layout, base.thruster_sources, limits
+    if has_wrench(file):
+        forms = file.layout.axes or tuple(map(VehicleAxis, (SURGE, SWAY, HEAVE, YAW)))
+        wrench = replace(Layout.of_wrench(forms), coupled=file.layout.coupled, restoring=file.layout.restoring)
+        sources = {name: {"direction": _AXIS} for name in wrench.curve_of}
+        return replace(wrench, cross=file.layout.cross), sources, limits
     if file.thruster:
         return file.layout, file.thruster_sources, limits
     return PAPER, PAPER_SOURCES, limits
+
+
+_AXIS = "The axis of the body"
 
 
 def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:

@@ -72,13 +72,10 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) ->
         tables["battery"] = {
             "voltage": _inline_table({"value": layout.voltage, "unit": "V", "source": vehicle.voltage_source})
         }
-    tables["curves"] = {
-        curve.name: _curve(curve)
-        | _thrust_tables(curve, vehicle.thrust_files.get(curve.name, ()), folder)
-        | _electric_current(vehicle.electric_currents.get(curve.name), folder)
-        for curve in layout.curves
-    }
-    tables["thruster"] = tomlkit.aot()
+    if layout.curves:
+        tables["curves"] = _curves(vehicle, folder)
+    if layout.thrusters:
+        tables["thruster"] = tomlkit.aot()
     for thruster in layout.thrusters:
         tables["thruster"].append(tomlkit.item(_thruster(thruster, vehicle.thruster_sources[thruster.name])))
     fins = {fin.name: tomlkit.item(_fin(fin, vehicle.thruster_sources[fin.name])) for fin in layout.fins}
@@ -96,6 +93,16 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) ->
             table = fins[above[1]] if above[0] == "fin" else _table_at(tables, above)
             table[key] = quantities[name]
     return tables
+
+
+def _curves(vehicle: Vehicle, folder: Path) -> dict[str, Any]:
+    """Return the table of each curve, without its coefficients. Raises ValueError."""
+    return {
+        curve.name: _curve(curve)
+        | _thrust_tables(curve, vehicle.thrust_files.get(curve.name, ()), folder)
+        | _electric_current(vehicle.electric_currents.get(curve.name), folder)
+        for curve in vehicle.layout.curves
+    }
 
 
 def _thrust_tables(curve: Curve, files: Sequence[Path], folder: Path) -> dict[str, Any]:
@@ -222,7 +229,7 @@ def _moved(document: Any, source: Path, path: Path) -> Output:
 def _names_of_files(document: Any) -> Iterator[tuple[str, Any, str]]:
     """Yield each key that names a folder or another file: the name of its table, the table and the key."""
     tables = [(name, document.get(name, {})) for name in ("vehicle", "provenance")]
-    for name, curve in document["curves"].items():
+    for name, curve in document.get("curves", {}).items():
         tables.append((f"curves.{name}", curve))
         tables += [(f"curves.{name}.tables", row) for row in curve.get("tables", ())]
         tables.append((f"curves.{name}.electric_current", curve.get("electric_current", {})))

@@ -74,7 +74,7 @@ def documentation_page(
     held = held_commands(vehicle, tables.values())
     axes = [form.axis for form in layout.axes]
     first = axes[0]
-    start = layout.driving(first, 0.3)
+    start = layout.example(first)
     rest = {**layout.usual_inputs, **layout.at_rest}
     shown = equations.of(layout)
     own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]
@@ -101,7 +101,7 @@ def documentation_page(
         choices=equations.choices,
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         arm=[vehicle[name] for name in ARM] if layout.has_arm else None,
-        live=live([Flown(vehicle, module)]) if module else None,
+        live=live([Flown(vehicle, module)]) if module and layout.driven else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
@@ -122,6 +122,7 @@ def documentation_page(
                 partial(plot_steady, vehicle=vehicle, axis=a, table=tables.get(a.name)),
             )
             for a in axes
+            if layout.driven
         ],
         steps=[
             _plot(
@@ -129,6 +130,7 @@ def documentation_page(
                 partial(plot_steps, vehicle=vehicle, axis=a, commands=held, table=tables.get(a.name)),
             )
             for a in axes
+            if layout.driven
         ],
     )
 
