@@ -218,20 +218,30 @@ class CoefficientKind:
 
 
 BODY = {
-    "m_rov": CoefficientKind("kg", "Mass m_rov", 1e-3, 1e6),
+    "m_rov": CoefficientKind("kg", "Mass m_rov", 1e-3, 1e6, tunable=True),
     "I_p": CoefficientKind("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
     "I_q": CoefficientKind("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
     "I_r": CoefficientKind("kg.m2", "Moment of inertia about the vertical axis I_r", 1e-6, 1e6),
 }
 RESTORING = {
-    "W": CoefficientKind("N", "Weight W", 0.0, 1e8),
-    "B": CoefficientKind("N", "Buoyancy B", 0.0, 1e8),
-    "x_G": CoefficientKind("m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False),
-    "y_G": CoefficientKind("m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False),
-    "z_G": CoefficientKind("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False),
-    "x_B": CoefficientKind("m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False),
-    "y_B": CoefficientKind("m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False),
-    "z_B": CoefficientKind("m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False),
+    "W": CoefficientKind("N", "Weight W", 0.0, 1e8, tunable=True),
+    "B": CoefficientKind("N", "Buoyancy B", 0.0, 1e8, tunable=True),
+    "x_G": CoefficientKind(
+        "m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False, tunable=True
+    ),
+    "y_G": CoefficientKind(
+        "m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False, tunable=True
+    ),
+    "z_G": CoefficientKind("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False, tunable=True),
+    "x_B": CoefficientKind(
+        "m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False, tunable=True
+    ),
+    "y_B": CoefficientKind(
+        "m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False, tunable=True
+    ),
+    "z_B": CoefficientKind(
+        "m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False, tunable=True
+    ),
 }
 """The weight and the buoyancy of a vehicle, with their centres."""
 CROSS = {
@@ -260,7 +270,7 @@ FIN = {
 }
 """The coefficients of a control surface."""
 CURVE = {
-    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
+    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False, tunable=True),
     "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
     "n_V": CoefficientKind(
         "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False

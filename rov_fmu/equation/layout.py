@@ -418,6 +418,11 @@ class Layout:
         return found
 
     @cached_property
+    def tuning(self) -> tuple[str, ...]:
+        """The names of the tuning factors α and β. They are tunable in the FMU, as the mass and the ballast are."""
+        return tuple(form.axis.coefficient(key) for form in self.axes for key in TUNING)
+
+    @cached_property
     def commands(self) -> dict[str, Declaration]:
         """The inputs that drive the thrusters and the fins: fractions of the full command, or of the largest angle.
 

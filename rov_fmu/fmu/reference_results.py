@@ -65,7 +65,7 @@ class ExperimentFiles:
 def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     """Return the files by their path in the FMU. Raises DataFileError."""
     sets = {"tuned": vehicle}
-    if any(vehicle[name] != 1.0 for name in _tunable(vehicle)):
+    if any(vehicle[name] != 1.0 for name in vehicle.layout.tuning):
         sets["untuned"] = untuned(vehicle)
     files: dict[str, str] = {}
     experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files), *_attitude(vehicle, files)]
@@ -74,7 +74,7 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     if len(sets) > 1:
         for name, rov in sets.items():
             files[f"{name}.ssv"] = render(
-                "parameters.ssv.j2", name=name, values={key: repr(rov[key]) for key in _tunable(rov)}
+                "parameters.ssv.j2", name=name, values={key: repr(rov[key]) for key in rov.layout.tuning}
             )
             related.append(_related(f"{name}.ssv", PARAMETERS, "parameter", descriptions[name]))
     if "attitude.ssv" in files:
@@ -103,10 +103,6 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
 
 def _related(source: str, kind: str, role: str, description: str) -> dict[str, str]:
     return {"type": kind, "source": source, "role": role, "description": description}
-
-
-def _tunable(vehicle: Vehicle) -> list[str]:
-    return [name for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------

@@ -103,6 +103,10 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                     f"{v['name']} = {value!r} is refused; it stays {self.values[reference]!r}.", Fmi2Status.discard
                 )
                 return
+        if self.is_initialized and not self._has_mass(dict(zip(references, values, strict=True))):
+            words = "the mass matrix of these parameters is not positive definite; all of them stay as they are."
+            self.log(words, Fmi2Status.discard)
+            return
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
             if not self._may_set(reference):
@@ -118,6 +122,17 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                 self._warn_once(
                     "guess", f"{words}, because phi_0, theta_0 and psi_0 determine the attitude at the start"
                 )
+
+    def _has_mass(self, changed: Mapping[int, float]) -> bool:
+        """Return True if the mass matrix is positive definite with some values changed, by their references."""
+        if not any(self.declared[reference]["causality"] == "parameter" for reference in changed):
+            return True
+        values = [changed.get(reference, value) for reference, value in enumerate(self.values)]
+        try:
+            found = self.equation.numbers(dict(zip(self.place, values, strict=True)))
+        except ZeroDivisionError:
+            return False
+        return all(found[name] > 0.0 for name in self.equation.PIVOTS)
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""

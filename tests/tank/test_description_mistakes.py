@@ -62,7 +62,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         f"{HEAD}[body]\n{MASS}",
         {},
-        "/steady_heave.csv: its commands are of thrusters, and rov.toml has none: write [curves.<name>] and [[thruster]]",
+        "/steady_heave.csv: its commands are of thrusters, and rov.toml has none: write [curves.<name>] and",
     ),
     (
         f"{DOWN}[commands]\npulse = [1100, 1500, 1900]\n",

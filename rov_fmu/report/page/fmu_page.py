@@ -94,6 +94,7 @@ def documentation_page(
         settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
         card=card(vehicle),
+        ballast=[n for n, one in layout.coefficients.items() if one.tunable and n not in layout.tuning],
         coupled=listed(equations.coupled(layout)),
         has_full_mass=any(line.coupled for line in shown.motion),
         equations=shown,
@@ -210,7 +211,7 @@ def _is_cut_off(cell: Cell) -> bool:
 
 def _is_tuned(vehicle: Vehicle) -> bool:
     """Return True unless each alpha and beta is 1."""
-    return any(vehicle[name] != 1.0 for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable)
+    return any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------------------------
