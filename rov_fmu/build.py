@@ -188,7 +188,7 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     with temporary_folder("fmu-") as folder:
         fmpy.extract(str(path), unzipdir=folder)
         axis = vehicle.layout.axes[0].axis
-        start = vehicle.layout.driving(axis, 0.3)
+        start = vehicle.layout.example(axis)
         result = fmpy.simulate_fmu(folder, start_values=start)
     by_value = {value: " = ".join(name for name in start if start[name] == value) for value in start.values()}
     commands = ", ".join(f"{names} = {value:g}" for value, names in by_value.items())

@@ -503,7 +503,13 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
 
 @_commands.command("sdf")
 @_vehicle(default=str(VIDEORAY))
-@click.option("-o", "--output", type=_FILE, metavar="FILE.sdf", help="File to write. The default is <identifier>.sdf.")
+@click.option(
+    "-o",
+    "--output",
+    type=_FILE,
+    metavar="FILE.sdf|.urdf",
+    help="File to write. The default is <identifier>.sdf. URDF has the hydrodynamics for ROS 2.",
+)
 @click.option("--world", "in_world", is_flag=True, help="Put the model into a world with water, which Gazebo can run.")
 @click.option(
     "--added-mass",
@@ -525,7 +531,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     for warning in model.warnings:
         _warn(warning)
     following = shell_words("gz", "sim", "-r", path) if in_world else "include it in a world, or give --world"
-    print_end([path], following)
+    print_end([path], "" if path.suffix.lower() == ".urdf" else following)
 
 
 # ---- prove -----------------------------------------------------------------------------------------------------------

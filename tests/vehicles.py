@@ -97,7 +97,7 @@ def numbered(layout: Layout, **values: float) -> Vehicle:
     numbers |= _BODY_NUMBERS | values
     return Vehicle(
         layout,
-        {name: 1.0 if declaration.tunable else numbers[name] for name, declaration in layout.coefficients.items()},
+        {name: 1.0 if name in layout.tuning else numbers[name] for name in layout.coefficients},
     )
 
 
@@ -292,7 +292,7 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Vehicle:
     layout = layout or random_layout(rng)
     numbers = {}
     for name, declaration in layout.coefficients.items():
-        if declaration.tunable:
+        if name in layout.tuning:
             numbers[name] = spread(rng, -0.5, 0.5)
         elif name.startswith(("a_d", "b_d")):
             numbers[name] = spread(rng, -1.0, 2.0, zero=1 / 6)

@@ -254,6 +254,26 @@ static void check_voltage(fmu *f, double voltage)
     (void)f, (void)voltage;
 }
 
+/* Refuse parameters during a run with which the mass matrix is not positive definite. Before the run, parameters may be
+ * set one after the other, and the end of the initialization refuses the matrix. */
+static outcome check_mass(fmu *f, const unsigned vr[], size_t n, const double value[])
+{
+    if (f->now.mode == INSTANTIATED || f->now.mode == INITIALIZATION) {
+        return DONE;
+    }
+    double at[N_VARIABLES];
+    model_numbers numbers;
+    memcpy(at, f->now.values, sizeof at);
+    for (size_t i = 0; i < n; i++) {
+        at[place_of(vr[i])] = value[i];
+    }
+    model_prepare(at, &numbers);
+    if (!model_is_definite(&numbers)) {
+        DISCARD(f, "the mass matrix of these parameters is not positive definite; all of them stay as they are.");
+    }
+    return DONE;
+}
+
 static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double value[])
 {
     REQUIRE(n == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
@@ -276,6 +296,9 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
                         info->maximum, old);
             }
         }
+    }
+    if (coefficient) {
+        TRY(check_mass(f, vr, n, value));
     }
     for (size_t i = 0; i < n; i++) {
         const unsigned place = place_of(vr[i]);

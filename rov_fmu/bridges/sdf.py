@@ -100,7 +100,7 @@ class _Propeller:
 
 
 @dataclass(frozen=True)
-class _Link:
+class Link:
     """The rigid body of a link: mass, centre of mass and moments of inertia about it."""
 
     mass: float
@@ -126,39 +126,38 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
     Raises InputError about a vehicle that Gazebo cannot have at all.
     """
-    if mistake := next(_impossible(vehicle), None):
+    if mistake := next(impossible(vehicle), None):
         raise InputError(f"{vehicle.identifier}: {mistake}")
-    gravity, volume = _gravity(vehicle), _volume(vehicle)
-    link = _link(vehicle, volume)
-    added = _added_mass(vehicle, link.matrix)
+    link = link_of(vehicle)
+    added = added_mass(vehicle, link.matrix)
     propellers = [propeller for propeller in (_propeller(vehicle, t) for t in vehicle.layout.thrusters) if propeller]
     notes = tuple(_notes(vehicle, added, propellers, explicit=explicit))
     small, radius = _PROPELLER
     text = render(
         "model.sdf.j2",
         Path(__file__).parent / "templates",
-        number=_number,
-        vector=_vector,
-        comment=_comment,
+        number=number,
+        vector=vector,
+        comment=comment,
         vehicle=vehicle,
         version=__version__,
         notes=notes,
         in_world=in_world,
         density=DENSITY,
-        gravity=gravity,
+        gravity=gravity(vehicle),
         north=pi / 2.0,
-        body=_Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
-        propeller=_Link(link.mass * small, np.zeros(3), link.mass * small * radius**2 * np.eye(3)),
+        body=Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
+        propeller=Link(link.mass * small, np.zeros(3), link.mass * small * radius**2 * np.eye(3)),
         fluid_added_mass={} if explicit else dict(_in_link(added)),
         disable_coriolis=explicit and not vehicle.layout.coupled,
-        buoyancy={"centre": _centre(vehicle, "B"), "size": [volume ** (1.0 / 3.0)] * 3},
-        hydrodynamics=_damping(vehicle, link) | (dict(_in_plugin(added)) if explicit else {}),
+        buoyancy={"centre": _centre(vehicle, "B"), "size": [_volume(vehicle) ** (1.0 / 3.0)] * 3},
+        hydrodynamics=hydrodynamics(vehicle, link) | (dict(in_plugin(added)) if explicit else {}),
         thrusters=propellers,
     )
     return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
 
 
-def _impossible(vehicle: Vehicle) -> Iterator[str]:
+def impossible(vehicle: Vehicle) -> Iterator[str]:
     """Yield a line about each reason why Gazebo cannot have the vehicle."""
     if "m_rov" not in vehicle.coefficients:
         yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
@@ -170,9 +169,9 @@ def _impossible(vehicle: Vehicle) -> Iterator[str]:
     for name in (t.name for t in vehicle.layout.thrusters if f"{t.name}_joint" in thrusters):
         yield f"thruster.{name}_joint: choose another name for Gazebo, where the joint of {name} has this name"
     if _volume(vehicle) <= 0.0:
-        weight = vehicle["m_rov"] * _gravity(vehicle)
+        weight = vehicle["m_rov"] * gravity(vehicle)
         least = "must be less than the weight for Gazebo, because the Buoyancy plugin only pushes upwards"
-        yield f"the net weight of {_net_weight(vehicle):g} N {least}: {weight:g} N"
+        yield f"the net weight of {net_weight(vehicle):g} N {least}: {weight:g} N"
 
 
 # ---- Mass ------------------------------------------------------------------------------------------------------------
@@ -188,7 +187,7 @@ def _of_point(mass: float, position: Array) -> Array:
     return mass * _cross(position).T @ _cross(position)
 
 
-def _net_weight(vehicle: Vehicle) -> float:
+def net_weight(vehicle: Vehicle) -> float:
     """Return the load that acts downwards in the earth frame, N: weight less buoyancy, and F_0 of a level vehicle."""
     if not vehicle.layout.has(HEAVE):
         return 0.0
@@ -198,14 +197,14 @@ def _net_weight(vehicle: Vehicle) -> float:
     return weight + vehicle.coefficients.get(HEAVE.coefficient("F_0"), 0.0)
 
 
-def _gravity(vehicle: Vehicle) -> float:
+def gravity(vehicle: Vehicle) -> float:
     """Return the gravity of the world, m/s2: that of the vehicle file's weight."""
     return vehicle.coefficients.get("W", 0.0) / vehicle["m_rov"] or _GRAVITY
 
 
 def _volume(vehicle: Vehicle) -> float:
     """Return the volume of the displaced water, m3, which gives the net weight."""
-    return (vehicle["m_rov"] - _net_weight(vehicle) / _gravity(vehicle)) / DENSITY
+    return (vehicle["m_rov"] - net_weight(vehicle) / gravity(vehicle)) / DENSITY
 
 
 def _centre(vehicle: Vehicle, of: str) -> Array:
@@ -215,23 +214,23 @@ def _centre(vehicle: Vehicle, of: str) -> Array:
     return _SIGNS[:3] * [vehicle.coefficients.get(f"{axis}_{of}", 0.0) for axis in "xyz"]
 
 
-def _link(vehicle: Vehicle, volume: float) -> _Link:
+def link_of(vehicle: Vehicle) -> Link:
     """Return the body of a vehicle, without added mass.
 
     About an axis that the vehicle lacks, its moment of inertia is so large that it hardly turns.
     """
     mass, centre = vehicle["m_rov"], _centre(vehicle, "G")
     own = [vehicle.coefficients.get(axis.inertia) for axis in AXES.values() if axis.is_rotation]
-    typical = max((moment for moment in own if moment), default=mass * volume ** (2.0 / 3.0) / 6.0)
+    typical = max((moment for moment in own if moment), default=mass * _volume(vehicle) ** (2.0 / 3.0) / 6.0)
     about_origin = np.diag([_HELD_INERTIA * typical if moment is None else moment for moment in own])
     inertia = about_origin - _of_point(mass, centre)
     least, middle, most = np.linalg.eigvalsh(inertia)
     if least <= 0.0 or least + middle < most:  # no body has these moments, and SDFormat refuses them
         inertia = most * np.eye(3)
-    return _Link(mass, centre, inertia)
+    return Link(mass, centre, inertia)
 
 
-def _added_mass(vehicle: Vehicle, rigid: Array) -> Array:
+def added_mass(vehicle: Vehicle, rigid: Array) -> Array:
     """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
     found = np.zeros((6, 6))
     forms = vehicle.layout.by_velocity
@@ -256,7 +255,7 @@ def _in_link(added: Array) -> Iterator[tuple[str, float]]:
             yield f"{_IN_LINK[i]}{_IN_LINK[j]}", added[i, j]
 
 
-def _in_plugin(added: Array) -> Iterator[tuple[str, float]]:
+def in_plugin(added: Array) -> Iterator[tuple[str, float]]:
     """Yield the added mass for the Hydrodynamics plugin, which has Fossen's sign: xDotU is -m_a."""
     for i, j in np.argwhere(added):
         yield f"{_FORCES[i]}Dot{_VELOCITIES[j].upper()}", -added[i, j]
@@ -285,7 +284,7 @@ def _divergence(added: Array, rigid: Array) -> Iterator[str]:
 # ---- Damping ---------------------------------------------------------------------------------------------------------
 
 
-def _damping(vehicle: Vehicle, link: _Link) -> dict[str, float]:
+def hydrodynamics(vehicle: Vehicle, link: Link) -> dict[str, float]:
     """Return the terms of the Hydrodynamics plugin: xU of U, xUabsU of U|U|, xUU of U U, yUR of U R.
 
     U|U| and U U together give quadratic drag that depends on the direction.
@@ -303,7 +302,7 @@ def _damping(vehicle: Vehicle, link: _Link) -> dict[str, float]:
         if form is None:
             add(v, -link.matrix[n, n] / _HELD_TIME, v)
             continue
-        b, a = (_both_ways(vehicle, form, key) for key in ("b_d", "a_d"))
+        b, a = (both_ways(vehicle, form, key) for key in ("b_d", "a_d"))
         add(v, -sum(b) / 2.0, v)
         add(v, -sum(a) / 2.0, v, v, magnitude=True)
         if a[0] != a[1]:
@@ -319,7 +318,7 @@ def _damping(vehicle: Vehicle, link: _Link) -> dict[str, float]:
     return found
 
 
-def _both_ways(vehicle: Vehicle, form: VehicleAxis, key: str) -> tuple[float, float]:
+def both_ways(vehicle: Vehicle, form: VehicleAxis, key: str) -> tuple[float, float]:
     """Return a drag coefficient for positive and for negative velocities."""
     return vehicle[form.coefficient(key)], vehicle[form.coefficient(key + REVERSE)]
 
@@ -411,7 +410,7 @@ def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit
     """Yield what the plugins and Gazebo's rigid body do otherwise with the motion."""
     layout = vehicle.layout
     for form in layout.axes:
-        forward, back = _both_ways(vehicle, form, "b_d")
+        forward, back = both_ways(vehicle, form, "b_d")
         if forward != back:
             names = f"{form.coefficient('b_d')} and {form.coefficient('b_d' + REVERSE)}"
             yield f"{names}: linear drag has their mean in both directions"
@@ -435,16 +434,16 @@ def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit
 # ---- Text ------------------------------------------------------------------------------------------------------------
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     """Return a number with 12 digits, without a negative zero."""
     return f"{value + 0.0:.12g}"
 
 
-def _vector(values: Array) -> str:
+def vector(values: Array) -> str:
     """Return the components of a vector."""
-    return " ".join(map(_number, values))
+    return " ".join(map(number, values))
 
 
-def _comment(text: str) -> Markup:
+def comment(text: str) -> Markup:
     """Return a text for an XML comment, which must not contain two hyphens in a row."""
     return Markup(re.sub("-(?=-)", "- ", text.rstrip(".")))

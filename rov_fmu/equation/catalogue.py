@@ -207,20 +207,21 @@ class Declaration:
 
 
 BODY = {
-    "m_rov": Declaration("kg", "Mass m_rov", 1e-3, 1e6),
+    "m_rov": Declaration("kg", "Mass m_rov", 1e-3, 1e6, tunable=True),
     "I_p": Declaration("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
     "I_q": Declaration("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
     "I_r": Declaration("kg.m2", "Moment of inertia about the vertical axis I_r", 1e-6, 1e6),
 }
 RESTORING = {
-    "W": Declaration("N", "Weight W", 0.0, 1e8),
-    "B": Declaration("N", "Buoyancy B", 0.0, 1e8),
-    "x_G": Declaration("m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False),
-    "y_G": Declaration("m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False),
-    "z_G": Declaration("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False),
-    "x_B": Declaration("m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False),
-    "y_B": Declaration("m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False),
-    "z_B": Declaration("m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False),
+    "W": Declaration("N", "Weight W", 0.0, 1e8, tunable=True),
+    "B": Declaration("N", "Buoyancy B", 0.0, 1e8, tunable=True),
+    **{
+        f"{axis}_{symbol}": Declaration(
+            "m", f"Position of the {centre}, {where} {axis}_{symbol}", -100.0, 100.0, needed=False, tunable=True
+        )
+        for symbol, centre in (("G", "centre of mass"), ("B", "centre of buoyancy"))
+        for axis, where in (("x", "forward"), ("y", "to starboard"), ("z", "down"))
+    },
 }
 """The weight and the buoyancy of a vehicle, with their centres."""
 CROSS = {
@@ -247,7 +248,7 @@ FIN = {
 }
 """The coefficients of a control surface."""
 CURVE = {
-    "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False),
+    "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False, tunable=True),
     "V_0": Declaration("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
     "n_V": Declaration(
         "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False

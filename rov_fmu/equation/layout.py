@@ -86,6 +86,14 @@ class ThrustTable:
         """
         return float(interpolated(command, (self.commands, self.forces, self.slopes)))
 
+    def slope(self, command: float) -> float:
+        """Return the derivative of `force` with respect to the command."""
+        n = min(max(bisect_right(self.commands, command) - 1, 0), len(self.commands) - 2)
+        h = self.commands[n + 1] - self.commands[n]
+        t, rise = (command - self.commands[n]) / h, self.forces[n + 1] - self.forces[n]
+        a, b = h * self.slopes[n], h * self.slopes[n + 1]
+        return (a + t * (2.0 * (3.0 * rise - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * rise))) / h
+
 
 @dataclass(frozen=True)
 class CurrentTable:
@@ -199,6 +207,17 @@ class Thruster:
         if self.position is None and axis.is_rotation:
             return float(self.arm) if axis is YAW else 0.0
         return effect_along(axis, self.direction, self.position or (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class BodyForce(Thruster):
+    """The force along one axis of the body, or the moment about it, where logs have a wrench and not thrusters."""
+
+    axis: Axis = SURGE
+
+    def effect(self, axis: Axis) -> float:
+        """Return 1 for its own axis, and 0 for the others."""
+        return float(axis is self.axis)
 
 
 @dataclass(frozen=True)
@@ -316,6 +335,20 @@ class Layout:
             curves=tuple(replace(curve, keys=keys(curve, CURVE)) for curve in self.curves),
         )
 
+    @classmethod
+    def of_wrench(cls, axes: "Iterable[VehicleAxis]") -> "Layout":
+        """Return the layout of a vehicle whose commands are a wrench in the body frame.
+
+        Each axis has a force of its own, which is linear in its command. It has the name of the load from outside.
+        """
+        axes, centre = tuple(axes), (0.0, 0.0, 0.0)
+        forces = []
+        for axis in (form.axis for form in axes):
+            x, y, z = (float(n == axis.place) for n in range(3))
+            sources = {"direction": "The axis of the body"}
+            forces.append(BodyForce(axis.external, axis.external, (x, y, z), centre, sources=sources, axis=axis))
+        return cls(axes, tuple(Curve(force.name) for force in forces), tuple(forces))
+
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
         wanted = set(names) - self.coefficients.keys()
@@ -351,6 +384,11 @@ class Layout:
     def has_arm(self) -> bool:
         """True when R and γ are among the coefficients."""
         return self.has(YAW) and any(t.position is None and t.arm for t in self.thrusters)
+
+    @cached_property
+    def has_wrench(self) -> bool:
+        """True when the commands are forces and moments along the axes of the body, in place of thrusters."""
+        return any(isinstance(thruster, BodyForce) for thruster in self.thrusters)
 
     @cached_property
     def has_attitude(self) -> bool:
@@ -396,6 +434,11 @@ class Layout:
         """Return the commands that drive an axis in its positive direction with a fraction of the full command."""
         return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
 
+    def example(self, axis: Axis) -> dict[str, float]:
+        """Return inputs that drive an axis in its positive direction: 30 % of the command, or 5 N or N.m from outside
+        where nothing drives it."""
+        return self.driving(axis, 0.3) or {axis.external: 5.0}
+
     # -- declarations --
 
     @cached_property
@@ -440,6 +483,11 @@ class Layout:
                 description = found[beta].description.removesuffix(AT_ZERO)
                 found[beta] = replace(found[beta], description=description, minimum=LEAST_BETA)
         return found
+
+    @cached_property
+    def tuning(self) -> tuple[str, ...]:
+        """The names of the tuning factors α and β. They are tunable in the FMU, as the mass and the ballast are."""
+        return tuple(form.axis.coefficient(key) for form in self.axes for key in TUNING)
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:

@@ -62,6 +62,7 @@ OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets
 GROUPS = {[*filter(None, groups)]!r}  # of like size
 TURNING = {shared("pqr")!r}  # the angular velocities
 QUATERNION = {places(quaternion)!r}
+PIVOTS = {[name.identifier for name in equation.names.of_kind("pivot")]!r}  # of the mass matrix, all above 0
 ROTATION = {rotation!r}  # the first two rows of the rotation matrix
 {_tables(equation)}
 

@@ -24,7 +24,9 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     made = vehicle.provenance
     data = [f"Source of the coefficients: {vehicle.source}."]
     trust = ["No errors on unseen data are known: the vehicle file does not say how it was identified."]
-    holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
+    holds = ["Forces from outside drive it, its inputs; it has no thrusters."]
+    if vehicle.layout.driven:
+        holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
     holds += [
         f"The {thrust} is negative below {c:.0%}." for thrust, c in reversing(vehicle.layout, vehicle.coefficients)
     ]

@@ -170,7 +170,7 @@ def _step(
         f"V_ss = {V_ss:.4g} {axis.unit}{published('V_ss')}, Tau = {Tau:.4g} s{published('Tau')}"
         f"{', without ' * bool(neglected)}{listed(neglected)}"
     )
-    tunable = {name: vehicle[name] for name, declared in layout.coefficients.items() if declared.tunable}
+    tunable = {name: vehicle[name] for name in layout.tuning}
     return _Experiment(
         f"{axis.name}_{percent:g}{'_' * bool(tuning)}{tuning}",
         description,

@@ -98,6 +98,11 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
                 self.log(f"{name} = {value!r} is refused; it stays {self.values[name]!r}.", Fmi2Status.discard)
                 return
+        parameters = {v["name"]: value for v, value in pairs if v["causality"] == "parameter"}
+        if self.is_initialized and parameters and not self._has_mass(parameters):
+            words = "the mass matrix of these parameters is not positive definite; all of them stay as they are."
+            self.log(words, Fmi2Status.discard)
+            return
         for v, value in pairs:
             if not self._may_set(v):
                 self._warn_once("again", f"{v['name']} {_TOO_LATE}, but it has this value already")
@@ -112,6 +117,14 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                 self._warn_once(
                     "guess", f"{words}, because phi_0, theta_0 and psi_0 determine the attitude at the start"
                 )
+
+    def _has_mass(self, changed: Mapping[str, float]) -> bool:
+        """Return True if the mass matrix is positive definite with some parameters changed."""
+        try:
+            found = self.equation.numbers({**self.values, **changed})
+        except ZeroDivisionError:
+            return False
+        return all(found[name] > 0.0 for name in self.equation.PIVOTS)
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""

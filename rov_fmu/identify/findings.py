@@ -143,6 +143,8 @@ _READ: dict[Heading, frozenset[str]] = {
     ),
     "Facts": frozenset(
         {
+            "wrench",
+            "source of wrench",
             "rows sorted",
             "time stamps merged",
             "rows without time",

@@ -1,6 +1,6 @@
 """The vehicle of a fit, with the sources, intervals and correlations of its coefficients."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -85,6 +85,31 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         measured_from=_data(fit),
     )
     return vehicle, coefficients
+
+
+def without_wrench(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle of the file: the forces of a wrench are its loads from outside, the inputs X_ext ...
+
+    Other vehicles are returned as they are.
+    """
+    if not vehicle.layout.has_wrench:
+        return vehicle
+    layout = replace(vehicle.layout, curves=(), thrusters=())
+    kept = layout.coefficients
+    return replace(
+        vehicle,
+        layout=layout,
+        coefficients={name: vehicle[name] for name in kept},
+        sources={name: source for name, source in vehicle.sources.items() if name in kept},
+        intervals={name: interval for name, interval in vehicle.intervals.items() if name in kept},
+        estimates={name: _of_kept(row, kept) for name, row in vehicle.estimates.items() if name in kept},
+    )
+
+
+def _of_kept(row: Estimated, kept: Collection[str]) -> Estimated:
+    """Return an estimate with its correlations with the coefficients that are kept."""
+    correlation = {name: r for name, r in row.correlation.items() if name in kept}
+    return row.model_copy(update={"correlation": correlation})
 
 
 def _given_the_last(covariance: Array, count: int) -> Array:

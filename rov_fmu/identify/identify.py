@@ -13,7 +13,7 @@ from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import told
-from rov_fmu.identify.identified_vehicle import identified_vehicle
+from rov_fmu.identify.identified_vehicle import identified_vehicle, without_wrench
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Identification, Prediction, Slip
@@ -66,7 +66,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings]),
         inputs=tests.inputs,
-        vehicle=vehicle,
+        vehicle=without_wrench(vehicle),
         against=against,
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, map(curve.coefficient, curve.keys)) for curve in known.curves},

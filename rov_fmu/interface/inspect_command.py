@@ -127,6 +127,7 @@ def _draft(folder: Path, found: Sequence[Inspection], tables: TableHeaders, thru
         quoted=_quoted,
         names=one_line(brief(", ".join(dict.fromkeys(one.path.name for one in found)))),
         is_own=not base and len(thrusters) > 1,
+        is_wrench=not {*thrusters}.isdisjoint(axis.external for axis in AXES.values()),
         thrusters=thrusters,
         shipped=SHIPPED,
         base=base,
@@ -210,16 +211,13 @@ def _columns(found: Iterable[Inspection], tables: TableHeaders) -> tuple[dict[st
     """Return what headers seem to mean, and the descriptions of the others."""
     columns = {title: meant for title, meant in tables.columns.items() if meant}
     others = dict.fromkeys(tables.columns, "")
-    for one in found:  # of several ranges of forces, such as [N 20] and [N 50], the widest
-        columns |= {title: max(columns.get(title, ""), meant, key=_full_force) for title, meant in one.columns.items()}
+    for one in found:
+        columns |= one.columns
         others |= one.unread
+    if any(meant.startswith("-depth") for meant in columns.values()):  # z points up, in all files
+        turned = {axis.external for axis in AXES.values() if axis.place}
+        columns = {title: f"-{meant}" if meant.split()[0] in turned else meant for title, meant in columns.items()}
     return columns, {title: others[title] for title in sorted(others) if title not in columns}
-
-
-def _full_force(header: str) -> float:
-    """Return the force at full command in a header such as `u_x [N 50]`; 0 in others, and -1 for no header."""
-    match = re.search(r"\[N\S* (\S+)\]$", header)
-    return float(match[1]) if match else 0.0 if header else -1.0
 
 
 def _quoted(text: str) -> str:

@@ -207,6 +207,13 @@ OUTPUTS = (
 )
 """The outputs to thrusters. What an autopilot says that it sends is preferred to topics that only their names tell."""
 
+FORCE, TORQUE = "force", "torque"
+_WRENCH = r"geometry_msgs/.*Wrench(Stamped)?"
+WRENCHES = tuple(
+    Message(_WRENCH, _each(f"{nested}{part}.{{}}"), part) for nested in ("wrench.", "") for part in (FORCE, TORQUE)
+)
+"""The wrenches that drive a vehicle: forces in N and moments in N.m along the axes of the body."""
+
 NOT_MEASURED = {
     *("setpoint", "setpoints", "desired", "target", "ref", "reference", "cmd", "command", "commands", "goal", "error"),
     *("trajectory", "waypoint", "waypoints", "plan", "nominal", "gimbal", "set"),
@@ -253,7 +260,7 @@ def as_json(axis: Axis) -> list[dict[str, Any]]:
 @cache
 def is_known(kind: str) -> bool:
     """Return True if messages of this type may be recognised."""
-    kinds = [message.kind for message in MESSAGES] + [output.kind for output in OUTPUTS]
+    kinds = [message.kind for message in (*MESSAGES, *WRENCHES)] + [output.kind for output in OUTPUTS]
     return any(re.fullmatch(pattern, kind) for pattern in kinds)
 
 

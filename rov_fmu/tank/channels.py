@@ -191,11 +191,14 @@ def _attitude_of(measurement: _Measurement) -> Attitude:
 
 
 def _frames(measurement: _Measurement) -> tuple[Array, Array]:
-    """Return two matrices: from the earth frame of a message to north, east, down, and from its body frame to forward,
+    """Return the two matrices of `frames_of` for a message, whose frames the catalogue may know."""
+    return (np.eye(3), np.eye(3)) if measurement.message.frame else frames_of(measurement.topic.source)
+
+
+def frames_of(source: Source) -> tuple[Array, Array]:
+    """Return two matrices: from the earth frame of a source to north, east, down, and from its body frame to forward,
     starboard, down."""
-    if measurement.message.frame:
-        return np.eye(3), np.eye(3)
-    earth, body = measurement.topic.source.frames
+    earth, body = source.frames
     earth_words, body_words = words_of(earth), words_of(body)
     is_frd = bool(body_words & {"ned", "frd"}) or ("ned" in earth_words and "flu" not in body_words)
     is_ned = "ned" in earth_words or (not earth and is_frd)

@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 import numpy as np
 from pydantic import TypeAdapter
 
-from rov_fmu.equation.catalogue import SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
     FORCE_UNITS,
@@ -29,7 +29,7 @@ from rov_fmu.io.csv_table import (
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import ANGLES, QUANTITIES, TIMES, Quantity
+from rov_fmu.tank.catalogue import ANGLES, FORCE, QUANTITIES, TIMES, TORQUE, Quantity
 from rov_fmu.tank.commands import NO_KEYS, LogKeys
 from rov_fmu.tank.description import RovTables
 
@@ -147,9 +147,12 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
     """
     command = logged_command(keys)
     columns = {"time": LogColumn(TIME)}
-    if axis:
+    if axis and not layout.has_wrench:
         columns[COMMAND] = LogColumn(command, Entry(COMMAND), AXIS)
-    for name in (thruster.name for thruster in layout.thrusters):
+    for axis_of_force in AXES.values() if layout.has_wrench else ():  # a vehicle need not have them all
+        name = axis_of_force.external
+        columns[name] = LogColumn(_force_column(axis_of_force), Entry(name), THRUSTERS)
+    for name in (thruster.name for thruster in layout.thrusters if not layout.has_wrench):
         title = f"thruster {name}" if layout.mix else f"u_{name}"
         columns[title] = LogColumn(replace(command, also=(name,)), Entry(name), THRUSTERS)
     for name in layout.commands if layout.mix else ():
@@ -162,6 +165,12 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
         column = replace(quantity.column, also=(*quantity.also, *also))
         columns.setdefault(short, LogColumn(column, Entry(name, quantity)))  # the distance along the axis comes first
     return columns
+
+
+def _force_column(axis: Axis) -> Column:
+    """Return the column of the force of a wrench along an axis, or of the moment about it."""
+    part = f"{TORQUE if axis.is_rotation else FORCE} {'xyz'[axis.place]}"
+    return Column({axis.load: 1.0}, optional=True, minimum=-1e6, maximum=1e6, also=(part,))
 
 
 def known_columns(columns: Mapping[str, LogColumn]) -> dict[str, Column]:
@@ -217,6 +226,7 @@ def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:
 
 def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list[str], Array]:
     """Return the names of the thrusters, and n x thrusters commands within ±1, from n commands of inputs or thrusters.
+    The forces of a wrench have no such limit.
 
     An input or a thruster without a command has the command 0. The command of an axis, and those of a vehicle whose
     thrusters are not known, keep their names.
@@ -228,4 +238,5 @@ def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list
         name: sum((gain * values.get(one, still) for one, gain in gains.get(name, {name: 1.0}).items()), still)
         for name in named or values
     }
-    return [*mixed], np.clip(np.column_stack([*mixed.values()]), -1.0, 1.0)
+    commands = np.column_stack([*mixed.values()])
+    return [*mixed], commands if layout.has_wrench else np.clip(commands, -1.0, 1.0)

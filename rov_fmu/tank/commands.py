@@ -21,12 +21,13 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from rov_fmu.equation.layout import BodyForce
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
 from rov_fmu.io.messages import listed, shown
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.tank.arrays import Array, spread
-from rov_fmu.tank.catalogue import NOT_COMMANDED, OUTPUTS, Output, words_of
-from rov_fmu.tank.channels import Topic
+from rov_fmu.tank.catalogue import FORCE, NOT_COMMANDED, OUTPUTS, WRENCHES, Output, words_of
+from rov_fmu.tank.channels import Topic, frames_of
 from rov_fmu.tank.clocks import ascending, held
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
@@ -130,7 +131,8 @@ class Commanded:
     """The commands of a log, and who sent them."""
 
     series: Mapping[str, Series] = field(default_factory=dict)
-    """The commands of each thruster, not yet limited to ±1, by its name; empty where the log has none."""
+    """The commands of each thruster, not yet limited to ±1, or the forces of a wrench, N or N.m, by name; empty where
+    the log has none."""
     sender: Source | None = None
     other_vehicles: Collection[str] = ()
     """The other vehicles that have commands."""
@@ -158,6 +160,35 @@ def commands_of(
     findings = [*_choice(path, best, own, sorted(vehicles))]
     series, meanings = _fractions(path, best, dict(zip(names, numbers, strict=True)), parameters, keys)
     return Commanded(series, best.source, vehicles - {vehicle}, [*findings, *meanings])
+
+
+def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], keys: LogKeys) -> Commanded:
+    """Return the forces of the wrench that a log has, forward, starboard and down, N or N.m. Raises DataFileError.
+
+    Of several wrenches, the one that changes most is used, unless [logs] names one.
+    """
+    found: dict[Source, dict[str, Series]] = {}
+    for message in WRENCHES:
+        for topic in topics:
+            if re.fullmatch(message.kind, topic.source.kind) and {*message.fields} <= topic.fields.keys():
+                _, body = frames_of(topic.source)
+                values = np.column_stack([topic.fields[field] for field in message.fields]) @ body.T
+                for force in forces:
+                    if force.axis.is_rotation == (message.gives != FORCE):
+                        series = topic.time, np.nan_to_num(values[:, force.axis.place])
+                        found.setdefault(topic.source, {})[force.name] = series
+    chosen = {source: own for source, own in found.items() if keys.outputs in ("", source.topic)}
+    if found and not chosen:
+        known = listed(shown(source.topic) for source in found)
+        raise DataFileError(f"{path}: [logs] names the outputs {shown(keys.outputs)}, but the log has {known}")
+    if not chosen:
+        return Commanded()
+    best = max(chosen, key=lambda source: sum(spread(values) for _, values in chosen[source].values()))
+    others = [source.topic for source in chosen if source is not best]
+    left = f"; not used: {listed(others)}" if others else ""
+    return Commanded(
+        chosen[best], best, findings=[about(path.name, "source of wrench", source=best.topic, others=left)]
+    )
 
 
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:

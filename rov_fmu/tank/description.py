@@ -14,7 +14,18 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Declaration, coefficient_name
+from rov_fmu.equation.catalogue import (
+    AXES,
+    HEAVE,
+    PITCH,
+    REVERSE,
+    ROLL,
+    SURGE,
+    SWAY,
+    YAW,
+    Declaration,
+    coefficient_name,
+)
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -307,7 +318,7 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
                 name, "is not allowed together with base, which has its own; coefficients may be given in [known]"
             )
         return
-    for name in ("curves", "thruster") if present else ():
+    for name in ("curves", "thruster") if {*present} - {"body"} else ():
         if name not in data or data[name] in ({}, []):
             form = "[[thruster]]" if name == "thruster" else "[curves.<name>]"
             yield key_line(name, f"this table is missing, and there is {present[0]}: write {form}")
@@ -315,10 +326,15 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
         yield from check_names_and_keys(file, lost, data)
 
 
+def has_wrench(file: RovTables) -> bool:
+    """Return True for a rov.toml with [body] that describes no thrusters: the commands of its logs are a wrench."""
+    return bool(file.body and not (file.base or file.arm or file.thruster or file.curves or file.inputs or file.fin))
+
+
 def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> Description:
     """Put together the description from the parts of the file and the base."""
     own_layout = file.layout
-    start = base.layout if base else file.layout if file.thruster else PAPER
+    start = base.layout if base else _start(file)
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
     # With `[fit] voltage`, V_0 belongs to the effect that is fitted.
     names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
@@ -339,6 +355,15 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         limits=file.validity.limits if file.validity else base.limits if base else (),
         base_name=data.get("base", ""),
     )
+
+
+def _start(file: RovTables) -> Layout:
+    """Return the layout to begin with, of a file without a base."""
+    if has_wrench(file):
+        forms = file.layout.axes or tuple(map(VehicleAxis, (SURGE, SWAY, HEAVE, YAW)))
+        own = file.layout
+        return replace(Layout.of_wrench(forms), coupled=own.coupled, restoring=own.restoring, cross=own.cross)
+    return file.layout if file.thruster else PAPER
 
 
 def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:

@@ -34,6 +34,7 @@ from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.parsers import one_parser, open_table
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
+from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
 KINDS = (*TABLES, "log")
@@ -114,7 +115,32 @@ class Folder:
         if self.mistakes or not (self.logs or self.rows):
             self.mistakes += self.unreadable
         self.logs = [checked(log) for log in self.logs]
+        if self.layout and self.layout.has_wrench:
+            self._relate_to_full_force()
         self.findings += [finding for log in self.logs for finding in log.findings]
+
+    def _relate_to_full_force(self) -> None:
+        """Make the forces of a wrench fractions of the largest ones in all logs, which become the vehicle's thrust."""
+        description = self.rov_file.description
+        assert description
+        for name in (name for (kind, _), names in self.files.items() if kind != "log" for name in names):
+            reason = f"its commands are of thrusters, and {ROV_FILE} has none: write [curves.<name>] and [[thruster]]"
+            self.mistakes.append(f"{self.path / name}: {reason}")
+        largest = [log.commands.largest for log in self.logs if log.commands]
+        names = [curve.name for curve in description.layout.curves]
+        full = {name: max((one.get(name, 0.0) for one in largest), default=0.0) or 1.0 for name in names}
+        self.logs = [replace(log, commands=log.commands and log.commands.relative_to(full)) for log in self.logs]
+        source = "The largest force in the logs"
+        known = {
+            curve.coefficient(key): Quantity(value=value, unit="N", source=source)
+            for curve in description.layout.curves
+            for key, value in (("a_t", 0.0), ("b_t", full[curve.name]))
+        }
+        self.rov_file = replace(self.rov_file, description=replace(description, known={**description.known, **known}))
+        if self.logs:
+            loads = {form.axis.external: form.axis.load for form in description.layout.axes}
+            told = [f"{name} = {most:.3g} {loads[name]}" for name, most in full.items() if name in loads]
+            self.findings.append(Finding("wrench", names={"full": listed(told)}))
 
     def read_dive(self, dive: Dive) -> None:
         """Read the files of a dive together."""

@@ -5,7 +5,7 @@ identification, `--inspect`, the flight page and `simulate` use it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +92,8 @@ class Commands:
     thruster: NDArray[np.intp]
     """n: the index of the thruster that changes."""
     value: Array
-    """n: the new command, a fraction of the full command within ±1."""
+    """n: the new command, a fraction of the full command within ±1. That of a wrench is in N or N.m until all logs of a
+    folder are read, whose largest force is full command."""
     source: Source = field(default_factory=lambda: Source(""))
 
     @property
@@ -104,6 +105,17 @@ class Commands:
     def end(self) -> float:
         """The time until which the last commands hold, s."""
         return float(self.rows[-1]) + self.interval
+
+    @property
+    def largest(self) -> dict[str, float]:
+        """The size of the largest command of each thruster."""
+        by_thruster = (np.abs(self.value[self.thruster == n]) for n in range(len(self.thrusters)))
+        return {name: float(own.max(initial=0.0)) for name, own in zip(self.thrusters, by_thruster, strict=True)}
+
+    def relative_to(self, full: Mapping[str, float]) -> "Commands":
+        """Return the commands divided by a full command of each thruster."""
+        each = np.array([full[name] for name in self.thrusters])
+        return replace(self, value=self.value / each[self.thruster])
 
     def at(self, time: Array) -> Array:
         """Return the command of each thruster at some times, times x thrusters; 0 before its first change."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.layout import BodyForce, Layout
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import in_rows
 from rov_fmu.tank.columns import (
@@ -23,7 +23,7 @@ from rov_fmu.tank.columns import (
     is_of_inputs,
     thruster_commands,
 )
-from rov_fmu.tank.commands import LogKeys, Series, commands_of
+from rov_fmu.tank.commands import LogKeys, Series, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.content import Content, Piece, described
@@ -67,7 +67,11 @@ def _log(
     named, told, labels = _meant(piece, entries)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
-    commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
+    if layout.has_wrench:
+        forces = [thruster for thruster in layout.thrusters if isinstance(thruster, BodyForce)]
+        commanded = wrench_of(path.with_name(file), topics, forces, keys)
+    else:
+        commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
     source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
     findings = [*content.findings * is_first, *commanded.findings, *_findings(file, layout, series, labels)]
@@ -115,11 +119,13 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
 
     `labels` has the column or field of each input, thruster or axis that rov.toml or a table names.
     """
-    for name, (_, values) in series.items():
+    for name, (_, values) in series.items() if not layout.has_wrench else ():
         if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
             yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
     expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
     for title, column in columns_of_log(layout, None).items():
         is_expected = column.commands == expected and column.entry and column.entry.name not in series
+        if layout.has_wrench and title not in layout.curve_of:
+            continue
         if is_expected and series and COMMAND not in series:
             yield about(file, "missing column", column=title)

@@ -70,6 +70,8 @@ def undriven_axes(layout: Layout) -> Iterator[tuple[Axis, str]]:
 
     Sway comes last: two thrusters with a toe-in turn the vehicle, and their push to the side is a by-product.
     """
+    if not layout.driven:
+        return
     axes = sorted((form.axis for form in layout.axes), key=lambda axis: axis is SWAY)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
     for axis in (axis for axis in axes if axis not in _RIGHTED):

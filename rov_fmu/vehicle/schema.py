@@ -480,13 +480,16 @@ class _Head(Strict):
     validity: Validity | None = None
 
 
-NEEDED = ("format", "vehicle", "validity", "body", "curves", "thruster", "axes")
+NEEDED = ("format", "vehicle", "validity", "body", "axes")
 """The keys and tables that a vehicle file must have."""
+DRIVING = ("curves", "thruster")
+"""The tables that it must also have, unless nothing in it is of thrusters, so that loads from outside drive it."""
 
 
 def _needed_in_file(schema: dict[str, Any]) -> None:
     """Tell editors what a vehicle file must have."""
     schema["required"] = [*NEEDED]
+    schema["dependentRequired"] = {"curves": ["thruster"], "thruster": ["curves"]}
     schema["properties"]["curves"]["minProperties"] = 1
     schema["properties"]["thruster"]["minItems"] = 1
 
@@ -564,10 +567,11 @@ def _with_missing_keys(
 
 def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -> Iterator[ErrorDetails]:
     """Yield a problem, as pydantic reports it, for each key that is needed and missing."""
-    for name in needed:
+    drives = DRIVING if needed is NEEDED and not data.keys().isdisjoint((*DRIVING, "arm", "fin", "inputs")) else ()
+    for name in (*needed, *drives):
         if name not in data:
             yield _missing(data, name)
-        elif data[name] in ({}, []) and name in ("curves", "thruster"):
+        elif data[name] in ({}, []) and name in DRIVING:
             reason = "must have at least 1 item, not 0"
             yield {"type": "too_short", "loc": (name,), "msg": reason, "input": data[name]}
     places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",))]

@@ -211,7 +211,7 @@ def _moved(document: Any, source: Path, path: Path) -> Output:
 def _names_of_files(document: Any) -> Iterator[tuple[str, Any, str]]:
     """Yield each key that names a folder or another file: the name of its table, the table and the key."""
     tables = [(name, document.get(name, {})) for name in ("vehicle", "provenance")]
-    for name, curve in document["curves"].items():
+    for name, curve in document.get("curves", {}).items():
         tables.append((f"curves.{name}", curve))
         tables += [(f"curves.{name}.tables", row) for row in curve.get("tables", ())]
         tables.append((f"curves.{name}.electric_current", curve.get("electric_current", {})))

@@ -213,6 +213,11 @@ def test_what_is_set_again_is_harmless_and_the_angles_replace_the_quaternion(
     assert put(eta=1.0) == ["eta must not be set after the initialization; it was not."]
     assert get("N_ext", "psi_0", *QUATERNION) == [20.0, 0.5, *turned]
     assert put(alpha_r=0.5, N_ext=1.0) == []
+    before = get("m_rov", "z_G", "der(q)")
+    (refused,) = put(m_rov=2.0 * SIX["m_rov"], z_G=50.0)
+    assert refused.startswith("the mass matrix of these parameters is not positive definite")
+    assert get("m_rov", "z_G", "der(q)") == before
+    assert put(m_rov=1.2 * SIX["m_rov"]) == []
 
 
 # start time, stop time, t and h of a step, and True if the step is accepted

@@ -498,8 +498,8 @@ def test_headers_that_nothing_explains_are_listed_and_drafted(
         "field.position.z": "-depth [m]",
         "field.velocity.x": "surge velocity [m/s]",
         "field.velocity.y": "-sway velocity [m/s]",
-        "field.force.x": "u_x [N 600]",
-        "field.force.z": "u_z [N 10]",
+        "field.force.x": "X_ext [N]",
+        "field.force.z": "-Z_ext [N]",
     }
     assert document["dives"] == {"dive_1": {"files": ["wrench.csv", "state.csv"]}}
 

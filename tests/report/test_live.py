@@ -113,7 +113,7 @@ _FLY = """legs => {
 def a_manoeuvre(vehicle: Vehicle) -> list[Leg]:
     """Return random commands (some of which saturate), loads, currents and tunings, for 5 ms to 5 s each."""
     rng, layout = random.Random(vehicle.identifier), vehicle.layout
-    tunable = [name for name, declaration in layout.coefficients.items() if declaration.tunable]
+    tunable = [*layout.tuning]
     return [
         {
             "length": exp(rng.uniform(log(5e-3), log(5.0))),

@@ -62,7 +62,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         f"{HEAD}[body]\n{MASS}",
         {},
-        "/rov.toml: curves: this table is missing, and there is body | /rov.toml: thruster: this table is missing, and",
+        "/steady_heave.csv: its commands are of thrusters, and rov.toml has none: write [curves.<name>] and",
     ),
     (
         f"{DOWN}[commands]\npulse = [1100, 1500, 1900]\n",

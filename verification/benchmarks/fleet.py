@@ -32,7 +32,7 @@ class Variations:
 
     def __init__(self, rov: Vehicle, count: int) -> None:
         self.rov, layout = rov, rov.layout
-        self.parameters = [name for name, declaration in layout.coefficients.items() if declaration.tunable]
+        self.parameters = [*layout.tuning]
         self.values = np.random.default_rng(1).uniform(0.7, 1.3, (count, len(self.parameters)))
         self.values *= [rov[name] for name in self.parameters]
         self.work = Work(rov, False, _HOLD, _COMMANDS, 1)

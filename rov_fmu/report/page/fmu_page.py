@@ -77,7 +77,7 @@ def documentation_page(
     held = held_commands(vehicle, tables.values())
     first = layout.axes[0].axis
     driven = [form.axis for form in layout.axes if layout.signs(form.axis)]
-    start = layout.driving(first, 0.3)
+    start = layout.example(first)
     rest = {**layout.usual_inputs, **layout.at_rest}
     shown = equations.of(layout)
     own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]
@@ -97,6 +97,7 @@ def documentation_page(
         settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
         card=card(vehicle),
+        ballast=[n for n, one in layout.coefficients.items() if one.tunable and n not in layout.tuning],
         coupled=listed(equations.coupled(layout)),
         has_full_mass=shown.has_full_mass,
         equations=shown,
@@ -105,7 +106,7 @@ def documentation_page(
         choices=equations.choices,
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         arm=[vehicle[name] for name in ARM] if layout.has_arm else None,
-        live=live([Flown(vehicle, module)]) if module else None,
+        live=live([Flown(vehicle, module)]) if module and layout.driven else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
@@ -212,7 +213,7 @@ def _is_cut_off(cell: Cell) -> bool:
 
 def _is_tuned(vehicle: Vehicle) -> bool:
     """Return True unless each alpha and beta is 1."""
-    return any(vehicle[name] != 1.0 for name, declaration in vehicle.layout.coefficients.items() if declaration.tunable)
+    return any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------------------------

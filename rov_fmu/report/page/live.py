@@ -62,7 +62,7 @@ class Live:
     loads: Sequence[tuple[str, float, str]]
     """The inputs that are not commands: name, end of the slider, unit."""
     tunable: Sequence[tuple[str, str, float, float, float]]
-    """The tunable coefficients: name, label, both ends of the slider, value in the vehicle file."""
+    """The tuning factors: name, label, both ends of the slider, value in the vehicle file."""
     title: str
     """The name of the vehicle, or the names of both."""
     other: str | None
@@ -130,7 +130,7 @@ def _data(flown: Flown) -> dict[str, Any]:
             for thruster, label in zip(layout.thrusters, _labels(vehicle), strict=True)
         ],
         "fins": [{"at": fin.position, "along": fin.direction} for fin in layout.fins],
-        "tunable": [name for name, declaration in layout.coefficients.items() if declaration.tunable],
+        "tunable": list(layout.tuning),
         "tests": list(_tests(vehicle)),
         "size": size_of(vehicle),
     }
@@ -276,7 +276,7 @@ def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, 
 
 
 def _tunable(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float]]:
-    """Yield the sliders of the tunable coefficients."""
+    """Yield the sliders of the tuning factors."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
         for axis in (form.axis for form in vehicle.layout.axes):
             value = vehicle[name := axis.coefficient(key)]

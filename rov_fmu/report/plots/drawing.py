@@ -41,7 +41,7 @@ def draw_icon(ax: Axes, vehicle: Vehicle) -> None:
     ax.add_patch(PathPatch(_body(x, y), facecolor=LIGHT["band"], edgecolor=LIGHT["metal"], linewidth=2.0))
     for mark in marks:
         _draw_mark(ax, mark, 1.6 * size)
-    reach = 1.1 * max(x, *(abs(part) for mark in marks for part in mark.tip(1.6 * size)))
+    reach = 1.1 * max([x, *(abs(part) for mark in marks for part in mark.tip(1.6 * size))])
     ax.set(aspect="equal", xlim=(-reach, reach), ylim=(reach, -reach))
     ax.set_axis_off()
 

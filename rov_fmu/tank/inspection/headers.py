@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby, takewhile
-from math import ceil, floor, inf, log10, pi
+from math import inf, pi
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns, read_header
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import COMMANDS, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES
+from rov_fmu.tank.catalogue import COMMANDS, FORCE, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES, TORQUE
 from rov_fmu.tank.columns import columns_of, columns_of_log, known_columns
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
@@ -30,8 +30,6 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
 _CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
 _LIKELY = {"depth": 100.0, "heading": 2.1 * pi, "roll angle": pi, "pitch angle": 0.5 * pi, "voltage": 1000.0}
 """The largest number that is likely in the SI unit. If a larger one has no unit, it is in a smaller unit."""
-_FORCES = {"force": "N", "torque": "N.m"}
-"""The words by which a column of a wrench is recognised, and its unit."""
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """The least time since 1970 that is in a unit."""
 
@@ -86,6 +84,12 @@ def guessed(
     meant = {title: _meant(title, numbers[title], rotations) for title in titles}
     commanding = _commanding(meant, numbers)
     names = _names(commanding)
+    forces = {title: force for title in commanding if (force := _force(title))}
+    if forces:
+        wrench = {title: f"{axis.external} [{axis.load}]" for title, axis in forces.items()}
+        others = {title: name for title, name in meant.items() if title not in forces}
+        measured = _measured(others, numbers, is_up=_is_up(meant, numbers))
+        return Layout.of_wrench(map(VehicleAxis, AXES.values())), wrench | measured
     layout = fitting(names, layouts) or layout_of(names)
     known = [thruster.name for thruster in layout.thrusters]
     is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
@@ -100,7 +104,7 @@ def guessed(
 def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
     """Return the headers of the commands of thrusters, or else those of forces that are applied."""
     commanding = [title for title, name in meant.items() if _is_command(title, numbers[title], name)]
-    return commanding[:_MOST_THRUSTERS] or [t for t in meant if _unit_of_force(t) and len(numbers[t])]
+    return commanding[:_MOST_THRUSTERS] or [t for t in meant if _force(t) and len(numbers[t])]
 
 
 def _is_up(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> bool:
@@ -193,18 +197,18 @@ def _unit(title: str, name: str, numbers: Array) -> str:
     return given if given in units else likely
 
 
-def _unit_of_force(title: str) -> str:
-    """Return the unit of a component of a force or torque that is applied, or an empty text for another header."""
-    match = re.search(rf"\b({'|'.join(_FORCES)})\b.* [xyz]$", _words(title))
-    return _FORCES[match[1]] if match else ""
+def _force(title: str) -> Axis | None:
+    """Return the axis of a component of a wrench, a force or torque that is applied; None for another header."""
+    match = re.search(rf"\b({FORCE}|{TORQUE})\b.* ([xyz])$", _words(title))
+    if not match:
+        return None
+    place, is_rotation = "xyz".index(match[2]), match[1] == TORQUE
+    return next(axis for axis in AXES.values() if (axis.place, axis.is_rotation) == (place, is_rotation))
 
 
 def _unit_of_command(title: str, numbers: Array) -> str:
     """Return the unit of a command: from its header, or else from the size of the values."""
     unit, most = header_parts(title)[1], float(np.abs(numbers).max(initial=0.0))
-    if unit_of_force := _unit_of_force(title):
-        digit = 10.0 ** floor(log10(most)) if most > 0.0 else 1.0
-        return f"{unit_of_force} {max(ceil(most / digit), 1) * digit:g}"  # 60 for 52.3
     known = unit in ("%", "1") or unit.startswith(PULSES)
     return unit if known else "1" if most <= 1.0 else "%" if most <= 100.0 else "us"
 

@@ -10,6 +10,7 @@ from typing import TextIO
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, read_columns, read_header
 from rov_fmu.io.messages import shown
@@ -154,8 +155,10 @@ def _commands(log: Log) -> Iterator[Row]:
     if not log.commands:
         return
     rows = log.commands.rows
+    loads = {axis.external: axis.load for axis in AXES.values()}
     for name, values in zip(log.commands.thrusters, log.commands.at(rows).T, strict=True):
-        yield _row(name if log.follows_axis else f"thruster {name}", "1", rows, values)
+        is_named = log.follows_axis or name in loads
+        yield _row(name if is_named else f"thruster {name}", loads.get(name, "1"), rows, values)
 
 
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------

@@ -70,11 +70,11 @@ def _frames(message: Any, kind: str) -> tuple[str, str]:
     """Return the frames of the pose and of the twist in a message.
 
     A child frame is that of the body: of the rotation of a pose, and of the twist in odometry. Otherwise, the frame in
-    the header is that in which the numbers are given, or, in a message of an IMU, the body's.
+    the header is that in which the numbers are given, or, in a message of an IMU or a wrench, the body's.
     """
     header = getattr(message, "header", None)
     frame, child = (header.frame_id if header else ""), getattr(message, "child_frame_id", "")
-    return ("", frame) if re.search("Imu|Twist", kind) else (frame, child)
+    return ("", frame) if re.search("Imu|Twist|Wrench", kind) else (frame, child)
 
 
 def _numbers(place: str, value: Any) -> Iterator[tuple[str, float]]:

@@ -26,7 +26,7 @@ from rov_fmu.io.csv_table import (
     DataFileError,
     read_columns,
 )
-from rov_fmu.io.messages import did_you_mean, shown, similar
+from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
@@ -173,7 +173,9 @@ def _no_commands(
     near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
     hint = f"; is it the column {' or '.join(near)}?" if near else ""
     hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
-    return f"there is no column of commands. Possible columns: {wanted}, each in [%], [1] or [us]{hint or renaming}"
+    units = dict.fromkeys(f"[{unit}]" for one in known.values() if one.commands for unit in one.column.units)
+    every = "each in [%], [1] or [us]" if "[%]" in units else f"in {listed(units, 'or')}"
+    return f"there is no column of commands. Possible columns: {wanted}, {every}{hint or renaming}"
 
 
 def _no_axis_in_name(path: Path, layout: Layout) -> str:

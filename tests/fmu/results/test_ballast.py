@@ -1,0 +1,93 @@
+"""The mass, the ballast and their places change during a run: velocities go on, and an impossible mass is refused."""
+
+import struct
+from typing import Any
+
+import pytest
+from fmpy import read_model_description
+
+from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, OK, STEP, Fmu
+from tests.fmu.calls.conftest import WRAPPERS
+from tests.fmu.calls.test_state_bytes import checksum
+from tests.vehicles import SIX, a_vehicle
+from verification.references import rigid_vehicle
+from verification.references.rigid_vehicle import compared, places
+
+ROV = a_vehicle(SIX)
+INPUTS = ROV.layout.usual_inputs | {"X_ext": 6.0, "Y_ext": -2.0, "Z_ext": 3.0, "K_ext": 0.3, "N_ext": 0.2, "V_N": 0.1}
+BALLAST = {name: factor * ROV[name] for name, factor in {"m_rov": 1.3, "W": 1.25, "B": 1.1, "z_G": 0.8}.items()}
+BALLAST |= {"x_B": ROV["x_B"] + 0.01, "y_G": ROV["y_G"] - 0.005}
+IMPOSSIBLE = {"m_rov": 2.0 * ROV["m_rov"], "z_G": 50.0}
+
+
+@pytest.fixture(scope="module", params=WRAPPERS, ids="FMI {}.0".format)
+def fmu(request: pytest.FixtureRequest) -> Fmu:
+    version: int = request.param
+    return WRAPPERS[version](request.getfixturevalue({2: "six_dir", 3: "six3_dir"}[version]))
+
+
+@pytest.fixture(scope="module")
+def expected() -> list[float]:
+    """Return what the rigid body of 6x6 matrices is compared by after 20 s, restarted with the ballast at 10 s."""
+    y: Any = places(ROV, ROV.layout.at_rest)
+    for rov in (ROV, ROV.replaced(BALLAST)):
+        y = rigid_vehicle.integrate(rov, INPUTS, y, 10.0)
+    return [float(x) for x in compared(ROV, list(y))]
+
+
+def test_a_run_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(fmu: Fmu, expected: list[float]) -> None:
+    with fmu.instance() as rov:
+        rov.start(INPUTS)
+        assert rov.step(0.0, 10.0) == OK
+        velocities = rov.get([*ROV.layout.velocities])
+        assert rov.set(BALLAST) == OK
+        assert rov.get([*ROV.layout.velocities]) == velocities
+        assert rov.step(10.0, 10.0) == OK
+        state = dict(zip(ROV.layout.state, rov.get([*ROV.layout.state]), strict=True))
+        assert not [line for line in rov.log if "must not be set" in line.text]
+    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
+
+
+def test_python_agrees_with_the_rigid_body_too(expected: list[float]) -> None:
+    state = ROV.step(INPUTS, ROV.layout.at_rest, 10.0)
+    state = ROV.replaced(BALLAST).step(INPUTS, state, 10.0)
+    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
+
+
+def test_a_mass_that_is_not_positive_definite_is_refused_and_nothing_changes(fmu: Fmu) -> None:
+    for kind, mode in ((CO_SIMULATION, STEP), (MODEL_EXCHANGE, EVENT)):
+        with fmu.instance(kind) as rov:
+            rov.reach(mode)
+            before = rov.get([*ROV.coefficients, "der(u)", "der(q)"])
+            rov.log.clear()
+            assert rov.set(IMPOSSIBLE) == DISCARD
+            (line,) = rov.log
+            assert "the mass matrix of these parameters is not positive definite" in line.text
+            assert rov.get([*ROV.coefficients, "der(u)", "der(q)"]) == before
+            assert rov.set(BALLAST) == OK
+            assert rov.get(["m_rov", "z_G"]) == [BALLAST["m_rov"], BALLAST["z_G"]]
+
+
+def test_a_saved_state_contains_the_ballast_and_no_impossible_mass(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        rov.start(INPUTS)
+        assert rov.step(0.0, 1.0) == OK
+        assert rov.set(BALLAST) == OK
+        saved = rov.save()
+        after = rov.trajectory(range(10, 20))
+        assert rov.set({"m_rov": ROV["m_rov"]}) == OK
+        assert rov.load(saved) == OK
+        assert rov.trajectory(range(10, 20)) == after
+        first = 8 + len(fmu.token) + 8 * 6
+        place = first + 8 * (fmu.vr["z_G"] - min(fmu.vr[name] for name in fmu.commands))
+        assert struct.unpack_from("<d", saved, place) == (BALLAST["z_G"],)
+        content = saved[:place] + struct.pack("<d", IMPOSSIBLE["z_G"]) + saved[place + 8 : -8]
+        assert rov.load(content + checksum(content)) == ERROR
+        assert "values that no run can reach" in rov.log[-1].text
+
+
+def test_the_ballast_is_tunable(fmu: Fmu) -> None:
+    variables = {v.name: v for v in read_model_description(str(fmu.folder), validate=False).modelVariables}
+    tunable = {name for name, v in variables.items() if v.variability == "tunable"}
+    places_of_centres = {f"{axis}_{point}" for axis in "xyz" for point in "GB"}
+    assert tunable == {"m_rov", "W", "B", *places_of_centres, *ROV.layout.tuning}

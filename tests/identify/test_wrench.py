@@ -1,0 +1,159 @@
+"""Logs whose commands are a wrench in the body frame: the drag and the inertia of an independent simulation are found.
+
+The equations of motion stand here, written by hand and solved by SciPy's DOP853.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rov_fmu.build import build
+from rov_fmu.cli import main
+from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.findings import by_heading
+from rov_fmu.identify.identify import identify
+from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
+from tests.tank.readers.test_bags import Ros
+
+MASS, BALLAST = 20.0, 1.5
+INERTIA = {"u": 26.0, "w": 34.0}
+LINEAR, QUADRATIC = {"u": 9.0, "w": 14.0}, {"u": 38.0, "w": 65.0}
+ROV = """
+[vehicle]
+name = "Mixer"
+identifier = "mixer"
+version = "1.0"
+description = "An AUV whose mixer logs forces"
+source = "Dives"
+
+[body]
+m_rov = { value = 20.0, unit = "kg", source = "Weighed" }
+
+[axes.surge]
+[axes.heave]
+"""
+
+
+@dataclass
+class Dive:
+    """What a dive of 40 s measures."""
+
+    time: NDArray[np.float64]
+    X: NDArray[np.float64]
+    Z: NDArray[np.float64]
+    u: NDArray[np.float64]
+    z: NDArray[np.float64]
+
+
+def dive(seed: int) -> Dive:
+    """Simulate m u' = X - d |u| u - b u, and the same downward with a load, under forces that are held for 0.1 s."""
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, 40.0, 0.1)
+    phases = random.uniform(-1.0, 1.0, (2, 10)).repeat(40, axis=1)
+    X, Z = 45.0 * phases[0], 40.0 * phases[1]
+    state, rows = np.zeros(3), [np.zeros(3)]
+    for x, z in zip(X[:-1], Z[:-1], strict=True):
+
+        def rates(_: float, y: NDArray[np.float64], x: float = x, z: float = z) -> list[float]:
+            u, w, _ = y
+            surge = (x - QUADRATIC["u"] * abs(u) * u - LINEAR["u"] * u) / INERTIA["u"]
+            heave = (z + BALLAST - QUADRATIC["w"] * abs(w) * w - LINEAR["w"] * w) / INERTIA["w"]
+            return [surge, heave, w]
+
+        state = solve_ivp(rates, (0.0, 0.1), state, "DOP853", rtol=1e-9, atol=1e-12).y[:, -1]
+        rows.append(state)
+    u, _, depth = np.array(rows).T
+    return Dive(time, X, Z, u + random.normal(0.0, 0.01, len(u)), depth + 5.0 + random.normal(0.0, 0.01, len(u)))
+
+
+def write(path: Path, header: str, *columns: NDArray[np.float64]) -> None:
+    np.savetxt(path, np.column_stack(columns), "%.17g", ",", header=header, comments="")
+
+
+def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
+    (tmp_path / "rov.toml").write_text(ROV, encoding="utf-8")
+    for n in (1, 2):
+        d = dive(n)
+        header = "time [s],X_ext [N],Z_ext [N],surge velocity [m/s],depth [m]"
+        write(tmp_path / f"dive_{n}.csv", header, d.time, d.X, d.Z, d.u, d.z)
+    found = identify(load_tests(tmp_path))
+    vehicle = found.vehicle
+    assert not vehicle.layout.thrusters
+    assert [*vehicle.layout.inputs] == ["X_ext", "Z_ext", "V_N", "V_E"]
+    truths = {f"a_d_{v}": QUADRATIC[v] for v in "uw"} | {f"b_d_{v}": LINEAR[v] for v in "uw"}
+    truths |= {f"beta_{v}": MASS / INERTIA[v] for v in "uw"} | {"F_0_w": BALLAST}
+    for name, truth in truths.items():
+        low, high = vehicle.intervals[name]
+        least = 0.005 * abs(truth)  # the lag is at least 0.02 s, of which the effective inertia has a part
+        assert low - least <= truth <= high + least, name
+        assert high - low < 0.5 * truth, name
+    assert {result.verdict.word for result in found.axes} == {"good"}
+    largest = max(abs(dive(n).X).max() for n in (1, 2))
+    facts = by_heading(found.findings)["Facts"]
+    assert any(
+        f"100% of a command is the largest of all logs: X_ext = {largest:.3g} N and Z_ext" in fact for fact in facts
+    )
+    write_vehicle(vehicle, tmp_path / "mixer.toml")
+    again = load_vehicle(tmp_path / "mixer.toml")
+    assert again.layout == vehicle.layout
+    rate = again.derivatives(again.layout.usual_inputs | {"X_ext": 10.0}, again.layout.at_rest)["u"]
+    assert rate == pytest.approx(10.0 / INERTIA["u"], rel=0.1)
+    built = build(again, tmp_path / "mixer.fmu", platforms=["host"])
+    assert "X_ext = 5 gives u = 0." in built.note
+
+
+def test_a_draft_of_topics_as_text_needs_one_edit(tmp_path: Path) -> None:
+    """The files are as `rostopic echo -p` writes them; the heading in them points up, and so does z."""
+    d = dive(1)
+    none, stamp = np.zeros(len(d.time)), 1.7e18 + 1e9 * d.time
+    part = "field.force.x,field.force.y,field.force.z,field.torque.x,field.torque.y,field.torque.z"
+    write(tmp_path / "wrench.csv", f"%time,{part}", stamp, d.X, none, -d.Z, none, none, none)
+    write(tmp_path / "state.csv", "%time,field.velocity.x,field.position.z", stamp, d.u, -d.z)
+    assert main(["identify", str(tmp_path), "--draft"]) == 0
+    path = tmp_path / "rov.toml"
+    draft = path.read_text(encoding="utf-8")
+    lines = [line for line in draft.splitlines() if '"?"' in line and not line.startswith("#")]
+    assert [line.partition(" ")[0] for line in lines] == ["m_rov", "I_r"]
+    path.write_text(draft.replace('value = "?"', "value = 20.0"), encoding="utf-8")
+    tests = load_tests(tmp_path)
+    assert tests.tested.logs == ["surge", "heave"]
+    (log,) = tests.folder.logs
+    assert log.commands
+    places = [log.commands.thrusters.index(name) for name in ("X_ext", "Z_ext")]
+    commands = log.commands.at(log.commands.rows)[:, places]
+    assert commands == pytest.approx(np.column_stack([d.X, d.Z]) / [abs(d.X).max(), abs(d.Z).max()], abs=1e-6)
+
+
+@pytest.mark.parametrize(("frame", "side"), [("base_link", -1.0), ("base_link_frd", 1.0)])
+def test_a_wrench_in_a_bag_is_turned_into_the_body_frame(tmp_path: Path, frame: str, side: float) -> None:
+    """The frame of REP 103 is forward, left, up."""
+    d, ros = dive(1), Ros(2)
+    messages = []
+    for t, X, Z, z in zip(d.time, d.X, d.Z, d.z, strict=True):
+        wrench = ros.message("geometry_msgs/msg/Wrench", force=ros.vector("Vector3", [X, 0.0, side * Z]))
+        stamped = ros.message("geometry_msgs/msg/WrenchStamped", header=ros.header(t, frame), wrench=wrench)
+        messages.append(("/auv/cmd_wrench", t, stamped))
+        messages.append(("/auv/depth", t, ros.message("std_msgs/msg/Float64", data=float(z))))
+    ros.write(tmp_path, messages, ".mcap")
+    (tmp_path / "rov.toml").write_text(ROV, encoding="utf-8")
+    tests = load_tests(tmp_path)
+    (log,) = tests.folder.logs
+    assert log.commands
+    assert log.commands.source.topic == "/auv/cmd_wrench"
+    Z = log.commands.at(log.commands.rows)[:, log.commands.thrusters.index("Z_ext")]
+    assert pytest.approx(d.Z / abs(d.Z).max(), abs=1e-6) == Z
+
+
+def test_logs_without_a_wrench_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    d = dive(1)
+    (tmp_path / "rov.toml").write_text(ROV, encoding="utf-8")
+    write(tmp_path / "dive.csv", "time [s],u_1 [%],surge velocity [m/s]", d.time, d.X, d.u)
+    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    place = f"rov-fmu: {tmp_path / 'dive.csv'}, line 1: there is no column of commands. Possible columns: "
+    assert line.startswith(f"{place}X_ext, Y_ext, Z_ext, K_ext, M_ext, N_ext, in [N] or [N.m]")
