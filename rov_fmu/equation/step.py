@@ -83,7 +83,7 @@ class Motion:
         for i, forces in model.LAGS.items():
             if all(self.held[steady] == values[force] for force, steady in forces.items()):
                 self.settled.add(i)  # these forces have arrived already
-        starts = {**self.held, **values, **dict.fromkeys(model.OFFSETS, 0.0)}
+        starts = {**model.numbers(self.values), **values, **dict.fromkeys(model.OFFSETS, 0.0)}
         self.y: State = [starts[name] for name in model.STATES]
         self.size = [0.0] * len(self.y)
         """The largest size of each state so far."""

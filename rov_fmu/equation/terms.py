@@ -302,6 +302,8 @@ class _Table:
                 alike.setdefault((force.effect, force.factors), []).append(force)
             else:
                 loads[force.axis].append(force.formula)
+        if len({(effect.name, frozenset(factors)) for effect, factors in alike}) < len(alike):
+            raise ValueError("a force with another power of the same states needs an effect of its own")
         constant = total(gain * total(loads[other]) for other, gain in inverse.items())
         coriolis = self._mass.coriolis(v) if self.layout.coupled else {}
         return (
