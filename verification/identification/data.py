@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, recorded
@@ -163,8 +163,8 @@ class Split:
     """A data set as the methods get it."""
 
     name: str
-    folder: Path
-    """The folder of the training, with its rov.toml."""
+    tests: Tests
+    """The folder of the training, as `rov-fmu identify` reads it."""
     known: Beginning
     """What is known before any recording of the training is fitted."""
     rows: Sequence[TableRow]
@@ -186,14 +186,15 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     for part, folder in folders.items():
         folder.mkdir(parents=True)
         one.write(part, data, folder)
-    known, logs, rows = begin(load_tests(folders["training"]))
+    tests = load_tests(folders["training"])
+    known, logs, rows = begin(tests)
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
     training, test = ([_recording(known, log) for log in some] for some in (logs, unseen))
     tables = read_toml(folders["training"] / ROV_FILE, DataFileError)
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}
     names = sum(count.get(name, 0) for name in _NAMES)
     edits = {True: sum(count.values()), False: names}
-    return Split(one.name, folders["training"], known, rows, training, test, one.truth, edits)
+    return Split(one.name, tests, known, rows, training, test, one.truth, edits)
 
 
 def _recording(known: Beginning, log: SampledLog) -> Recording:

@@ -5,7 +5,8 @@ from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify import assess
-from rov_fmu.identify.likelihood.curves import Shapes
+from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
@@ -15,19 +16,19 @@ from rov_fmu.vehicle.vehicle import Vehicle
 from verification.identification.data import Recording, Split
 from verification.identification.protocol import Known
 
-_COMMANDS = (0.3, 0.5, -0.3, -0.5)
-
 
 class Identified:
     """`rov-fmu identify`: the vehicle of the file, and the covariance of its parameters."""
 
     name, uses_thrust, has_bands = "rov-fmu", True, True
+    tests: Tests
     found: Fit
 
     def fit(self, split: Split) -> None:
         """Fit all parameters to the training recordings."""
+        self.tests = split.tests
         with threadpool_limits(limits=1, user_api="blas"):
-            self.found = fit_all(split.folder, split.known, [r.log for r in split.training], split.rows)
+            self.found = fit_all(split.tests.folder.path, split.known, [r.log for r in split.training], split.rows)
 
     def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
         """Run the filter until each start, and the model from there on."""
@@ -46,20 +47,20 @@ class Identified:
         return recording.log.record.value - off, deviations**2
 
     def coefficients(self, axis: Axis) -> Known:
-        """Return the numbers of the model with their posterior."""
+        """Return the answers that `rov-fmu identify` gives, and the drag over the inertia with its posterior."""
         own = self.found.averaged
-        names = [*(f"V_ss {100 * c:g} %" for c in _COMMANDS), "quadratic drag / inertia"]
+        vehicle, _ = identified_vehicle(self.tests, self.found)
+        known: dict[str, tuple[float, float, float]] = {}
+        for answer in assess.answers(own, axis, vehicle):
+            if answer.command in assess.COMMANDS:
+                low, high = sorted(map(abs, answer.steady[1]))
+                known[f"V_ss {100 * answer.command:g} %"] = abs(answer.steady[0]), low, high
 
-        def values(z: Array) -> Array:
-            vehicle = Vehicle(own.table.layout, own.table.coefficients(z.tolist()))
-            shapes: Shapes = own.table.shapes(z.tolist())
-            V = [shapes.motion(vehicle, axis, c).steady_velocity() for c in _COMMANDS]
-            A, _ = shapes.motion(vehicle, axis, _COMMANDS[0]).drag(1.0)
-            return np.log(np.abs([*V, A]))
+        def drag(z: Array) -> Array:
+            model = Vehicle(own.table.layout, own.table.coefficients(z.tolist()))
+            A, _ = own.table.shapes(z.tolist()).motion(model, axis, assess.COMMANDS[0]).drag(1.0)
+            return np.array([A])
 
-        found, covariance, _ = own.numbers(values)
-        errors = np.sqrt(np.diag(covariance))
-        return {
-            name: (float(np.exp(value)), *around(float(np.exp(value)), float(np.exp(value) * error), positive=True))
-            for name, value, error in zip(names, found, errors, strict=True)
-        }
+        (value,), ((variance,),), _ = own.numbers(drag)
+        low, high = around(float(value), float(variance) ** 0.5, positive=True)
+        return known | {"quadratic drag / inertia": (float(value), low, high)}
