@@ -382,23 +382,45 @@ def _warn(message: str) -> None:
     shell_complete=_complete_vehicle,
 )
 @click.option(
+    "--recording",
+    type=_FILE,
+    metavar="LOG",
+    help="A log in any format that identify reads: the vehicle flies its commands beside what was measured. A rov.toml "
+    "beside it is obeyed.",
+)
+@click.option(
+    "--identified",
+    type=_FILE,
+    metavar="LOGS.mcap",
+    help="What `identify --mcap` wrote: the bands of the errors and the unknown forces of the recording are shown.",
+)
+@click.option(
     "-o", "--output", type=_FILE, metavar="PAGE.html", help="Write the page to this file; do not open a browser."
 )
-def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
+def _fly(
+    vehicle: Path, against: Path | None, recording: Path | None, identified: Path | None, output: Path | None
+) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
     from rov_fmu.fmu.archive import web_module
     from rov_fmu.io.output import Output
     from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page
+    from rov_fmu.report.page.recording import recording_of
     from rov_fmu.vehicle.vehicle import load_vehicle
 
+    if identified and not recording:
+        raise click.UsageError("fly: --identified needs --recording, the log that it is about")
     paths = [vehicle, against] if against else [vehicle]
     loaded = [load_vehicle(path) for path in paths]
     if output:
-        check_targets([output], [*paths, *(file for one in loaded for file in one.files)])
+        given = [path for path in (recording, identified) if path]
+        check_targets([output], [*paths, *given, *(file for one in loaded for file in one.files)])
         check_written(output, PAGE)
+    with _warnings_printed():
+        flown = recording_of(recording, loaded[0], identified) if recording else None
     page = fly_page(
-        [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, _short_names(paths), strict=True)]
+        [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, _short_names(paths), strict=True)],
+        recording=flown,
     ).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))

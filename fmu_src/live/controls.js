@@ -104,7 +104,9 @@ class Live {
     this.compass = pilot.has("psi") ? new Compass(part("compass")) : null;
     this.horizon = pilot.has("phi") ? new Horizon(part("horizon")) : null;
     this.depth = pilot.has("z") ? new DepthTape(part("depth")) : null;
-    this.charts = this.vehicle.axes.map((axis, n) => new Chart(part(`chart-${axis.name}`), axis, n));
+    /** @type {Chart[]} */
+    this.charts = [];
+    this.rows = Number(part("section").style.getPropertyValue("--rows"));
     this.isSeen = true;
     this.changed = true;
     this.last = 0;
@@ -112,7 +114,10 @@ class Live {
     this.say(
       `${this.flight.isHeld ? `${HELD} ` : ""}Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
     );
+    this.arrange();
     this.follow(location.hash);
+    const recording = document.getElementById("live-recorded");
+    if (recording) this.replay(JSON.parse(recording.textContent ?? ""));
     this.show();
     // The page has no other use than to fly, so keys act at once. A page embedded in another one takes no focus.
     if (document.body.matches(".flown:not(.compact)")) part("stage").focus({ preventScroll: true });
@@ -169,10 +174,13 @@ class Live {
       this.picture?.orbit(event.movementX, event.movementY);
       this.show();
     });
-    for (const { svg } of this.charts) {
-      svg.addEventListener("pointermove", (event) => this.point(svg, /** @type {PointerEvent} */ (event)));
-      svg.addEventListener("pointerleave", () => this.point(svg, null));
-    }
+    part("charts").addEventListener("pointermove", (event) => this.point(event));
+    part("charts").addEventListener("pointerleave", () => this.point(null));
+    part("view").addEventListener("change", () => this.arrange());
+    part("timeline").addEventListener("input", () => {
+      this.flight.seek(Number(/** @type {HTMLInputElement} */ (part("timeline")).value));
+      this.show();
+    });
     const file = /** @type {HTMLInputElement} */ (part("recording"));
     file.addEventListener("change", () => {
       if (file.files?.[0]) this.open(file.files[0]);
@@ -232,10 +240,11 @@ class Live {
 
   /** Ends a recording that is being flown, so that the pilot has control. */
   takeOver() {
-    if (!this.flight.playback) return;
-    this.flight.playback = null;
+    if (!this.flight.replay) return;
+    this.flight.leave();
     this.flight.ghostShown = this.flight.isOther || this.isTuned();
     this.span = SPAN;
+    this.arrange();
     this.say("You have control; the recording has ended.");
   }
 
@@ -256,6 +265,9 @@ class Live {
       slider.style.setProperty("--to", String(Math.max(...ends)));
     }
     document.getElementById("live-above")?.setAttribute("aria-pressed", String(this.picture?.isFromAbove));
+    const timeline = /** @type {HTMLInputElement} */ (part("timeline"));
+    timeline.hidden = !this.flight.replay;
+    timeline.value = String(this.flight.time);
     part("pause").textContent = this.paused ? "Fly on" : "Pause";
     part("speed").textContent = `${this.speed}×`;
     /** @type {HTMLInputElement} */ (part("ghost")).checked = this.flight.ghostShown;
@@ -271,7 +283,7 @@ class Live {
   pause(paused) {
     this.paused = paused;
     if (!paused && this.flight.test && this.hasEnded()) this.leaveTest();
-    if (!paused && this.flight.playback?.next() === null) this.takeOver();
+    if (!paused && this.flight.replay && this.hasEnded()) this.takeOver();
     this.show();
   }
 
@@ -294,16 +306,36 @@ class Live {
     this.show();
   }
 
-  /** Shows the values at the place of the pointer. @param {Element} svg @param {PointerEvent | null} event */
-  point(svg, event) {
-    const { left, width } = svg.getBoundingClientRect();
-    const { plot } = this.charts[0];
-    this.pointed =
-      event &&
-      Math.max(
-        0,
-        Math.min(1, (((event.clientX - left) / width) * (plot.right + 4) - plot.left) / (plot.right - plot.left)),
-      );
+  /** Shows the values at the place of the pointer. @param {PointerEvent | null} event */
+  point(event) {
+    const chart = this.charts.find(({ svg }) => svg.contains(/** @type {Node | null} */ (event?.target ?? null)));
+    if (event && !chart) return;
+    this.pointed = null;
+    if (event && chart) {
+      const { left } = chart.svg.getBoundingClientRect();
+      const { plot } = chart;
+      this.pointed = Math.max(0, Math.min(1, (event.clientX - left - plot.left) / (plot.right - plot.left)));
+    }
+    this.changed = true;
+  }
+
+  /** Makes the charts that are chosen. @param {string} [choice] */
+  arrange(choice) {
+    const view = /** @type {HTMLSelectElement} */ (part("view"));
+    if (choice) view.value = choice;
+    const { replay } = this.flight;
+    for (const option of view.options) {
+      option.hidden =
+        option.value === "force"
+          ? !replay?.recording.forces.length
+          : ["measured", "error"].includes(option.value) && !replay;
+    }
+    if (view.selectedOptions[0].hidden) view.value = "velocities";
+    const panels = PANELS[view.value](this.flight);
+    part("charts").replaceChildren();
+    part("section").style.setProperty("--columns", String(Math.ceil(panels.length / this.rows)));
+    this.charts = panels.map((panel) => new Chart(part("charts"), panel));
+    for (const chart of this.charts) chart.fit();
     this.changed = true;
   }
 
@@ -311,6 +343,7 @@ class Live {
   reset() {
     this.still();
     this.flight.reset();
+    this.arrange();
     this.flight.begun = false;
     this.picture?.reset();
     this.paused = false;
@@ -320,9 +353,10 @@ class Live {
     this.show();
   }
 
-  /** Returns true when the step test has reached the end of the charts. */
+  /** Returns true when the step test has reached the end of the charts, or the recording its end. */
   hasEnded() {
-    return this.flight.time >= this.span;
+    const { time, times, replay } = this.flight;
+    return time >= (replay ? times[times.length - 1] : this.span);
   }
 
   /** Ends a step test; from then on the charts move again. */
@@ -363,6 +397,7 @@ class Live {
     this.takeOver();
     for (const slider of this.sliders) if (slider.dataset.kind === "load") slider.value = String(slider.dataset.start);
     this.flight.run(test);
+    this.arrange("velocities");
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
     const Tau = this.flight.pilot.model.marks[2 * test.axis + 1];
     this.span = Math.min(60, Math.max(4, Math.ceil(6 * (Number.isFinite(Tau) ? Tau : 3))));
@@ -379,20 +414,27 @@ class Live {
       if (file.size > MOST_BYTES) throw new Unreadable(`it is larger than ${MOST_BYTES / 1e6} MB`);
       const recording = readRecording(await file.text(), file.name, this.vehicle);
       this.slideCommands({});
-      this.flight.play(recording);
-      this.span = 30;
-      this.paused = false;
-      this.say(
-        [
-          `${file.name}: ${shown(recording.times[recording.times.length - 1], 0)} s, flown with its commands. The ghost is what was measured.`,
-          ...recording.notes,
-        ].join(" "),
-      );
-      this.show();
+      this.replay(recording);
     } catch (error) {
       const reason = error instanceof Unreadable ? error.message : "it cannot be read";
       this.say(`${file.name} cannot be flown: ${reason}.`);
     }
+  }
+
+  /** Flies a recording. @param {Recording} recording */
+  replay(recording) {
+    if (!this.flight.play(recording)) {
+      this.say(`${recording.name}: the vehicle moves too fast under these commands to be computed.`);
+      return;
+    }
+    this.span = 30;
+    this.paused = false;
+    this.arrange("measured");
+    const end = this.flight.times[this.flight.times.length - 1];
+    place(part("timeline"), { max: end });
+    const words = `${recording.name}: ${shown(end, 0)} s, flown with its commands. The ghost is what was measured.`;
+    this.say([words, ...recording.notes].join(" "));
+    this.show();
   }
 
   /** Saves the flight as a CSV file. */
@@ -489,7 +531,7 @@ class Live {
   /** Sets the commands from sliders, keys, sticks and gamepad. */
   command() {
     const demands = this.demands();
-    if (this.flight.playback) {
+    if (this.flight.replay) {
       if (demands.size === 0) return;
       this.takeOver();
     }
@@ -525,11 +567,11 @@ class Live {
     const { flight } = this;
     if (!flight.advance(flight.test ? Math.min(h, this.span - flight.time) : h))
       this.say("It moved too fast to be computed, and is back at the start.");
-    if (flight.playback && flight.playback.next() === null) {
-      this.say(flight.playback.verdict(this.vehicle));
+    if (flight.replay && this.hasEnded()) {
+      this.say(flight.replay.verdict(this.vehicle));
       this.pause(true);
     }
-    if (flight.playback || flight.steering()) this.show();
+    if (flight.replay || flight.steering()) this.show();
     if (flight.test && this.hasEnded()) {
       this.say(`${part("message").textContent} The test has ended.`);
       this.pause(true);
@@ -547,7 +589,7 @@ class Live {
     this.horizon?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost, this.pointed);
-    part("measured").hidden = !flight.playback && this.vehicle.tests.every(({ V }) => V === null);
+    part("measured").hidden = !flight.replay && this.vehicle.tests.every(({ V }) => V === null);
     const [roll, pitch, heading] = attitudeOf(model);
     const readings = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);

@@ -1,32 +1,37 @@
-// A flight: the pilot's vehicle and a ghost under the same commands, with their tracks.
+// A flight: the pilot's vehicle and a ghost, which is another tuning, another vehicle, or what a recording measured.
 
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
 const MOST_KEPT = 20000;
 const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
-/** A vehicle with its track and the history of its velocities and positions. */
+/** Returns the last place at which ascending numbers are at most x, or 0. @param {number[]} numbers @param {number} x */
+function placeOf(numbers, x) {
+  let [low, high] = [0, numbers.length];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (numbers[middle] <= x) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
+/** A vehicle with its history: the values of all variables, and then the distances along the axes, at the times of the flight. */
 class Craft {
   /** @param {Model} model */
   constructor(model) {
     this.model = model;
     /** What holds it level. @type {Hold | null} */
     this.hold = null;
-    /** The points of the track: north, east and depth in turn. @type {number[]} */
-    this.track = [];
-    /** The velocities by axis, at the times of the flight. @type {number[][]} */
-    this.velocities = model.vehicle.axes.map(() => []);
-    /** Depth, heading, or the distance along the axis. @type {number[][]} */
-    this.positions = model.vehicle.axes.map(() => []);
+    /** @type {Float64Array[]} */
+    this.states = [];
     /** The distance covered along each axis. */
     this.distances = model.vehicle.axes.map(() => 0);
   }
 
-  reset() {
-    this.model.reset();
-    this.track = [];
-    this.velocities = this.velocities.map(() => []);
-    this.positions = this.positions.map(() => []);
-    this.distances = this.distances.map(() => 0);
+  /** Begins anew, with the states as they are set. */
+  begin() {
+    this.states = [];
+    this.model.observe();
     this.keep();
   }
 
@@ -43,39 +48,49 @@ class Craft {
       if (sticks) model.give(commandsOf(model.vehicle, sticks.demands));
       if (!model.step(h)) return false;
     }
+    model.observe();
     axes.forEach(({ velocity }, a) => {
       distances[a] += (h / 2) * (before[a] + model.get(velocity));
     });
     return true;
   }
 
-  /** Adds the current velocities and positions to the history. */
   keep() {
-    const { model, track } = this;
-    model.vehicle.axes.forEach(({ velocity }, a) => {
-      this.velocities[a].push(model.get(velocity));
-      this.positions[a].push(this.position(a));
-    });
-    const here = positionOf(model);
-    const moved = plus(here, [-1, /** @type {Vector} */ (track.slice(-3))]);
-    if (track.length === 0 || Math.hypot(...moved) > model.vehicle.size / 8) track.push(...here);
-    if (track.length > 3 * MOST_KEPT) track.splice(0, 3 * (MOST_KEPT / 2));
+    const { values } = this.model;
+    const state = new Float64Array(values.length + this.distances.length);
+    state.set(values);
+    state.set(this.distances, values.length);
+    this.states.push(state);
+  }
+
+  /** Returns to what it was between the n-th time and the next. @param {number} n @param {number} share From 0 to 1 of the way. */
+  show(n, share) {
+    const [state, next] = [this.states[n], this.states[n + 1] ?? this.states[n]];
+    const { values } = this.model;
+    for (let i = 0; i < values.length; i++) values[i] = state[i] + share * (next[i] - state[i]);
+    this.distances = this.distances.map((_, a) => state[values.length + a]);
+  }
+
+  /** Returns a variable at the n-th time, or 0 if the vehicle does not have it. @param {number} n @param {string} name */
+  at(n, name) {
+    const place = this.model.places.get(name);
+    return place === undefined ? 0 : this.states[n][place];
+  }
+
+  /** Returns depth, heading, or the distance along an axis at the n-th time. @param {number} a @param {number} n */
+  position(a, n = this.states.length - 1) {
+    const { position } = this.model.vehicle.axes[a];
+    return position ? this.at(n, position) : this.states[n][this.model.values.length + a];
+  }
+
+  /** Returns the velocity along an axis at the n-th time. @param {number} a @param {number} n */
+  velocity(a, n = this.states.length - 1) {
+    return this.at(n, this.model.vehicle.axes[a].velocity);
   }
 
   /** Returns the number of an axis, or -1 if the vehicle does not have it. @param {string} name */
   axis(name) {
     return this.model.vehicle.axes.findIndex((axis) => axis.name === name);
-  }
-
-  /** Returns depth, heading, or the distance along an axis. @param {number} a */
-  position(a) {
-    const { position } = this.model.vehicle.axes[a];
-    return position ? this.model.get(position) : this.distances[a];
-  }
-
-  /** Removes the oldest n entries of the history. @param {number} n */
-  forget(n) {
-    for (const trace of [...this.velocities, ...this.positions]) trace.splice(0, n);
   }
 }
 
@@ -95,8 +110,8 @@ class Flight {
     this.since = pilot.vehicle.axes.map(() => ({ time: 0, velocity: 0 }));
     /** @type {StepTest | null} */
     this.test = null;
-    /** @type {Playback | null} */
-    this.playback = null;
+    /** @type {Replay | null} */
+    this.replay = null;
     /** True while the sticks steer a vehicle that is held level. */
     this.isHeld = pilot.has("phi");
     /** @type {Sticks} */
@@ -108,13 +123,22 @@ class Flight {
 
   /** Returns to the start. Commands and loads stay as they are. */
   reset() {
-    this.time = 0;
-    this.times = [0];
-    this.commands = [this.given()];
     this.test = null;
-    this.playback = null;
-    this.pilot.reset();
-    this.ghost.reset();
+    this.replay = null;
+    for (const craft of [this.pilot, this.ghost]) {
+      craft.model.reset();
+      craft.distances = craft.distances.map(() => 0);
+    }
+    this.begin();
+  }
+
+  /** Begins the history with the states as they are set. */
+  begin() {
+    this.time = 0;
+    this.times.splice(0, Number.POSITIVE_INFINITY, 0); // the charts keep this list
+    this.commands = [this.given()];
+    this.pilot.begin();
+    this.ghost.begin();
     for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
   }
 
@@ -131,7 +155,7 @@ class Flight {
     return (
       !this.begun ||
       (this.test === null &&
-        this.playback === null &&
+        this.replay === null &&
         !(this.isHeld && this.sticks.demands.size > 0) &&
         variables.slice(0, inputs).every(([name, start]) => model.get(name) === start) &&
         axes.every(({ velocity }) => [velocity, `der(${velocity})`].every((name) => Math.abs(model.get(name)) < REST)))
@@ -151,9 +175,9 @@ class Flight {
     if (changed.length === 0) return;
     model.give(given);
     const { vehicle } = model;
-    const handed = handedOver(vehicle, this.ghost.model.vehicle, (name) => model.get(name));
-    this.ghost.model.give(handed);
-    this.followed();
+    this.ghost.model.give(handedOver(vehicle, this.ghost.model.vehicle, (name) => model.get(name)));
+    model.observe();
+    this.ghost.model.observe();
     this.commands[this.commands.length - 1] = this.given();
     vehicle.axes.forEach(({ velocity, signs, external }, a) => {
       if (changed.some(([name]) => name in signs || name === external)) {
@@ -169,6 +193,7 @@ class Flight {
     const { model } = this.pilot;
     model.give(given);
     model.tune();
+    if (this.replay) this.play(this.replay.recording);
   }
 
   /** Takes over the sticks of a vehicle that is held level. @param {Sticks} sticks */
@@ -179,39 +204,29 @@ class Flight {
 
   /** Returns the sticks while they steer: not a recording or a step test, whose commands are those of the thrusters. */
   steering() {
-    return this.isHeld && !this.playback && !this.test ? this.sticks : null;
+    return this.isHeld && !this.replay && !this.test ? this.sticks : null;
   }
 
-  followed() {
-    this.pilot.model.observe();
-    this.ghost.model.observe();
-  }
-
-  /** Steps h seconds. Returns false, and returns to the start, when a step overflows. @param {number} h */
+  /** Moves on by h seconds. Returns false, and returns to the start, when a step overflows. @param {number} h */
   advance(h) {
-    let left = h;
-    while (left > 0) {
-      let step = Math.min(left, LONGEST_STEP);
-      if (this.playback) {
-        const next = this.playback.next();
-        if (next === null) break;
-        step = Math.min(step, next - this.time);
-        if (step <= 0) {
-          this.playback.arrive(this);
-          continue;
-        }
-      }
+    if (this.replay) {
+      this.seek(this.time + h);
+      return true;
+    }
+    for (let left = h; left > 0; ) {
+      const step = Math.min(left, LONGEST_STEP);
       const sticks = this.steering();
-      const followed = this.playback ? this.playback.move(this.ghost, step) : this.ghost.step(this.time, step, sticks);
-      if (!this.pilot.step(this.time, step, sticks) || !followed) {
+      if (![this.pilot, this.ghost].every((craft) => craft.step(this.time, step, sticks))) {
         this.reset();
         return false;
       }
       this.time += step;
       left -= step;
       this.keep();
+      if (this.times.length > MOST_KEPT)
+        for (const list of [this.times, this.commands, this.pilot.states, this.ghost.states])
+          list.splice(0, MOST_KEPT / 2);
     }
-    this.followed();
     return true;
   }
 
@@ -220,21 +235,43 @@ class Flight {
     this.commands.push(this.given());
     this.pilot.keep();
     this.ghost.keep();
-    if (this.times.length > MOST_KEPT) {
-      const n = MOST_KEPT / 2;
-      this.times.splice(0, n);
-      this.commands.splice(0, n);
-      this.pilot.forget(n);
-      this.ghost.forget(n);
-    }
   }
 
-  /** Flies a recording from its start. The ghost shows the measured motion. @param {Recording} recording */
+  /** Flies a whole recording, and shows its start. The ghost is what was measured. Returns false when a step overflows.
+   * @param {Recording} recording */
   play(recording) {
+    const { time } = this.replay ? this : { time: 0 };
     this.reset();
-    this.playback = new Playback(recording, this);
+    const replay = new Replay(recording, this);
+    if (!replay.fly(this)) {
+      this.reset();
+      return false;
+    }
+    this.replay = replay;
     this.ghostShown = true;
     this.begun = true;
+    this.seek(time);
+    return true;
+  }
+
+  /** Shows a recording at a time. @param {number} time */
+  seek(time) {
+    const last = this.times[this.times.length - 1];
+    this.time = Math.max(0, Math.min(last, time));
+    const n = placeOf(this.times, this.time);
+    const share = n + 1 < this.times.length ? (this.time - this.times[n]) / (this.times[n + 1] - this.times[n]) : 0;
+    for (const craft of [this.pilot, this.ghost]) craft.show(n, share);
+    this.pilot.model.give(
+      Object.fromEntries(this.pilot.model.vehicle.commands.map((name, c) => [name, this.commands[n][c]])),
+    );
+  }
+
+  /** Ends the recording; the flight goes on from where it is shown. */
+  leave() {
+    const n = placeOf(this.times, this.time) + 1;
+    for (const list of [this.times, this.commands, this.pilot.states, this.ghost.states]) list.splice(n);
+    this.pilot.model.turn();
+    this.replay = null;
   }
 
   /** Flies a published step test: from rest, with all other inputs at their start values. @param {StepTest} test */
@@ -248,6 +285,109 @@ class Flight {
     this.test = test;
     this.begun = true;
   }
+}
+
+/** A recording that is flown again. The pilot's vehicle gets its commands, and the ghost shows the measured motion. */
+class Replay {
+  /** @param {Recording} recording @param {Flight} flight */
+  constructor(recording, { pilot, ghost }) {
+    this.recording = recording;
+    const { axes } = pilot.model.vehicle;
+    /** By signal: predicted minus measured, at the times of the signal. @type {number[][]} */
+    this.errors = recording.signals.map(() => []);
+    /** By signal: the axis of the ghost, which may be another vehicle, or -1. */
+    this.places = recording.signals.map(({ axis }) => ghost.axis(axes[axis].name));
+    /** True when the ghost has a track, which needs measurements of surge. */
+    this.hasTrack = recording.signals.some(({ axis }) => axes[axis].name === "surge");
+  }
+
+  /** Flies all of it. Returns false when a step overflows. @param {Flight} flight */
+  fly(flight) {
+    const { times, commands, signals } = this.recording;
+    const { pilot, ghost } = flight;
+    signals.forEach((signal, n) => {
+      for (const [craft, axis] of /** @type {[Craft, number][]} */ ([
+        [pilot, signal.axis],
+        [ghost, this.places[n]],
+      ])) {
+        if (axis < 0) continue;
+        const { velocity, position } = craft.model.vehicle.axes[axis];
+        const name = signal.isPosition ? position : velocity;
+        if (name) craft.model.set(name, signal.values[0]);
+        else craft.distances[axis] = signal.values[0];
+      }
+    });
+    for (const craft of [pilot, ghost]) craft.model.turn();
+    flight.begin();
+    const stops = [...new Set([...times, ...signals.flatMap((signal) => signal.times)])].sort(
+      (one, other) => one - other,
+    );
+    const next = signals.map(() => 0);
+    let row = 0;
+    for (const stop of stops) {
+      while (flight.time < stop) {
+        const step = Math.min(LONGEST_STEP, stop - flight.time);
+        this.move(ghost, flight.time, step);
+        if (!pilot.step(flight.time, step, null)) return false;
+        flight.time = step < LONGEST_STEP ? stop : flight.time + step;
+        if (flight.time - flight.times[flight.times.length - 1] >= stops[stops.length - 1] / MOST_KEPT) flight.keep();
+      }
+      signals.forEach((signal, n) => {
+        if (signal.times[next[n]] !== stop) return;
+        const { velocity, position } = pilot.model.vehicle.axes[signal.axis];
+        const predicted = !signal.isPosition
+          ? pilot.model.get(velocity)
+          : position
+            ? pilot.model.get(position)
+            : pilot.distances[signal.axis];
+        this.errors[n].push(predicted - signal.values[next[n]]);
+        next[n] += 1;
+      });
+      if (times[row] === stop) {
+        flight.set(Object.fromEntries(Object.entries(commands).map(([name, values]) => [name, values[row]])));
+        row += 1;
+      }
+    }
+    return true;
+  }
+
+  /** Moves the ghost from a time on along the measured motion. @param {Craft} ghost @param {number} time @param {number} h */
+  move(ghost, time, h) {
+    const { model, distances } = ghost;
+    this.recording.signals.forEach(({ isPosition, times, values }, n) => {
+      const axis = this.places[n];
+      if (axis < 0) return;
+      const { velocity, position } = model.vehicle.axes[axis];
+      const [now, then] = [time, time + h].map((t) => between(times, values, t));
+      const travelled = isPosition ? then : (position ? model.get(position) : distances[axis]) + now * h;
+      model.set(velocity, isPosition ? (then - now) / h : then);
+      if (position) model.set(position, travelled);
+      else distances[axis] = travelled;
+    });
+    const [u, v, psi] = ["u", "v", "psi"].map((name) => model.get(name));
+    model.turn();
+    model.set("x", model.get("x") + h * (u * Math.cos(psi) - v * Math.sin(psi) + model.get("V_N")));
+    model.set("y", model.get("y") + h * (u * Math.sin(psi) + v * Math.cos(psi) + model.get("V_E")));
+    model.observe();
+  }
+
+  /** Returns a sentence about the deviations (root mean square) of the prediction. @param {Vehicle} vehicle */
+  verdict(vehicle) {
+    const deviations = this.recording.signals.map(({ axis, isPosition }, n) => {
+      const { name, unit, positionUnit } = vehicle.axes[axis];
+      const squares = this.errors[n].reduce((sum, error) => sum + error ** 2, 0);
+      return `${name} ${Math.sqrt(squares / Math.max(1, this.errors[n].length)).toPrecision(2)} ${isPosition ? positionUnit : unit}`;
+    });
+    const left = this.recording.left;
+    return `The end of the recording. The prediction is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;
+  }
+}
+
+/** Returns a value at a time between the measured ones. @param {number[]} times @param {number[]} values @param {number} time */
+function between(times, values, time) {
+  const n = placeOf(times, time);
+  if (n + 1 >= times.length || time <= times[n]) return values[n];
+  return values[n] + ((time - times[n]) / (times[n + 1] - times[n])) * (values[n + 1] - values[n]);
 }
 
 /**
@@ -279,6 +419,6 @@ function commandsOf(vehicle, demands) {
   for (const { name, shares } of vehicle.axes) {
     for (const [command, share] of Object.entries(shares)) commands[command] += share * (demands.get(name) ?? 0);
   }
-  for (const name of vehicle.commands) commands[name] = Math.max(-1, Math.min(1, commands[name]));
+  for (const name of vehicle.commands) commands[name] = saturated(commands[name]);
   return commands;
 }

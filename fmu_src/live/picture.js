@@ -360,10 +360,11 @@ class Picture {
     const frame = rotationOf(pilot.model);
     const plan = this.pilot.shape.plan.map(([u, v]) => plus([0, 0, 0], [u, frame[0]], [v, frame[1]]));
     this.shadow.setAttribute("d", outline(plan.map(([u, v]) => see([u, v, floor]))));
-    const ghostIsThere = flight.ghostShown && (flight.playback?.hasTrack() ?? true);
+    const ghostIsThere = flight.ghostShown && (flight.replay?.hasTrack ?? true);
     const from = (/** @type {Vector} */ p) => see(plus(p, [-1, here]));
-    this.tracks[0].setAttribute("d", ghostIsThere ? pathOf(ghost, from) : "");
-    this.tracks[1].setAttribute("d", pathOf(pilot, from));
+    const last = placeOf(flight.times, flight.time);
+    this.tracks[0].setAttribute("d", ghostIsThere ? pathOf(ghost, last, from) : "");
+    this.tracks[1].setAttribute("d", pathOf(pilot, last, from));
     this.ghost.group.setAttribute("visibility", ghostIsThere ? "visible" : "hidden");
     const away = plus(positionOf(ghost.model), [-1, here]);
     if (ghostIsThere) this.ghost.draw(ghost.model, (p) => see(plus(p, [1, away])), scale, []);
@@ -409,11 +410,12 @@ class Picture {
   }
 }
 
-/** @param {Craft} craft @param {(p: Vector) => number[]} see From the earth frame to px. */
-function pathOf({ track, model }, see) {
-  const stride = 3 * Math.max(1, Math.ceil(track.length / 4500));
+/** Returns the track up to the n-th time and the present place. @param {Craft} craft @param {number} last
+ * @param {(p: Vector) => number[]} see From the earth frame to px. */
+function pathOf(craft, last, see) {
+  const stride = Math.max(1, Math.ceil(last / 1500));
   const places = [];
-  for (let i = 0; i < track.length; i += stride) places.push(see([track[i], track[i + 1], track[i + 2]]));
-  places.push(see(positionOf(model)));
+  for (let n = 0; n < last; n += stride) places.push(see([craft.at(n, "x"), craft.at(n, "y"), craft.at(n, "z")]));
+  places.push(see(positionOf(craft.model)));
   return `M${places.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`;
 }

@@ -9,14 +9,15 @@ const RENAMING = "if another header stands for it, rename that one: this page do
 /** The error of a file that is not a recording of this vehicle. Its text says why. */
 class Unreadable extends Error {}
 
+/** Half of a 95 % band over time. @typedef {{times: number[], values: number[]}} Band */
+/** The measurements of an axis: positions or velocities at their own times, and the band of the errors of predictions, if it is known.
+ * @typedef {{axis: number, isPosition: boolean, times: number[], values: number[], band?: Band}} Signal */
+/** An unknown force along an axis, with its band. @typedef {{axis: number, times: number[], values: number[], band?: Band}} Force */
 /**
- * The measurements of an axis: positions or velocities. They are NaN in rows without a measurement.
- * @typedef {{axis: number, isPosition: boolean, values: number[]}} Signal
- */
-/**
- * A recording: times in s, commands by row and name, signals, sentences about what is not as in the file, and the number of rows that were
- * left out.
- * @typedef {{name: string, times: number[], commands: Record<string, number>[], signals: Signal[], notes: string[], left: number}} Recording
+ * A recording: the times in s from which commands hold, the commands by name, signals, unknown forces, sentences about what is not as in
+ * the file, and the number of rows that were left out.
+ * @typedef {{name: string, times: number[], commands: Record<string, number[]>, signals: Signal[], forces: Force[], notes: string[],
+ *   left: number}} Recording
  */
 
 /** Reads a recording. @param {string} text @param {string} name The file's name. @param {Vehicle} vehicle @returns {Recording} */
@@ -80,6 +81,7 @@ function readRecording(text, name, vehicle) {
   if (new Set(commanding.map((column) => column.name)).size < commanding.length) {
     throw new Unreadable("it has a command twice");
   }
+  const times = rows.map((row) => row[time] - start);
   const commands = rows.map((row) => given(commanding, row, vehicle));
   const off = rows.reduce((most, row, n) => Math.max(most, difference(commanding, row, commands[n], vehicle)), 0);
   const { used, reason } = measured(columns, rows, headers, vehicle);
@@ -89,9 +91,15 @@ function readRecording(text, name, vehicle) {
   }
   return {
     name,
-    times: rows.map((row) => row[time] - start),
-    commands,
-    signals: used,
+    times,
+    commands: Object.fromEntries(vehicle.commands.map((one) => [one, commands.map((row) => row[one])])),
+    signals: used.map(({ axis, isPosition, values }) => ({
+      axis,
+      isPosition,
+      times: times.filter((_, n) => Number.isFinite(values[n])),
+      values: values.filter(Number.isFinite),
+    })),
+    forces: [],
     notes: [...(reason ? [`The pressure is not used: ${reason}.`] : []), ...nearness(off)],
     left: lines.length - 1 - rows.length,
   };
@@ -329,108 +337,16 @@ function unwrapped(angles) {
  * the steps of the page are. @param {Flight} flight */
 function tableOf({ times, commands, pilot }) {
   const { axes, commands: names } = pilot.model.vehicle;
-  const columns = axes.flatMap(({ velocity, unit, position, positionUnit }, a) => [
-    { title: `${velocity} [${unit}]`, values: pilot.velocities[a] },
-    ...(position ? [{ title: `${position} [${positionUnit}]`, values: pilot.positions[a] }] : []),
+  const columns = axes.flatMap(({ velocity, unit, position, positionUnit }) => [
+    { name: velocity, unit },
+    ...(position ? [{ name: position, unit: positionUnit }] : []),
   ]);
-  const head = ["time [s]", ...names.map((name) => `${name} [%]`), ...columns.map(({ title }) => title)];
+  const titles = columns.map(({ name, unit }) => `${name} [${unit}]`);
+  const head = ["time [s]", ...names.map((name) => `${name} [%]`), ...titles];
   const rows = times.map((time, n) => [
     Number(time.toFixed(6)),
     ...commands[n].map((x) => 100 * x),
-    ...columns.map(({ values }) => values[n]),
+    ...columns.map(({ name }) => pilot.at(n, name)),
   ]);
   return [head, ...rows].map((row) => `${row.join(",")}\n`).join("");
-}
-
-/** A recording that is being flown. The pilot's vehicle gets its commands, and the ghost shows the measured motion. */
-class Playback {
-  /** @param {Recording} recording @param {Flight} flight */
-  constructor(recording, flight) {
-    this.recording = recording;
-    this.row = 0;
-    const { axes } = flight.pilot.model.vehicle;
-    /** The name of each signal's axis, which the ghost, possibly another vehicle, may have elsewhere. */
-    this.names = recording.signals.map(({ axis }) => axes[axis].name);
-    /** For each signal: the last measurement, its time and rate, the sum of squares and the number of deviations. */
-    this.measured = recording.signals.map(({ values }) => {
-      const now = values.find(Number.isFinite) ?? 0;
-      return { now, time: 0, rate: 0, start: now, sum: 0, n: 0 };
-    });
-    for (const craft of [flight.pilot, flight.ghost]) {
-      recording.signals.forEach(({ isPosition }, n) => {
-        const axis = craft.axis(this.names[n]);
-        if (axis < 0) return;
-        const { velocity, position } = craft.model.vehicle.axes[axis];
-        const name = isPosition ? position : velocity;
-        if (name) craft.model.set(name, this.measured[n].now);
-        else craft.distances[axis] = this.measured[n].now;
-      });
-      craft.model.turn();
-      craft.track = [];
-      craft.forget(1);
-      craft.keep();
-    }
-    this.arrive(flight);
-  }
-
-  /** Returns true when the ghost has a track, which needs measurements of surge. */
-  hasTrack() {
-    return this.names.includes("surge");
-  }
-
-  /** Returns the time of the next row, or null at the end. */
-  next() {
-    return this.row < this.recording.times.length ? this.recording.times[this.row] : null;
-  }
-
-  /** Takes the next row: compares the prediction with it, and sets its commands. @param {Flight} flight */
-  arrive(flight) {
-    const { signals, commands, times } = this.recording;
-    signals.forEach(({ axis, isPosition, values }, n) => {
-      const value = values[this.row];
-      if (!Number.isFinite(value)) return;
-      const { pilot } = flight;
-      const predicted = isPosition ? pilot.position(axis) : pilot.model.get(pilot.model.vehicle.axes[axis].velocity);
-      const signal = this.measured[n];
-      const passed = times[this.row] - signal.time;
-      signal.rate = passed > 0 ? (value - signal.now) / passed : signal.rate;
-      signal.sum += (predicted - value) ** 2;
-      signal.n += 1;
-      signal.now = value;
-      signal.time = times[this.row];
-    });
-    flight.set(commands[this.row]);
-    this.row += 1;
-  }
-
-  /** Moves the ghost h seconds along the measured motion. @param {Craft} ghost @param {number} h */
-  move(ghost, h) {
-    const { model, distances } = ghost;
-    this.recording.signals.forEach(({ isPosition }, n) => {
-      const axis = ghost.axis(this.names[n]);
-      if (axis < 0) return;
-      const { velocity, position } = model.vehicle.axes[axis];
-      const { now, rate } = this.measured[n];
-      model.set(velocity, isPosition ? rate : now);
-      if (isPosition && position) model.set(position, now);
-      else if (position) model.set(position, model.get(position) + now * h);
-      else distances[axis] = isPosition ? now : distances[axis] + now * h;
-    });
-    const [u, v, psi] = ["u", "v", "psi"].map((name) => model.get(name));
-    model.turn();
-    model.set("x", model.get("x") + h * (u * Math.cos(psi) - v * Math.sin(psi) + model.get("V_N")));
-    model.set("y", model.get("y") + h * (u * Math.sin(psi) + v * Math.cos(psi) + model.get("V_E")));
-    return true;
-  }
-
-  /** Returns a sentence about the deviations (root mean square) of the prediction. @param {Vehicle} vehicle */
-  verdict(vehicle) {
-    const deviations = this.recording.signals.map(({ axis, isPosition }, n) => {
-      const { name, unit, positionUnit } = vehicle.axes[axis];
-      const { sum, n: many } = this.measured[n];
-      return `${name} ${Math.sqrt(sum / Math.max(1, many)).toPrecision(2)} ${isPosition ? positionUnit : unit}`;
-    });
-    const left = this.recording.left;
-    return `The end of the recording. The prediction is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;
-  }
 }

@@ -131,20 +131,110 @@ class DepthTape {
   }
 }
 
-/** A chart of an axis over time: the velocity with V_ss and Tau, or the measured position. */
+/** A line of a chart: its class, its times, its value at the n-th of them, and half of its band, if it has one.
+ * @typedef {{kind: string, times: number[], value: (n: number) => number, band?: (n: number) => number}} Trace */
+/** What a chart shows: its place in the page, its title, the unit and the digits of its readings, its lines, and the axis whose V_ss
+ * and Tau it marks, or -1. `signal` is the number of the recording's signal that the second line is.
+ * @typedef {{id: string, title: string, unit: string, digits: number, traces: Trace[], axis: number, signal: number}} Graph */
+
+/** The choices of charts, by the words of the list. @type {Record<string, (flight: Flight) => Graph[]>} */
+const PANELS = {
+  velocities: (flight) => axisPanels(flight, () => false),
+  positions: (flight) => axisPanels(flight, () => true),
+  thrust: ({ pilot, times }) =>
+    pilot.model.vehicle.thrusters.map(({ force, label }) => ({
+      id: force,
+      title: `${label}: ${force}`,
+      unit: "N",
+      digits: 2,
+      traces: [{ kind: "line", times, value: (n) => pilot.at(n, force) }],
+      axis: -1,
+      signal: -1,
+    })),
+  measured: (flight) =>
+    axisPanels(flight, (a) => flight.replay?.recording.signals.find(({ axis }) => axis === a)?.isPosition ?? false),
+  error: ({ replay, pilot }) =>
+    (replay?.recording.signals ?? []).map(({ axis, isPosition, times, band }, s) => {
+      const { name, unit, positionUnit } = pilot.model.vehicle.axes[axis];
+      const value = (/** @type {number} */ n) => replay?.errors[s][n] ?? 0;
+      const trace = { kind: "line", times, value, ...bandOf(band, times) };
+      return {
+        id: name,
+        title: `${name}: error`,
+        unit: isPosition ? positionUnit : unit,
+        digits: 3,
+        traces: [trace],
+        axis: -1,
+        signal: -1,
+      };
+    }),
+  force: ({ replay, pilot }) =>
+    (replay?.recording.forces ?? []).map(({ axis, times, values, band }) => {
+      const { name, unit } = pilot.model.vehicle.axes[axis];
+      return {
+        id: name,
+        title: `${name}: unknown`,
+        unit: unit.startsWith("rad") ? "N m" : "N",
+        digits: 2,
+        traces: [{ kind: "line", times, value: (n) => values[n], ...bandOf(band, times) }],
+        axis: -1,
+        signal: -1,
+      };
+    }),
+};
+
+/** Returns the band at the times of a trace, if there is one. @param {Band | undefined} band @param {number[]} times */
+function bandOf(band, times) {
+  return band ? { band: (/** @type {number} */ n) => between(band.times, band.values, times[n]) } : {};
+}
+
+/** Returns a chart for each axis: of its position or of its velocity. In a recording, the second line is what was measured.
+ * @param {Flight} flight @param {(a: number) => boolean} ofPosition @returns {Graph[]} */
+function axisPanels({ pilot, ghost, times, replay }, ofPosition) {
+  return pilot.model.vehicle.axes.map(({ name, velocity, unit, position, positionUnit }, a) => {
+    const isPosition = ofPosition(a);
+    const get = (/** @type {Craft} */ craft, /** @type {number} */ axis) => (/** @type {number} */ n) =>
+      isPosition ? craft.position(axis, n) : craft.velocity(axis, n);
+    const traces = [{ kind: "line", times, value: get(pilot, a) }];
+    const other = ghost.axis(name);
+    const signal = replay ? replay.recording.signals.findIndex((one) => one.axis === a) : -1;
+    const measured = replay?.recording.signals[signal];
+    if (measured?.isPosition === isPosition)
+      traces.push({ kind: "line measured", times: measured.times, value: (n) => measured.values[n] });
+    else if (other >= 0 && (!replay || measured))
+      traces.push({ kind: "line ghostly", times, value: get(ghost, other) });
+    return {
+      id: name,
+      title: `${name}: ${isPosition ? (position ?? "distance") : velocity}`,
+      unit: isPosition ? positionUnit : unit,
+      digits: isPosition ? 2 : 3,
+      traces,
+      axis: isPosition ? -1 : a,
+      signal: measured?.isPosition === isPosition ? signal : -1,
+    };
+  });
+}
+
+/** A chart over time. */
 class Chart {
-  /** @param {Element} svg @param {Axis} axis @param {number} number */
-  constructor(svg, axis, number) {
+  /** @param {Element} parent @param {Graph} panel */
+  constructor(parent, panel) {
+    const svg = drawn(parent, "svg", {
+      id: `live-chart-${panel.id}`,
+      role: "img",
+      "aria-label": `${panel.title} over time`,
+    });
     this.svg = svg;
-    this.axis = axis;
-    this.number = number;
+    this.panel = panel;
     this.frame = drawn(svg, "path", { class: "grid" });
     this.title = drawn(svg, "text", { class: "title", x: 2, y: 12 });
     this.marks = drawn(svg, "text", { class: "marks right" });
     this.ticks = [0, 1, 2, 3, 4, 5].map(() => drawn(svg, "text", { class: "right" }));
     this.ends = ["", "right"].map((kind) => drawn(svg, "text", { class: kind }));
+    this.band = drawn(svg, "path", { class: "band" });
     this.steady = drawn(svg, "path", { class: "steady" });
-    this.lines = ["line ghostly", "line"].map((kind) => drawn(svg, "path", { class: kind }));
+    /** Those of the traces, the last of which is drawn first. */
+    this.lines = [...panel.traces].reverse().map(({ kind }) => drawn(svg, "path", { class: kind }));
     this.measured = drawn(svg, "path", { class: "measured" });
     this.Tau = drawn(svg, "circle", { class: "tau", r: 4 });
     this.point = drawn(svg, "circle", { class: "point", r: 4.5 });
@@ -170,52 +260,66 @@ class Chart {
   /** @param {Flight} flight @param {number} span The time span in s. @param {boolean} ghost
    * @param {number | null} pointed The place of the pointer, from 0 to 1 of the span. */
   draw(flight, span, ghost, pointed) {
-    const { number, axis } = this;
+    const { axis, unit, digits, signal } = this.panel;
+    const traces = this.panel.traces.filter(({ kind }) => ghost || kind !== "line ghostly");
     const { left, right, top, bottom } = this.plot;
-    const { times, time, pilot, playback, test } = flight;
-    const signal = playback?.recording.signals.find((s) => s.axis === number) ?? null;
-    const isPosition = signal?.isPosition ?? false;
+    const { time, replay, test } = flight;
     const start = Math.max(0, time - span);
-    const [V, Tau] = pilot.model.marks.subarray(2 * number, 2 * number + 2);
-    const mine = (isPosition ? pilot.positions : pilot.velocities)[number];
-    const other = ghost && (playback === null || signal) ? this.ghostTrace(flight, isPosition) : null;
+    const marked = axis >= 0 && !flight.steering();
+    const [V, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
     const published =
-      test && test.axis === number && test.V !== null
+      marked && test?.axis === axis && test.V !== null
         ? { V: test.command < 0 ? -test.V : test.V, Tau: test.Tau }
         : null;
-    const first = Math.max(0, times.findIndex((t) => t >= start) - 1);
-    const [low, high, step] = rangeOf(
-      isPosition ? [] : [0, V, published?.V ?? 0],
-      (other ? [mine, other] : [mine]).map((trace) => trace.slice(first)),
-      bottom - top,
-    );
-    const px = (/** @type {number} */ t) => left + ((t - start) / span) * (right - left);
+    const windows = traces.map(({ times }) => [placeOf(times, start), placeOf(times, time)]);
+    const levels = axis >= 0 ? [0, V, published?.V ?? 0] : [];
+    const [low, high, step] = rangeOf(levels, traces, windows, bottom - top);
+    const px = (/** @type {number} */ t) => Math.max(left, left + ((t - start) / span) * (right - left));
     const py = (/** @type {number} */ v) => bottom - ((v - low) / (high - low)) * (bottom - top);
     this.lay(low, high, step, py);
     this.ends[0].textContent = `${shown(start, 0)} s`;
     this.ends[1].textContent = `${shown(start + span, 0)} s`;
-    const line = (/** @type {number[]} */ trace) => lineOf(times, trace, first, (t) => Math.max(left, px(t)), py);
-    this.lines[1].setAttribute("d", line(mine));
-    this.lines[0].classList.toggle("measured", playback !== null);
-    this.lines[0].setAttribute("d", other ? line(other) : "");
-    const since = flight.since[number];
-    const fromRest = V !== 0 && Math.abs(since.velocity) < 0.02 * Math.abs(V) && Number.isFinite(Tau);
-    const hasSteady = !isPosition && V !== 0 && Number.isFinite(V);
+    this.lines.forEach((line, n) => {
+      const trace = traces[this.lines.length - 1 - n];
+      line.setAttribute("d", trace ? lineOf(trace, windows[this.lines.length - 1 - n], px, py) : "");
+    });
+    const [mine, other] = traces;
+    const { band } = mine;
+    if (band) {
+      const upper = lineOf({ ...mine, value: band }, windows[0], px, py);
+      const lower = lineOf({ ...mine, value: (n) => -band(n) }, windows[0], px, py);
+      this.band.setAttribute("d", `${upper}L${lower.slice(1).split("L").reverse().join("L")}Z`);
+    }
+    const since = flight.since[axis];
+    const fromRest = marked && V !== 0 && Math.abs(since.velocity) < 0.02 * Math.abs(V) && Number.isFinite(Tau);
+    const hasSteady = marked && V !== 0 && Number.isFinite(V);
     const level = (/** @type {number} */ x, /** @type {number} */ v) => `M${x.toFixed(1)} ${py(v).toFixed(1)}H${right}`;
-    this.steady.setAttribute("d", hasSteady ? level(Math.max(left, px(since.time)), V) : "");
+    this.steady.setAttribute("d", hasSteady ? level(px(since.time), V) : "");
     const p = 1 - Math.exp(-1);
     this.mark(this.Tau, hasSteady && fromRest ? [px(since.time + Tau), py(p * V)] : null);
     this.measured.setAttribute("d", published ? level(left, published.V) : "");
-    this.mark(this.point, published?.Tau ? [px(since.time + published.Tau), py(p * published.V)] : null);
-    const at = pointed === null ? -1 : times.findIndex((t) => t >= start + pointed * span);
-    this.pointer.setAttribute("d", at < 0 ? "" : `M${px(times[at]).toFixed(1)} ${top}V${bottom}`);
-    const [what, digits, unit] = isPosition
-      ? [axis.position ?? "distance", 2, axis.positionUnit]
-      : [axis.velocity, 3, axis.unit];
-    const reading = (/** @type {number[]} */ trace) => shown(trace[at < 0 ? trace.length - 1 : at], digits);
-    this.title.textContent = `${axis.name}: ${what} ${reading(mine)} ${unit}`;
-    if (at >= 0) this.marks.textContent = `${other ? `ghost ${reading(other)} · ` : ""}at ${shown(times[at], 2)} s`;
-    else this.marks.textContent = hasSteady ? `V_ss ${shown(V, 3)}${fromRest ? ` · Tau ${shown(Tau, 2)} s` : ""}` : "";
+    this.mark(this.point, published?.Tau ? [px(published.Tau), py(p * published.V)] : null);
+    const at = pointed === null ? time : start + pointed * span;
+    const isPointed = pointed !== null && at <= time;
+    const reading = (/** @type {Trace} */ { times, value }) => {
+      const n = placeOf(times, Math.min(at, time));
+      const share = n + 1 < times.length ? Math.max(0, (Math.min(at, time) - times[n]) / (times[n + 1] - times[n])) : 0;
+      return share ? value(n) + share * (value(n + 1) - value(n)) : value(n);
+    };
+    this.pointer.setAttribute("d", isPointed ? `M${px(at).toFixed(1)} ${top}V${bottom}` : "");
+    this.title.textContent = `${this.panel.title} ${shown(reading(mine), digits)} ${unit}`;
+    const words = [];
+    if (signal >= 0 && replay && other) {
+      const n = placeOf(other.times, Math.min(at, time));
+      const half = replay.recording.signals[signal].band;
+      const error = shown(replay.errors[signal][n] ?? 0, digits);
+      words.push(`error ${error}${half ? ` ± ${shown(between(half.times, half.values, at), digits)}` : ""}`);
+    } else if (isPointed && other) words.push(`ghost ${shown(reading(other), digits)}`);
+    else if (isPointed && band) words.push(`± ${shown(band(placeOf(mine.times, at)), digits)}`);
+    else if (hasSteady && !isPointed)
+      words.push(`V_ss ${shown(V, 3)}`, ...(fromRest ? [`Tau ${shown(Tau, 2)} s`] : []));
+    if (isPointed) words.push(`at ${shown(at, 2)} s`);
+    this.marks.textContent = words.join(" · ");
   }
 
   /** Draws the horizontal lines and their numbers. @param {number} low @param {number} high @param {number} step
@@ -237,37 +341,31 @@ class Chart {
     place(circle, { visibility: visible ? "visible" : "hidden" });
     if (visible) place(circle, { cx: at[0].toFixed(1), cy: at[1].toFixed(1) });
   }
-
-  /** Returns the ghost's trace of the same axis, which may have another number. @param {Flight} flight @param {boolean} isPosition */
-  ghostTrace(flight, isPosition) {
-    const number = flight.ghost.axis(this.axis.name);
-    const traces = isPosition ? flight.ghost.positions : flight.ghost.velocities;
-    return number < 0 ? null : traces[number];
-  }
 }
 
-/** Returns the ends of a chart's range, and the distance of its lines, for levels and traces and a height in px.
- * @param {number[]} levels @param {number[][]} traces @param {number} height */
-function rangeOf(levels, traces, height) {
+/** Returns the ends of a chart's range, and the distance of its lines, for levels, windows of traces and a height in px.
+ * @param {number[]} levels @param {Trace[]} traces @param {number[][]} windows @param {number} height */
+function rangeOf(levels, traces, windows, height) {
   let [low, high] = [Math.min(...levels), Math.max(...levels)];
-  for (const trace of traces) {
-    for (const value of trace) {
-      if (value < low) low = value;
-      if (value > high) high = value;
+  traces.forEach(({ value, band }, t) => {
+    for (let n = windows[t][0]; n <= windows[t][1]; n++) {
+      const [one, half] = [value(n), band?.(n) ?? 0];
+      low = Math.min(low, one, half ? -half : one);
+      high = Math.max(high, one, half || one);
     }
-  }
+  });
   const step = roundUp(Math.max((high - low) / Math.max(1, Math.min(3.5, height / 24 - 1)), 0.05));
   low = Math.floor(low / step + 1e-9) * step;
   return [low, Math.max(low + 2 * step, Math.ceil(high / step - 1e-9) * step), step];
 }
 
-/** @param {number[]} times @param {number[]} trace @param {number} first @param {(t: number) => number} px @param {(v: number) => number} py */
-function lineOf(times, trace, first, px, py) {
-  const stride = Math.max(1, Math.floor((times.length - first) / 400));
+/** @param {Trace} trace @param {number[]} window @param {(t: number) => number} px @param {(v: number) => number} py */
+function lineOf({ times, value }, [first, last], px, py) {
+  const stride = Math.max(1, Math.floor((last - first) / 400));
   /** @type {string[]} */
   const places = [];
-  const add = (/** @type {number} */ i) => places.push(`${px(times[i]).toFixed(1)} ${py(trace[i]).toFixed(1)}`);
-  for (let i = first - (first % stride) + stride * (first % stride ? 1 : 0); i < times.length - 1; i += stride) add(i);
-  add(times.length - 1);
+  const add = (/** @type {number} */ n) => places.push(`${px(times[n]).toFixed(1)} ${py(value(n)).toFixed(1)}`);
+  for (let n = Math.ceil(first / stride) * stride; n < last; n += stride) add(n);
+  add(last);
   return `M${places.join("L")}`;
 }

@@ -1,6 +1,5 @@
 """An identification as an MCAP file: what each log measured, what the model predicts, and what it cannot explain."""
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -9,6 +8,7 @@ import numpy as np
 from rov_fmu.bridges.mcap import Number, Recording, about, nanoseconds
 from rov_fmu.c.simulation import Array
 from rov_fmu.identify.result import Identification, Prediction, UnknownForce
+from rov_fmu.report.page.recording import topic_name
 from rov_fmu.tank.log import Channel, Commands, Log
 from rov_fmu.vehicle.uncertainty import NORMAL
 
@@ -41,18 +41,13 @@ def identification_mcap(identification: Identification) -> bytes:
         series = [*_series_of(identification, log)]
         begin = min((float(one.time[0]) for one in series if len(one.time)), default=0.0)
         for one in series:
-            write = recording.topic(f"/{_name(log.file)}/{one.topic}", one.numbers)
+            write = recording.topic(f"/{topic_name(log.file)}/{one.topic}", one.numbers)
             rows = np.column_stack([*one.columns.values()]).tolist()
             for stamp, row in zip(nanoseconds(one.time - begin), rows, strict=True):
                 messages.append((stamp, write, dict(zip(one.columns, row, strict=True))))
     for stamp, write, values in sorted(messages, key=lambda message: message[0]):
         write(stamp, values)
     return recording.content()
-
-
-def _name(text: str) -> str:
-    """Return a text as a part of a topic, for which viewers need no quotation marks."""
-    return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
 
 
 def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:
@@ -75,7 +70,7 @@ def _commands(commands: Commands) -> _Series:
 def _measured(channel: Channel) -> _Series:
     name, (time, values) = channel.quantity.name, channel.samples
     numbers = {"measured": Number(channel.quantity.unit, f"Measured {name}")}
-    return _Series(_name(name), time, {"measured": values}, numbers)
+    return _Series(topic_name(name), time, {"measured": values}, numbers)
 
 
 def _prediction(prediction: Prediction) -> _Series:
@@ -87,7 +82,7 @@ def _prediction(prediction: Prediction) -> _Series:
         "predicted": Number(unit, f"The prediction of the {name} by {prediction.by}"),
         **_edges(unit, f"95 % band of the measured {name}"),
     }
-    return _Series(_name(name), prediction.time, columns, numbers)
+    return _Series(topic_name(name), prediction.time, columns, numbers)
 
 
 def _unknown(unknown: UnknownForce) -> _Series:

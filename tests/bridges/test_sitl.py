@@ -18,7 +18,6 @@ from time import process_time
 import numpy as np
 import pytest
 
-from examples.hold_level import VECTORED_6DOF
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, servo_packet
@@ -33,6 +32,7 @@ from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import THRUST_EFFECTS, pulsed
+from verification.references.ardusub import VECTORED_6DOF
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)

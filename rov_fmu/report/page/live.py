@@ -67,18 +67,20 @@ class Live:
     """The name of the vehicle, or the names of both."""
     other: str | None
     """The name of the ghost, if there is one."""
+    recording: Markup | None
+    """The recording that is flown at first as JSON, if there is one."""
 
 
-def live(flown: Sequence[Flown]) -> Live:
-    """Return the content that flies the first of these vehicles. Raises DataFileError."""
+def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> Live:
+    """Return the content that flies the first of these vehicles, with a recording if there is one. Raises
+    DataFileError."""
     pilot = flown[0].vehicle
     data = [_data(one) for one in flown]
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     script = inline_script(*_SCRIPTS, folder=MODULE_SOURCES)
     tests, start = data[0]["tests"], dict(data[0]["variables"])
     names = _names(flown)
     return Live(
-        data=Markup(text),
+        data=_json(data),
         script=script.text,
         policy=f"{script.policy} 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
@@ -89,7 +91,13 @@ def live(flown: Sequence[Flown]) -> Live:
         tunable=list(_tunable(pilot)),
         title=" beside ".join(names),
         other=names[1] if len(flown) > 1 else None,
+        recording=_json(recording) if recording else None,
     )
+
+
+def _json(data: Any) -> Markup:
+    """Return data as JSON that may stand in a script element."""
+    return Markup(json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"))
 
 
 def _names(flown: Sequence[Flown]) -> list[str]:
@@ -100,14 +108,16 @@ def _names(flown: Sequence[Flown]) -> list[str]:
     return next((names for names in (plain, versions, files) if len({*names}) == len(names)), plain)
 
 
-def fly_page(flown: Sequence[Flown], *, compact: bool = False) -> str:
+def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mapping[str, Any] | None = None) -> str:
     """Return a page that has only the live section: the first vehicle and the second one as a ghost.
+
+    A recording (`recording_of`) is flown at once.
 
     The compact form, for a frame in another page, shows the picture, the charts and the buttons only.
     Raises DataFileError.
     """
     vehicle = flown[0].vehicle
-    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown), compact=compact)
+    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown, recording), compact=compact)
 
 
 def _data(flown: Flown) -> dict[str, Any]:

@@ -1,13 +1,12 @@
 """The page holds a vehicle level as ArduSub does: its law beside the one in Python, and what a pilot does with it."""
 
 from collections.abc import Callable
-from math import cos, degrees, pi, sin
+from math import cos, degrees, sin
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from examples.hold_level import STICK, VECTORED_6DOF, Hold, Motion, fly
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.fmu.archive import web_module
 from rov_fmu.report.page.live import Flown, fly_page
@@ -15,6 +14,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.report.conftest import Visit
 from tests.report.test_live import flying, until
+from verification.references.ardusub import STICK, VECTORED_6DOF, Hold, Motion
 
 pytestmark = pytest.mark.interop
 
@@ -97,10 +97,10 @@ def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any) ->
     page.focus("#live-stage")
     page.keyboard.down("KeyW")
     until(page, "live.flight.time > 20")
-    angles = page.evaluate(
-        "[0, 1].map((n) => live.flight.pilot.positions[live.flight.pilot.axis(['roll', 'pitch'][n])])"
+    tilts = page.evaluate(
+        "live.flight.times.map((_, n) => Math.hypot(live.flight.pilot.at(n, 'phi'), live.flight.pilot.at(n, 'theta')))"
     )
-    assert degrees(max(abs(angle) for trace in angles for angle in trace)) < 35.0
+    assert degrees(max(tilts)) < 35.0
     assert page.evaluate("live.flight.pilot.model.get('x')") > 15.0
     page.keyboard.up("KeyW")
     time = page.evaluate("live.flight.time")
@@ -147,10 +147,3 @@ def test_a_vehicle_that_cannot_tilt_has_no_switch(tmp_path: Path, visit: Callabl
     page = flying(visit, target.as_uri()).page
     assert page.locator("#live-hold").count() == 0
     assert not page.evaluate("live.flight.isHeld")
-
-
-def test_the_example_flies_level() -> None:
-    lines: list[str] = []
-    assert degrees(fly(5.0, 1.0, Hold(), lines.append)) < 35.0
-    assert lines[0].startswith("   5 s:   4.1 m ahead")
-    assert pi > fly(1.0, 1.0, None, lines.append) > 0.7, "the raw thrusters turn it over"

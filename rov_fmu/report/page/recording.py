@@ -1,0 +1,156 @@
+"""A log as the page that flies reads it: the commands of the vehicle, what was measured, and what identification adds.
+
+Any format that `rov-fmu identify` reads is converted, with the tables [columns], [topics] and [logs] of the rov.toml
+beside the file. Nothing is resampled: commands and measurements keep their own times.
+"""
+
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import NO_FILE, FileError, lines_on
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.columns import COMMAND, names_of
+from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.inspection.headers import axis_in_name
+from rov_fmu.tank.log import Commands, Log
+from rov_fmu.tank.quality import unwrapped
+from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.parsers import format_of, read_parsed
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
+
+_MOST_SAMPLES = 20_000
+"""The largest number of samples of a quantity. Of more samples, every second, third … is flown."""
+_NOT_TOLD = {"missing column", "unknown direction", "time of arrival"}
+"""The findings that a flight does not need."""
+
+
+def topic_name(text: str) -> str:
+    """Return a text, such as the name of a file, as a part of a topic, for which viewers need no quotation marks."""
+    return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
+
+
+def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -> dict[str, Any]:
+    """Return the recording in a log, as fmu_src/live/recording.js declares it.
+
+    `identified` is the MCAP file that `rov-fmu identify --mcap` wrote: the bands of its predictions and its unknown
+    forces are added. Warns of what is left out. Raises FileError if the log cannot be flown by this vehicle.
+    """
+    log = _read(path, vehicle.layout)
+    if not log.commands:
+        raise DataFileError(f"{path}: no commands of thrusters were found, so it cannot be flown")
+    start, end = float(log.commands.rows[0]), log.commands.end
+    signals = [*_signals(log, vehicle.layout.axes, start, end)]
+    if not signals:
+        names = ", ".join(vehicle.layout.kinds)
+        raise DataFileError(f"{path}: no motion of an axis of this vehicle was found: {names}")
+    begin = min([start, *(float(c.samples[0][0]) for c in log.channels if not c.unused and c.count)])
+    forces = [*_add_identified(identified, log, vehicle.layout, signals, begin - start)] if identified else []
+    times, commands = _commands(log, vehicle.layout)
+    return {
+        "name": path.name,
+        "times": _rounded(times - start),
+        "commands": commands,
+        "signals": signals,
+        "forces": forces,
+        "notes": [],
+        "left": 0,
+    }
+
+
+def _read(path: Path, layout: Layout) -> Log:
+    """Read the log up to the first restart of its clock. Raises FileError."""
+    if not path.is_file():
+        raise FileError(f"{path}: {NO_FILE}")
+    described = path.parent / ROV_FILE
+    rov_file = read_description(described) if described.is_file() else NO_ROV_FILE
+    names, wrong = names_of(layout, rov_file.tables)
+    if wrong or not rov_file.explains_files:
+        raise VehicleFileError(*(lines_on(described, wrong) or rov_file.mistakes))
+    log, *others = read_logs(path, layout, names, axis_in_name(path))
+    if others:
+        warnings.warn(f"{path}: only the part before the clock restarts is flown", UserWarning, stacklevel=3)
+    for sentence in sentences((f for f in log.findings if f.kind not in _NOT_TOLD), SENTENCES):
+        warnings.warn(sentence, UserWarning, stacklevel=3)
+    return log
+
+
+def _commands(log: Log, layout: Layout) -> tuple[Array, dict[str, list[float]]]:
+    """Return the times at which commands change, and the commands of the vehicle that give those of the log best."""
+    commands = log.commands
+    assert isinstance(commands, Commands)
+    times = np.unique([commands.rows[0], *commands.time, commands.rows[-1]])
+    given = commands.at(times)
+    if commands.thrusters == (COMMAND,) and log.axis:
+        signs = layout.signs(log.axis)
+        values = given @ np.array([[signs.get(name, 0.0) for name in layout.commands]])
+    else:
+        mix = [[layout.gains[name].get(one, 0.0) for one in layout.commands] for name in commands.thrusters]
+        values = given @ np.linalg.pinv(np.array(mix), rcond=1e-9).T
+    columns = np.clip(values, -1.0, 1.0).T
+    return times, {name: _rounded(column) for name, column in zip(layout.commands, columns, strict=True)}
+
+
+def _signals(log: Log, axes: tuple[VehicleAxis, ...], start: float, end: float) -> Iterator[dict[str, Any]]:
+    """Yield what is compared: of each axis the position, or else the velocity."""
+    for n, axis in enumerate(form.axis for form in axes):
+        known = (quantity for quantity in QUANTITIES.values() if quantity.axis == axis)
+        channels = (log.used(quantity.name) for quantity in sorted(known, key=lambda one: one.is_velocity))
+        for channel in filter(None, channels):
+            is_meant = channel.there & (channel.time >= start) & (channel.time <= end)
+            if np.count_nonzero(is_meant) < 2:
+                continue
+            stride = -(-np.count_nonzero(is_meant) // _MOST_SAMPLES)
+            values = unwrapped(channel) if channel.quantity.wraps else channel.values
+            yield {
+                "axis": n,
+                "quantity": channel.quantity.name,
+                "isPosition": not channel.quantity.is_velocity,
+                "times": _rounded(channel.time[is_meant][::stride] - start),
+                "values": _rounded(values[is_meant][::stride]),
+            }
+            break
+
+
+def _add_identified(
+    path: Path, log: Log, layout: Layout, signals: list[dict[str, Any]], begin: float
+) -> Iterator[dict[str, Any]]:
+    """Add the bands of predictions to the signals, and yield the unknown forces. The file's times begin at `begin`.
+
+    Raises DataFileError if the file has nothing about this log.
+    """
+    if not path.is_file():
+        raise FileError(f"{path}: {NO_FILE}")
+    own = f"/{topic_name(log.file)}/"
+    known = [topic_name(signal["quantity"]) for signal in signals]
+    known += [f"unknown_force/{form.axis.name}" for form in layout.axes]
+    content = read_parsed(path, format_of(path), {own + name for name in known})
+    topics = {topic.source.topic.removeprefix(own): topic for piece in content.pieces for topic in piece.topics}
+    if not topics:
+        raise DataFileError(f"{path}: has nothing about {log.file}; `rov-fmu identify --mcap` writes such a file")
+
+    def band(fields: Mapping[str, Array], times: Array) -> dict[str, list[float]]:
+        return {"times": _rounded(times + begin), "values": _rounded(0.5 * (fields["high"] - fields["low"]))}
+
+    for signal in signals:
+        topic = topics.get(topic_name(signal["quantity"]))
+        if topic and "low" in topic.fields:
+            signal["band"] = band(topic.fields, topic.time)
+    for n, axis in enumerate(form.axis for form in layout.axes):
+        if topic := topics.get(f"unknown_force/{axis.name}"):
+            values = {"times": _rounded(topic.time + begin), "values": _rounded(topic.fields["force"])}
+            yield {"axis": n, **values, "band": band(topic.fields, topic.time)}
+
+
+def _rounded(values: Array) -> list[float]:
+    """Return numbers with nine decimals, far below what a sensor or a clock tells."""
+    rounded: list[float] = np.round(values, 9).tolist()
+    return rounded
