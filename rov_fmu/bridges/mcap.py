@@ -26,7 +26,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from foxglove import Context
-    from foxglove.messages import ArrowPrimitive, Color, Quaternion, SceneEntity, Vector3
+    from foxglove.messages import ArrowPrimitive, Color, Quaternion, SceneEntity, Timestamp, Vector3
 
 EARTH = "map"
 """The name of the frame that is fixed to the earth: east, north, up."""
@@ -87,6 +87,20 @@ class Recording:
         channel = Channel(name, schema=schema, message_encoding="json", context=self.context)
         return lambda stamp, values: channel.log(dict(values), log_time=stamp)
 
+    def poses(self, name: str, values: Mapping[str, Array]) -> Callable[[int, int], None]:
+        """Return the function that writes the n-th pose of a topic, with its stamp in ns, from values as in `poses`."""
+        from foxglove.channels import PoseInFrameChannel
+        from foxglove.messages import Pose, PoseInFrame
+
+        channel = PoseInFrameChannel(name, context=self.context)
+        positions, orientations = poses(values)
+
+        def write(n: int, stamp: int) -> None:
+            pose = Pose(position=_vector(positions[n]), orientation=_quaternion(orientations[n]))
+            channel.log(PoseInFrame(timestamp=_timestamp(stamp), frame_id=EARTH, pose=pose), log_time=stamp)
+
+        return write
+
     def content(self) -> bytes:
         """End the file, and return its content."""
         self._writer.close()
@@ -116,9 +130,10 @@ def motion_mcap(vehicle: Vehicle, time: Array, values: Mapping[str, Array]) -> b
         for topic, declared in groups.items()
     }
     write = {topic: recording.topic(topic, own) for topic, own in numbers.items() if own}
-    write_pose = _pose_writer(vehicle, values, recording.context)
+    write_picture, write_pose = _picture_writer(vehicle, values, recording.context), recording.poses("/pose", values)
     before: dict[str, float] = {}
     for n, stamp in enumerate(nanoseconds(time)):
+        write_picture(n, stamp)
         write_pose(n, stamp)
         row = {topic: {name: float(values[name][n]) for name in own} for topic, own in numbers.items()}
         if row["/inputs"] != before:
@@ -148,13 +163,19 @@ def poses(values: Mapping[str, Array]) -> tuple[Array, Rotation]:
     return np.stack([east, north, 0.0 - down], axis=-1), _TO_ENU * turned * _TO_FRD
 
 
-def _pose_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
-    """Return the function that writes pose and picture of the vehicle at the n-th time, with its stamp in ns."""
-    from foxglove.channels import FrameTransformsChannel, PoseInFrameChannel, SceneUpdateChannel
-    from foxglove.messages import FrameTransform, FrameTransforms, Pose, PoseInFrame, SceneUpdate, Timestamp
+def _timestamp(stamp: int) -> "Timestamp":
+    from foxglove.messages import Timestamp
+
+    seconds, rest = divmod(stamp, 1_000_000_000)
+    return Timestamp(sec=seconds, nsec=rest)
+
+
+def _picture_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
+    """Return the function that writes frame and picture of the vehicle at the n-th time, with its stamp in ns."""
+    from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel
+    from foxglove.messages import FrameTransform, FrameTransforms, SceneUpdate
 
     tf = FrameTransformsChannel("/tf", context=context)
-    pose = PoseInFrameChannel("/pose", context=context)
     scene = SceneUpdateChannel("/scene", context=context)
     positions, orientations = poses(values)
     forces = {t.name: values[f"F_{t.name}"] for t in vehicle.layout.thrusters if f"F_{t.name}" in values}
@@ -164,21 +185,14 @@ def _pose_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Contex
 
     def write(n: int, stamp: int) -> None:
         nonlocal due
-        seconds, rest = divmod(stamp, 1_000_000_000)
-        at = Timestamp(sec=seconds, nsec=rest)
-        position, orientation = _vector(positions[n]), _quaternion(orientations[n])
         transform = FrameTransform(
-            timestamp=at,
+            timestamp=_timestamp(stamp),
             parent_frame_id=EARTH,
             child_frame_id=BODY,
-            translation=position,
-            rotation=orientation,
+            translation=_vector(positions[n]),
+            rotation=_quaternion(orientations[n]),
         )
         tf.log(FrameTransforms(transforms=[transform]), log_time=stamp)
-        pose.log(
-            PoseInFrame(timestamp=at, frame_id=EARTH, pose=Pose(position=position, orientation=orientation)),
-            log_time=stamp,
-        )
         if stamp >= due:
             shares = {name: float(force[n]) / strongest if strongest else 0.0 for name, force in forces.items()}
             scene.log(SceneUpdate(entities=[_picture(vehicle, size, shares)]), log_time=stamp)

@@ -2,14 +2,19 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.bridges.mcap import Number, Recording, about, nanoseconds
 from rov_fmu.c.simulation import Array
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW
 from rov_fmu.identify.result import Identification, Prediction, UnknownForce
 from rov_fmu.report.page.recording import topic_name
 from rov_fmu.tank.log import Channel, Commands, Log
+from rov_fmu.tank.quality import unwrapped
 from rov_fmu.vehicle.uncertainty import NORMAL
 
 
@@ -30,24 +35,49 @@ def identification_mcap(identification: Identification) -> bytes:
     """Return the logs of an identification as the content of an MCAP file.
 
     Each log begins at time 0, and its topics begin with its name: `commands`, by thruster, whenever one changes; each
-    measured quantity, with its prediction by a fit without this log and the 95 % band; and `unknown_force`, the slow
-    force along each axis that the model does not explain, with its 95 % interval. All values are in SI units.
+    measured quantity, with its prediction by a fit without this log and the 95 % band; `unknown_force`, the slow force
+    along each axis that the model does not explain, with its 95 % interval; and `pose`, with Foxglove's schema, the
+    measured attitude and depth, if the log has a heading. All values are in SI units.
 
     Raises InputError where foxglove-sdk is not installed.
     """
     recording = Recording(about(identification.vehicle))
-    messages: list[tuple[int, Callable[[int, Mapping[str, float]], None], dict[str, float]]] = []
+    messages: list[tuple[int, Callable[[], None]]] = []
     for log in identification.folder.logs:
         series = [*_series_of(identification, log)]
         begin = min((float(one.time[0]) for one in series if len(one.time)), default=0.0)
         for one in series:
-            write = recording.topic(f"/{topic_name(log.file)}/{one.topic}", one.numbers)
+            write = recording.topic(f"/{topictopic_name(log.file)}/{one.topic}", one.numbers)
             rows = np.column_stack([*one.columns.values()]).tolist()
             for stamp, row in zip(nanoseconds(one.time - begin), rows, strict=True):
-                messages.append((stamp, write, dict(zip(one.columns, row, strict=True))))
-    for stamp, write, values in sorted(messages, key=lambda message: message[0]):
-        write(stamp, values)
+                messages.append((stamp, partial(write, stamp, dict(zip(one.columns, row, strict=True)))))
+        time, values = _pose(log)
+        if len(time):
+            write_pose = recording.poses(f"/{topic_name(log.file)}/pose", values)
+            stamps = nanoseconds(time - begin)
+            messages += [(stamp, partial(write_pose, n, stamp)) for n, stamp in enumerate(stamps)]
+    for _, write_it in sorted(messages, key=lambda message: message[0]):
+        write_it()
     return recording.content()
+
+
+def _pose(log: Log) -> tuple[Array, dict[str, Array]]:
+    """Return the measured attitude and depth at the times of the heading, by the names of the FMU; none without one.
+
+    A log has no horizontal position, and an angle that it does not have is 0.
+    """
+    heading = log.used(YAW.position)
+    time = heading.samples[0] if heading else np.zeros(0)
+
+    def at_times(name: str) -> Array:
+        channel = log.used(name)
+        if channel is None or not channel.count:
+            return np.zeros(len(time))
+        return np.interp(time, channel.samples[0], unwrapped(channel)[channel.there])
+
+    psi, theta, phi = (at_times(axis.position) for axis in (YAW, PITCH, ROLL))
+    attitude = Rotation.from_euler("ZYX", np.column_stack([psi, theta, phi])).as_quat(scalar_first=True)
+    return time, {"z": at_times(HEAVE.position), **dict(zip(QUATERNION, attitude.T, strict=True))}
 
 
 def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:

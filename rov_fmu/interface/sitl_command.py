@@ -83,6 +83,8 @@ def _setup(path: Path, options: Options) -> Setup:
         hint = did_you_mean(options.frame, FRAMES)
         raise InputError(f"--frame {shown(options.frame)}: must be one of {', '.join(FRAMES)}{hint}")
     vehicle = load(path)
+    if not vehicle.layout.commands:
+        raise InputError(f"{path}: this vehicle has no thrusters, so there is nothing that ArduSub could drive")
     if options.log:
         check_targets([options.log], [path, *vehicle.files])
         if os.path.lexists(options.log) and not options.force:

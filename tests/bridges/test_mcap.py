@@ -27,6 +27,8 @@ from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.log import Channel, Source
 from tests.folders import small_folder
 from tests.report.results import example
 
@@ -214,6 +216,24 @@ def test_identification() -> None:
     commands = next(one.commands for one in result.folder.logs if one.file == prediction.file)
     assert commands
     assert [values["t"] for _, values in found[f"{log}/commands"]] == commands.value.tolist()
+
+
+def test_measured_poses_of_a_log() -> None:
+    """The bow points north-west, up and to port: its direction and the depth are those of the angles."""
+    result, time = example(), np.arange(0.0, 5.0, 0.1)
+    phi, theta, psi = 0.2, 0.3, 2.0 * pi - pi / 4
+    angles = {"roll angle": phi, "pitch angle": theta, "heading": psi, "depth": 1.5}
+    channels = tuple(Channel(QUANTITIES[q], Source(q), time, np.full(len(time), x)) for q, x in angles.items())
+    log = replace(result.folder.logs[0], channels=channels)
+    found = messages(identification_mcap(replace(result, folder=replace(result.folder, logs=[log]))))
+    poses_of_log = found[f"/{log.file.replace('.', '_')}/pose"]
+    assert len(poses_of_log) == len(time)
+    pose = poses_of_log[0][1]
+    assert pose.frame_id == "map"
+    assert (pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) == (0.0, 0.0, -1.5)
+    q = pose.pose.orientation
+    bow = [1.0 - 2.0 * (q.y**2 + q.z**2), 2.0 * (q.x * q.y + q.w * q.z), 2.0 * (q.x * q.z - q.w * q.y)]
+    assert bow == pytest.approx([cos(theta) * sin(psi), cos(theta) * cos(psi), sin(theta)])
 
 
 def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
