@@ -47,7 +47,7 @@ def identification_mcap(identification: Identification) -> bytes:
         series = [*_series_of(identification, log)]
         begin = min((float(one.time[0]) for one in series if len(one.time)), default=0.0)
         for one in series:
-            write = recording.topic(f"/{topictopic_name(log.file)}/{one.topic}", one.numbers)
+            write = recording.topic(f"/{topic_name(log.file)}/{one.topic}", one.numbers)
             rows = np.column_stack([*one.columns.values()]).tolist()
             for stamp, row in zip(nanoseconds(one.time - begin), rows, strict=True):
                 messages.append((stamp, partial(write, stamp, dict(zip(one.columns, row, strict=True)))))
