@@ -4,7 +4,7 @@ const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 const SPAN = 20; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
-const HELD = "Depth, heading and attitude are held, as ArduSub holds them; keys and sticks steer.";
+const HELD = "Depth, heading and attitude are held as by ArduSub.";
 
 /** The axis that each arrow key drives, and the direction. @type {Record<string, [string, number]>} */
 const ARROWS = {
@@ -106,6 +106,10 @@ class Live {
     this.depth = pilot.has("z") ? new DepthTape(part("depth")) : null;
     /** @type {Chart[]} */
     this.charts = [];
+    const map = document.getElementById("live-map");
+    this.track = map && new Track(map);
+    /** @type {Chart | null} */
+    this.dive = null;
     this.rows = Number(part("section").style.getPropertyValue("--rows"));
     this.isSeen = true;
     this.changed = true;
@@ -206,8 +210,7 @@ class Live {
       this.isSeen = entry.isIntersecting;
     }).observe(section);
     const resized = new ResizeObserver(() => {
-      this.picture?.fit();
-      for (const chart of this.charts) chart.fit();
+      this.fit();
       this.draw(); // before the new size is painted
     });
     for (const name of ["stage", "charts"]) resized.observe(part(name));
@@ -221,6 +224,8 @@ class Live {
       this.flight.ghostShown ||= !this.flight.isOther && this.isTuned();
     } else if (slider.dataset.kind === "load") {
       this.flight.set({ [name]: Number(slider.value) });
+    } else if (slider.dataset.kind === "bed") {
+      this.flight.bed = Number(slider.value);
     } else if (slider.dataset.kind === "start") {
       this.takeOver();
       this.flight.beginAt(name, (Number(slider.value) * Math.PI) / 180);
@@ -335,7 +340,16 @@ class Live {
     part("charts").replaceChildren();
     part("section").style.setProperty("--columns", String(Math.ceil(panels.length / this.rows)));
     this.charts = panels.map((panel) => new Chart(part("charts"), panel));
-    for (const chart of this.charts) chart.fit();
+    const heave = PANELS.positions(this.flight).find((_, a) => this.vehicle.axes[a].position === "z");
+    this.dive?.svg.remove();
+    this.dive = heave ? new Chart(part("column"), { ...heave, id: "dive", title: "depth", signal: -1 }) : null;
+    this.fit();
+  }
+
+  /** Takes over the sizes on the screen. */
+  fit() {
+    this.picture?.fit();
+    for (const chart of [...this.charts, this.dive]) chart?.fit();
     this.changed = true;
   }
 
@@ -579,6 +593,14 @@ class Live {
     this.changed = true;
   }
 
+  /** Returns the words about the surface or the seabed that stops the vehicle. */
+  edge() {
+    const { pilot, bed, isBounded, replay, test } = this.flight;
+    const z = pilot.model.get("z");
+    if (!isBounded || replay || test) return "";
+    return z <= 0 ? " (at the surface)" : z >= bed - RESTING * this.vehicle.size ? " (on the seabed)" : "";
+  }
+
   draw() {
     this.changed = false;
     const { flight } = this;
@@ -589,11 +611,18 @@ class Live {
     this.horizon?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost, this.pointed);
-    part("measured").hidden = !flight.replay && this.vehicle.tests.every(({ V }) => V === null);
+    this.track?.draw(flight, ghost && (flight.replay?.hasTrack ?? true));
+    this.dive?.draw(flight, Math.max(SPAN, flight.times[flight.times.length - 1]), ghost, null);
+    const all = this.charts.flatMap(({ panel }) => panel.traces);
+    part("steady").hidden = flight.steering() !== null || this.charts.every(({ panel }) => panel.axis < 0);
+    part("measured").hidden = !flight.test && !all.some(({ kind }) => kind === "line measured");
+    part("banded").hidden = !all.some(({ band }) => band);
+    part("grey").hidden = !ghost;
+    part("hint").hidden = flight.begun;
     const [roll, pitch, heading] = attitudeOf(model);
     const readings = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);
-    if (model.has("z")) readings.push(`depth ${shown(model.get("z"), 2)} m`);
+    if (model.has("z")) readings.push(`depth ${shown(model.get("z"), 2)} m${this.edge()}`);
     if (model.has("phi")) readings.push(`roll ${shown(roll, 0)}°`, `pitch ${shown(pitch, 0)}°`);
     if (model.has("psi")) readings.push(`heading ${shown(heading, 0)}°`);
     part("readings").textContent = readings.join(" · ");

@@ -2,6 +2,7 @@
 
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
 const MOST_KEPT = 20000;
+const RESTING = 0.55; // of the vehicle's size: the height of its middle above the seabed on which it rests
 const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
 /** Returns the last place at which ascending numbers are at most x, or 0. @param {number[]} numbers @param {number} x */
@@ -53,6 +54,21 @@ class Craft {
       distances[a] += (h / 2) * (before[a] + model.get(velocity));
     });
     return true;
+  }
+
+  /** Keeps the vehicle in the water, between the surface and a depth. @param {number} bed */
+  confine(bed) {
+    const { model } = this;
+    const z = model.get("z");
+    if (z >= 0 && z <= bed) return;
+    const edge = z < 0 ? 0 : bed;
+    const sinks = model.get("der(z)");
+    model.set("z", edge);
+    if (sinks * (z - edge) > 0)
+      rotationOf(model).forEach((direction, n) => {
+        model.set("uvw"[n], model.get("uvw"[n]) - sinks * direction[2]);
+      });
+    model.observe();
   }
 
   keep() {
@@ -116,6 +132,9 @@ class Flight {
     this.isHeld = pilot.has("phi");
     /** @type {Sticks} */
     this.sticks = { demands: new Map(), added: {} };
+    /** The depth of the seabed, m, which recordings and step tests do not have, and whether it and the surface stop the vehicle. */
+    this.bed = 10;
+    this.isBounded = true;
     /** True after the first input. Until then, time stands still. */
     this.begun = false;
     this.reset();
@@ -220,6 +239,8 @@ class Flight {
         this.reset();
         return false;
       }
+      if (this.isBounded && !this.test)
+        for (const craft of [this.pilot, this.ghost]) craft.confine(this.bed - RESTING * craft.model.vehicle.size);
       this.time += step;
       left -= step;
       this.keep();

@@ -159,20 +159,24 @@ class Figure {
     this.paths.forEach((path, n) => {
       place(path, n < parts.length ? { class: parts[n].kind, d: parts[n].path } : { d: "" });
     });
-    this.label(look, scale, taken);
+    this.label(model, look, scale, taken);
   }
 
-  /** Puts each label beside its thruster: away from the vehicle's middle, or where it covers less.
-   * @param {(p: Vector) => number[]} look @param {number} scale @param {DOMRect[]} taken */
-  label(look, scale, taken) {
+  /** Puts each label at the end of the jet of its thruster: away from the vehicle's middle, or where it covers less.
+   * @param {Model} model @param {(p: Vector) => number[]} look @param {number} scale @param {DOMRect[]} taken */
+  label(model, look, scale, taken) {
     const [x, y] = look([0, 0, 0]);
     const isLegible = scale * this.vehicle.size > (this.labels.children.length > 4 ? 45 : 24);
     place(this.labels, { visibility: isLegible ? "inherit" : "hidden" });
     const r = this.shape.radius * scale;
     const tubes = this.shape.tubes.map(({ at }) => look(at));
+    const tips = this.shape.tubes.map(({ at, along }, n) => {
+      const { force, most } = this.vehicle.thrusters[n];
+      return look(plus(at, [jetOf(model.get(force) / most, this.shape.radius, this.vehicle.size), along]));
+    });
     const covered = [...taken, ...tubes.map(([u, v]) => new DOMRect(u - r, v - r, 2 * r, 2 * r))];
     [...this.labels.children].forEach((text, n) => {
-      const [u, v] = tubes[n];
+      const [u, v] = tips[n];
       const far = Math.hypot(u - x, v - y);
       const away = far < 2 ? [1, 0] : [(u - x) / far, (v - y) / far];
       const width = LETTER * (text.textContent ?? "").length;
@@ -209,6 +213,12 @@ function prism({ kind, plan, top, low }, look) {
     { kind: `${kind} side`, path: visible.map(outline).join(""), near },
     { kind: `${kind} end`, path: outline(end), near },
   ];
+}
+
+/** Returns where a jet ends, along the direction of its thruster; 0 without a jet. @param {number} share Of the strongest force.
+ * @param {number} r @param {number} size */
+function jetOf(share, r, size) {
+  return Math.abs(share) < 0.004 ? 0 : -Math.sign(share) * (0.6 * r + (0.3 + 1.7 * Math.abs(share)) * size);
 }
 
 /** Returns a thruster as a tube, and the jet of water that it throws against its force.
@@ -274,6 +284,7 @@ class Picture {
     this.tracks = [drawn(svg, "path", { class: "line ghostly" }), drawn(svg, "path", { class: "line" })];
     this.ghost = new Figure(svg, flight.ghost.model.vehicle, "craft ghostly", false);
     this.pilot = new Figure(svg, flight.pilot.model.vehicle, "craft", true);
+    this.surface = drawn(svg, "path", { class: "surface" });
     this.bar = drawn(svg, "path", { class: "scale" });
     this.length = drawn(svg, "text", { x: 14, y: 22 });
     this.north = drawn(svg, "path", { class: "needle" });
@@ -355,7 +366,20 @@ class Picture {
       dot(p, toward),
     ];
     const step = roundUp(80 / scale);
-    const floor = step * (Math.floor((here[2] + 0.8 * this.size) / step) + 1) - here[2];
+    const water = step * (Math.floor((here[2] + 0.8 * this.size) / step) + 1) - here[2];
+    const bed = flight.replay ? Number.POSITIVE_INFINITY : flight.bed - here[2];
+    const floor = Math.min(water, bed);
+    this.svg.classList.toggle("bedded", bed <= water);
+    const reaches = [5, 3.5, 2].map((n) => n * this.size);
+    const surface = reaches.map((d) =>
+      [
+        [d, d],
+        [d, -d],
+        [-d, -d],
+        [-d, d],
+      ].map(([p, q]) => see([p, q, -here[2]])),
+    );
+    this.surface.setAttribute("d", here[2] < 8 * this.size ? surface.map(outline).join("") : "");
     this.lay(see, scale, step, floor, here);
     const frame = rotationOf(pilot.model);
     const plan = this.pilot.shape.plan.map(([u, v]) => plus([0, 0, 0], [u, frame[0]], [v, frame[1]]));

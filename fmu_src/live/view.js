@@ -215,6 +215,49 @@ function axisPanels({ pilot, ghost, times, replay }, ofPosition) {
   });
 }
 
+/** The tracks from above, north up, in a scale that shows all of both. */
+class Track {
+  /** @param {Element} svg */
+  constructor(svg) {
+    this.svg = svg;
+    this.bar = drawn(svg, "path", { class: "scale thin" });
+    this.words = drawn(svg, "text", { x: 6, y: 14 });
+    this.lines = ["line ghostly", "line"].map((kind) => drawn(svg, "path", { class: kind }));
+    this.here = drawn(svg, "path", { class: "needle", d: "M0 -8L5 6L0 3L-5 6Z" });
+  }
+
+  /** @param {Flight} flight @param {boolean} ghost */
+  draw({ pilot, ghost: other, times, time }, ghost) {
+    const [width, height] = [this.svg.clientWidth || 160, this.svg.clientHeight || 160];
+    place(this.svg, { viewBox: `0 0 ${width} ${height}` });
+    const last = placeOf(times, time);
+    const stride = Math.max(1, Math.ceil(last / 500));
+    const tracks = [other, pilot].map((craft) => {
+      const points = [];
+      for (let n = 0; n < last; n += stride) points.push([craft.at(n, "x"), craft.at(n, "y")]);
+      return [...points, positionOf(craft.model)];
+    });
+    const shownTracks = ghost ? tracks : tracks.slice(1);
+    const [north, east] = [0, 1].map((i) => shownTracks.flatMap((points) => points.map((p) => p[i])));
+    const [middle, aside] = [north, east].map((list) => (Math.min(...list) + Math.max(...list)) / 2);
+    const reach = [north, east].map((list) => Math.max(2, 1.15 * (Math.max(...list) - Math.min(...list))));
+    const scale = Math.min((height - 20) / reach[0], width / reach[1]);
+    const see = (/** @type {number[]} */ [x, y]) => [
+      width / 2 + (y - aside) * scale,
+      height / 2 + 8 - (x - middle) * scale,
+    ];
+    this.lines.forEach((line, n) => {
+      line.setAttribute("d", n || ghost ? outline(tracks[n].map(see)).slice(0, -1) : "");
+    });
+    const [x, y] = see(positionOf(pilot.model));
+    const turned = (pilot.model.get("psi") * 180) / Math.PI;
+    place(this.here, { transform: `translate(${x.toFixed(1)} ${y.toFixed(1)}) rotate(${turned.toFixed(1)})` });
+    const step = roundUp(30 / scale);
+    this.bar.setAttribute("d", `M6 20h${(step * scale).toFixed(1)}`);
+    this.words.textContent = `Track from above: ${step < 1 ? `${Math.round(step * 100)} cm` : `${step} m`}`;
+  }
+}
+
 /** A chart over time. */
 class Chart {
   /** @param {Element} parent @param {Graph} panel */
@@ -226,6 +269,8 @@ class Chart {
     });
     this.svg = svg;
     this.panel = panel;
+    /** True for a chart whose numbers grow downward. */
+    this.isDepth = panel.id === "dive";
     this.frame = drawn(svg, "path", { class: "grid" });
     this.title = drawn(svg, "text", { class: "title", x: 2, y: 12 });
     this.marks = drawn(svg, "text", { class: "marks right" });
@@ -275,7 +320,8 @@ class Chart {
     const levels = axis >= 0 ? [0, V, published?.V ?? 0] : [];
     const [low, high, step] = rangeOf(levels, traces, windows, bottom - top);
     const px = (/** @type {number} */ t) => Math.max(left, left + ((t - start) / span) * (right - left));
-    const py = (/** @type {number} */ v) => bottom - ((v - low) / (high - low)) * (bottom - top);
+    const share = (/** @type {number} */ v) => (v - low) / (high - low);
+    const py = (/** @type {number} */ v) => bottom - (this.isDepth ? 1 - share(v) : share(v)) * (bottom - top);
     this.lay(low, high, step, py);
     this.ends[0].textContent = `${shown(start, 0)} s`;
     this.ends[1].textContent = `${shown(start + span, 0)} s`;

@@ -99,7 +99,7 @@ Leg = dict[str, Any]
 
 _FLY = """legs => {
     live.pause(true);
-    live.flight.isHeld = false;
+    Object.assign(live.flight, { isHeld: false, isBounded: false });
     live.flight.reset();
     const { model } = live.flight.pilot;
     return legs.map(({ length, inputs, tuning }) => {
@@ -229,7 +229,7 @@ def test_a_frame_is_drawn_in_time(pages: Callable[[str], str], visit: Visitor) -
             return performance.now() - start;
         }).sort((one, other) => one - other)[50]"""
     )
-    assert took < 8.0, "half of a frame at 60 Hz is left to the browser"
+    assert took < 8.0, "half of a frame at 60 Hz is left to the browser, also on a busy machine"
 
 
 # ---- Roll and pitch --------------------------------------------------------------------------------------------------
@@ -474,6 +474,7 @@ def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, quie
     other = load_vehicle(SHIPPED["bluerov2"])
     ghost = page.evaluate("""() => {
         live.pause(true);
+        live.flight.isBounded = false;
         live.flight.set({ u_l: 0.5, u_r: 0.3, u_t: -0.2 });
         live.flight.advance(3);
         return [...live.flight.ghost.model.values];
@@ -766,6 +767,7 @@ def test_the_charts_tell_the_values_under_the_pointer(page: Any, vehicle: Vehicl
 def test_an_exported_flight_can_be_flown_and_inspected(page: Any, tmp_path: Path) -> None:
     page.evaluate("""() => {
         live.pause(true);
+        live.flight.isBounded = false;
         for (const commands of [{ u_l: 0.5, u_r: 0.4 }, { u_t: -0.3 }, { u_r: -0.2 }]) {
             live.flight.set(commands);
             live.flight.advance(2);
@@ -883,9 +885,13 @@ def test_the_ghost_is_lightly_filled_and_each_line_has_its_own_dash(page: Any) -
 def test_the_legend_tells_what_was_measured_only_where_something_was(
     pages: Callable[[str], str], quiet: Visitor
 ) -> None:
-    """The VideoRay has published step tests; a vehicle without them has measurements during a recording only."""
+    """That is during a step test, and beside a recording."""
     legend = "#live-measured"
-    assert flying(quiet, pages("videoray")).page.locator(legend).is_visible()
+    tested = flying(quiet, pages("videoray")).page
+    assert not tested.locator(legend).is_visible()
+    tested.click("#live-run")
+    until(tested, "live.flight.time > 0.1")
+    assert tested.locator(legend).is_visible()
     page = flying(quiet, pages("everything")).page
     assert not page.locator(legend).is_visible()
     command, axis = page.evaluate("[live.vehicle.commands[0], live.vehicle.axes[0]]")
