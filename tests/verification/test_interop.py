@@ -23,7 +23,8 @@ from verification.interoperability.__main__ import main
 from verification.interoperability.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
 from verification.interoperability.install import install
 from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, VEHICLES, Manoeuvre, ResultError
-from verification.interoperability.run import Verdict, build_fmu, run, without_places
+from verification.interoperability.page import PageError, write_table
+from verification.interoperability.run import Outcome, Verdict, build_fmu, run, without_places
 
 TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
@@ -330,6 +331,47 @@ def test_no_environment_is_cleared_for_another(tmp_path: Path, monkeypatch: pyte
     shutil.rmtree(tmp_path / "python-cofmupy")
     install("python", tmp_path, said.append)
     assert [command[-1] for command in calls if "venv" in command] == [str(tmp_path / "python-cofmupy")]
+
+
+def _outcome(importer: Importer, vehicle: str, difference: float | None) -> Outcome:
+    verdict = Verdict.NO_FINDING if difference is None else Verdict.AGREES
+    return Outcome(importer, vehicle, verdict, difference)
+
+
+def test_the_page_shows_the_larger_difference_of_both_versions(tmp_path: Path) -> None:
+    two, three = (next(i for i in IMPORTERS if i.name == name) for name in ("ecos-cs", "ecos-cs-fmi3"))
+    check = next(i for i in IMPORTERS if i.name == "schemas")
+    run_of_all = [_outcome(two, "a", 2e-14), _outcome(three, "a", 4e-13), _outcome(two, "b", 3e-15)]
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- matrix -->\nold\n<!-- end -->\nafter\n")
+    write_table([*run_of_all, _outcome(check, "a", None)], page)
+    text = page.read_text()
+    assert f"| Ecos {two.version} | 2.0, 3.0 | CS | 4e-13 | 3e-15 |" in text
+    assert f"| lxml {check.version} | 2.0 | XML schemas | no finding | – |" in text, "it has not seen the other vehicle"
+    assert "old" not in text
+    assert text.startswith("before\n")
+    assert text.endswith("<!-- end -->\nafter\n")
+
+
+def test_the_page_is_not_written_if_an_importer_did_not_run(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("<!-- matrix -->\n<!-- end -->\n")
+    with pytest.raises(PageError, match=f"{IMPORTERS[0].name} was not run"):
+        write_table([Outcome(IMPORTERS[0], "a", Verdict.NOT_RUN)], page)
+    page.write_text("no place for it")
+    with pytest.raises(PageError, match="there is no <!-- matrix -->"):
+        write_table([_outcome(IMPORTERS[0], "a", 0.0)], page)
+
+
+def test_the_page_of_the_importers_has_all_of_them() -> None:
+    """It is written by a run of all; an importer or a version that is new needs another run."""
+    page = (ROOT / "docs" / "importers.md").read_text(encoding="utf-8")
+    for importer in IMPORTERS:
+        title, interface = re.escape(f"{importer.title} {importer.version}"), re.escape(importer.interface)
+        row = rf"\| {title} \| [\d., ]+ \| {interface} \|"
+        (found,) = re.findall(f"{row}.*", page)
+        assert f"{importer.fmi}.0" in found
+        assert not re.search("differs|failed|not run", found)
 
 
 def test_no_registry_is_named() -> None:

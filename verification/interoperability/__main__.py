@@ -15,6 +15,7 @@ from rich.table import Column, Table
 from .importers import HERE, KITS, VERSIONS, Importer, chosen
 from .install import InstallError, install
 from .manoeuvre import MANOEUVRES
+from .page import PageError, write_table
 from .run import Outcome, Verdict, build_fmu, run
 
 STYLES = {Verdict.DIFFERS: "red", Verdict.FAILED: "red", Verdict.NOT_RUN: "yellow"}
@@ -35,6 +36,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--fmi", type=int, choices=VERSIONS, help="version of FMI (default: both)")
     add("--fmu", type=Path, metavar="FILE", help="FMU of that vehicle and version (default: built for this)")
     add("--install", action="store_true", help="install the kits instead of running (Linux)")
+    add(
+        "--page",
+        type=Path,
+        metavar="FILE",
+        help="write the table into this page, which all importers have to be run for",
+    )
     add("--list", action="store_true", help="list the importers instead of running them")
     add(
         "--tools",
@@ -77,6 +84,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with console.status(f"{importer.title}, FMI {importer.fmi}.0, {importer.interface}: {vehicle}"):
                 outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))
     _show(outcomes, console)
+    if options.page:
+        try:
+            write_table(outcomes, options.page)
+        except (PageError, OSError) as error:
+            print(f"interop: {error}", file=sys.stderr)
+            return 2
     # An importer that was named must run.
     bad = {Verdict.DIFFERS, Verdict.FAILED, *([Verdict.NOT_RUN] if options.names else [])}
     return int(any(outcome.verdict in bad for outcome in outcomes))

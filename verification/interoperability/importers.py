@@ -155,7 +155,8 @@ _FMI_SIM = "rust/fmi-sim-{version}/bin/fmi-sim"
 # Some importers are not in the table. FMI++ (fmipp 2.1.0) and mosaik-fmi 1.1.0, which uses it, have no binaries for
 # Linux and compile with SUNDIALS 3 only. OMSimulator's package (3.0.0.post198) fetches its binaries from another host
 # during its installation; tests/fmu/test_versions.py checks its rule for value references instead. Jaxonomy's Model
-# Exchange agrees to 4e-6, but takes minutes.
+# Exchange agrees to 4e-6, but takes minutes. GEMSEO-FMU brings 1.1 GB of packages. moo-sim-interface holds all inputs
+# at their start values, so it cannot fly a manoeuvre.
 IMPORTERS = (
     *_both(
         _python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
@@ -176,6 +177,9 @@ IMPORTERS = (
     _python("jaxonomy", "Jaxonomy", "CS", "jaxonomy"),
     _python("cofmupy", "CoFmuPy", "CS", "cofmupy", requirements="requirements-cofmupy.txt"),
     *_both(_python("fmuloader", "fmuloader", "CS, state restored", "fmuloader")),
+    _python("sofirpy", "SOFiRpy", "CS", "sofirpy"),
+    _python("cosimtlk", "cosimtlk", "CS", "cosimtlk"),
+    _python("syssimx", "SysSimX", "CS, ports with units", "syssimx"),
     _python("fmugym", "FMUGym", "CS, single precision", "fmugym", SINGLE),
     *_both(
         _python("fmucontainer", "fmutool", "CS, container of two ROVs", "fmu-manipulation-toolbox"),

@@ -1,0 +1,57 @@
+"""The table of docs/importers.md: what every importer gave in one run of all of them."""
+
+import re
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+
+from .importers import Importer
+from .run import Outcome, Verdict
+
+_TABLE = re.compile(r"(?<=<!-- matrix -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+
+class PageError(Exception):
+    """A page that cannot have the table, in one line."""
+
+
+def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
+    """Put the table of a run between `<!-- matrix -->` and `<!-- end -->` of a page. Raises PageError.
+
+    Every importer has to have run, so that no row of the table is of another day.
+    """
+    if absent := [one.importer.name for one in outcomes if one.verdict is Verdict.NOT_RUN]:
+        raise PageError(f"{page}: {absent[0]} was not run, so the table would not be complete")
+    text = page.read_text(encoding="utf-8")
+    if not _TABLE.search(text):
+        raise PageError(f"{page}: there is no <!-- matrix --> with an <!-- end --> after it")
+    content = f"\n{table(outcomes)}\n\nRun on {date.today()}.\n\n"
+    page.write_text(_TABLE.sub(lambda _: content, text), encoding="utf-8")
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Return the table in Markdown: one row for an importer in one mode, with the larger difference of both FMIs."""
+    vehicles = [*dict.fromkeys(one.vehicle for one in outcomes)]
+    rows: dict[tuple[str, str], list[Outcome]] = {}
+    for one in outcomes:
+        rows.setdefault((_title(one.importer), one.importer.interface), []).append(one)
+    lines = [["importer", "FMI", "interface", *vehicles], ["---"] * (3 + len(vehicles))]
+    for (title, interface), row in rows.items():
+        versions = ", ".join(f"{n}.0" for n in sorted({one.importer.fmi for one in row}))
+        cells = [_cell([one for one in row if one.vehicle == vehicle]) for vehicle in vehicles]
+        lines.append([title, versions, interface, *cells])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _title(importer: Importer) -> str:
+    return f"{importer.title} {importer.version}"
+
+
+def _cell(outcomes: Sequence[Outcome]) -> str:
+    """Return what an importer gave for a vehicle: the difference, or the verdict where there is none."""
+    if not outcomes:
+        return "–"
+    bad = [one for one in outcomes if not one.verdict.is_good]
+    if bad or outcomes[0].difference is None:
+        return (bad or outcomes)[0].verdict.value
+    return f"{max(one.difference or 0.0 for one in outcomes):.0e}"
