@@ -145,6 +145,7 @@ def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
     letters = re.findall(r"<kbd>([A-Z])</kbd>", words)
     assert len(set(letters)) == len(letters) == 2 * len(heavy.layout.axes)
     start = {slider.get("name"): float(slider.get("value")) for slider in root.iter("input") if slider.get("name")}
+    assert start.pop("bed") == 10.0, "the seabed is of the page"
     assert start == {v.name: v.start for v in declared if v.name in start}
     assert start["Z_ext"] == 500.0
     assert {*heavy.layout.inputs} <= {*start}

@@ -270,6 +270,7 @@ def test_the_horizon_shows_the_attitude(tilting: Any) -> None:
 
 @pytest.mark.parametrize(("key", "velocity"), [("KeyL", "p"), ("KeyI", "q"), ("KeyD", "r")])
 def test_each_rotation_has_its_key(tilting: Any, key: str, velocity: str) -> None:
+    tilting.locator("#live-hold").uncheck()
     tilting.focus("#live-stage")
     tilting.keyboard.down(key)
     until(tilting, f"live.flight.pilot.model.get('{velocity}') > 0.05")
