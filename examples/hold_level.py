@@ -1,6 +1,6 @@
 """Hold a vehicle level as ArduSub does: `python -m examples.hold_level` flies the BlueROV2 Heavy ahead for 20 s.
 
-The law is that of `verification/references/ardusub.py`. The page that flies holds the Heavy in the same way.
+The law is that of `verification/references/autopilot/ardusub.py`. The page that flies holds the Heavy in the same way.
 """
 
 import warnings
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from math import cos, degrees, sin
 
 import rov_fmu
-from verification.references.ardusub import STICK, VECTORED_6DOF, Hold, Motion
+from verification.references.autopilot.ardusub import STICK, VECTORED_6DOF, Hold, Motion
 
 STEP = 0.02
 """The time between two calls of the law in `fly`, s. ArduSub itself runs at 400 Hz."""

@@ -1,5 +1,5 @@
 // What holds a vehicle level: the depth, heading and attitude hold of ArduSub's modes stabilise and depth hold, with its default gains
-// and, for a BlueROV2 Heavy, its motor matrix. verification/references/ardusub.py is the same law in Python and names its sources.
+// and, for a BlueROV2 Heavy, its motor matrix. verification/references/autopilot/ardusub.py is the same law in Python and names its sources.
 
 const HOLD_RATE = 400; // Hz, of ArduSub's main loop
 const STICK = 0.8; // s, the time constant with which a stick moves: a jump to full thrust ahead would turn the Heavy over

@@ -1,7 +1,8 @@
 """A stand-in for ArduSub: its side of the JSON interface, and its depth, heading and position hold.
 
 It follows ArduPilot's sources. `libraries/SITL/SIM_JSON.cpp`: packets, the parser of replies, the repetition of a
-packet without a reply, and the clock. The law of depth and heading is that of `verification/references/ardusub.py`.
+packet without a reply, and the clock. The law of depth and heading is that of
+`verification/references/autopilot/ardusub.py`.
 """
 
 import struct
@@ -10,7 +11,7 @@ from dataclasses import dataclass, field
 from math import atan, cos, radians, sin
 from socket import AF_INET, SOCK_DGRAM, socket
 
-from verification.references.ardusub import Hold, Motion, Pid
+from verification.references.autopilot.ardusub import Hold, Motion, Pid
 
 KEYS = {"gyro": 3, "accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "timestamp": 1, "rng_1": 1}
 KEYS |= {"voltage": 1, "current": 1}

@@ -32,7 +32,7 @@ from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import THRUST_EFFECTS, pulsed
-from verification.references.ardusub import VECTORED_6DOF
+from verification.references.autopilot.ardusub import VECTORED_6DOF
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)

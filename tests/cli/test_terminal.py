@@ -203,9 +203,9 @@ def test_a_pipe_gets_a_plain_line_for_each_part_but_the_last(folder: Path) -> No
     assert out.splitlines()[-1].startswith(f"Wrote {folder / 'found.html'}. Next: rov-fmu identify ")
 
 
-def test_a_narrow_terminal_wraps_the_cells_of_a_table_and_loses_no_digit(folder: Path) -> None:
+def test_a_narrow_terminal_gets_several_tables_that_lose_no_digit(folder: Path) -> None:
     shown = on_a_terminal(["tables"], 40, folder)
     assert max(map(len, shown.lines)) <= 40
-    digits = re.findall(r"\d", " ".join(shown.lines))
-    assert Counter(digits) == Counter(re.findall(r"\d", " ".join(on_a_terminal(["tables"], 100, folder).lines)))
+    digits = Counter(re.findall(r"\d", " ".join(shown.lines)))
+    assert digits >= Counter(re.findall(r"\d", " ".join(on_a_terminal(["tables"], 100, folder).lines)))
     assert "…" not in "".join(shown.lines)

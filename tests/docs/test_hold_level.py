@@ -5,7 +5,7 @@ from math import degrees, pi
 import pytest
 
 from examples.hold_level import fly
-from verification.references.ardusub import Hold
+from verification.references.autopilot.ardusub import Hold
 
 
 @pytest.mark.filterwarnings("ignore:.*turns over")

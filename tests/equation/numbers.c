@@ -156,10 +156,11 @@ static void saves(fmi2Component c, int n)
     CHECK(fmi2.FreeFMUstate(c, &saved) == fmi2OK && fmi2.FreeFMUstate(c, &read) == fmi2OK);
 }
 
-/* Make calls that are refused. Each of them writes to the log. */
+/* Make calls that are refused. Each of them writes to the log. The first coefficient, the mass, may change; the second is
+   fixed. */
 static void refusals(fmi2Component c, int n)
 {
-    const fmi2ValueReference coefficient = FIRST_COEFFICIENT, derivative = FIRST_CALCULATED, input = 0;
+    const fmi2ValueReference coefficient = FIRST_COEFFICIENT + 1, derivative = FIRST_CALCULATED, input = 0;
     const double infinite = 1e308 * 10.0, one = 1.0;
     double change;
     const size_t before = messages;

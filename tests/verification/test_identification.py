@@ -1,6 +1,8 @@
 """The ROV identification benchmark: scores of known numbers, each method on a small vehicle, and the loader."""
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
@@ -11,6 +13,7 @@ import pytest
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
+from tests.commands import ROOT
 from verification.identification import __main__ as command
 from verification.identification.data import Recorded, Recording, Split, load
 from verification.identification.datasets.exjobb import EXJOBB
@@ -22,8 +25,10 @@ from verification.identification.methods.unchanged import ConstantVelocity, Unch
 from verification.identification.protocol import BEGIN, Method, Outcome, Predicted, ahead, run
 from verification.identification.scores import Score, bands, from_csv, numbers, scores, summary, to_csv
 
-NEEDS = {"_gaussian_process": "sklearn", "_neural_ode": "jax"}
+NEEDS = {"_gaussian_process": "sklearn"}
 """The package of an extra that a method needs."""
+HERE = [make for make in command.METHODS if make.__name__ != "_neural_ode"]
+"""The methods that are tested in this process."""
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +36,7 @@ def split(tmp_path_factory: pytest.TempPathFactory) -> Split:
     return load(TINY, None, tmp_path_factory.mktemp("tiny"))
 
 
-@pytest.fixture(scope="module", params=command.METHODS, ids=lambda make: make.__name__.strip("_"))
+@pytest.fixture(scope="module", params=HERE, ids=lambda make: make.__name__.strip("_"))
 def outcome(request: pytest.FixtureRequest, split: Split) -> Outcome:
     make: Callable[[], Method] = request.param
     if package := NEEDS.get(make.__name__):
@@ -126,6 +131,13 @@ def test_models_beat_no_change_and_ours_is_near_the_noise(outcome: Outcome, spli
         assert all(row.inside_95 >= 0.85 for row in own)
         assert all(row.low <= row.true <= row.high for row in numbers(outcome))
         assert len([*numbers(outcome)]) == 10
+
+
+def test_the_neural_ode_passes_the_tests_of_every_method() -> None:
+    pytest.importorskip("jax", reason="this method needs the extra [identification] with jax")
+    program = [sys.executable, "-m", "tests.verification.neural_ode_checks"]
+    ran = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ran.stdout == "passed\n", ran.stderr
 
 
 def test_no_change_and_constant_velocity_are_what_they_say(split: Split) -> None:

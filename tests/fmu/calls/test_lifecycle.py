@@ -322,7 +322,7 @@ def test_a_call_that_importers_make_against_the_standard_works_with_one_warning(
             assert rov.set({"u_l": 0.5, "u": 0.1}) == OK
             assert _warnings(rov) == []
             before = rov.get(["der(u)"])
-            assert rov.set({"beta_u": 0.5, "m_rov": 7.0}) == ERROR
+            assert rov.set({"beta_u": 0.5, "I_r": 0.3}) == ERROR
             rov.log.clear()
             for value in (0.5, 0.25):
                 assert rov.set({"beta_u": value, "alpha_w": value}) == OK
@@ -428,7 +428,7 @@ def test_a_value_that_a_variable_has_already_is_set_with_one_warning(
         if kind == WITH_EVENTS and fmu.VERSION == 2:
             continue
         with fmu.instance(kind) as rov:
-            assert rov.set({"m_rov": 7.0, "u": 0.5}) == OK
+            assert rov.set({"I_r": 0.3, "u": 0.5}) == OK
             rov.reach(mode)
             fixed = [name for name in fmu.parameters if fmu.variables[name].variability == "fixed"]
             fixed += [name for name in fmu.states if name not in fmu.settable(mode)]
@@ -436,9 +436,7 @@ def test_a_value_that_a_variable_has_already_is_set_with_one_warning(
             for _ in range(2):
                 assert rov.set({"u_l": 0.0, **dict(zip(fixed, rov.get(fixed), strict=True))}) == OK
             (warning,) = _warnings(rov)
-            assert warning.startswith(
-                f"{fmu.name('SetFloat64')}: m_rov must not be set in {mode}, but it has this value"
-            )
+            assert warning.startswith(f"{fmu.name('SetFloat64')}: I_r must not be set in {mode}, but it has this value")
             assert rov.save() == before
             assert rov.set({"u_l": 0.5, "I_r": 0.5}) == ERROR
             assert rov.set({"der(u)": rov.get(["der(u)"])[0]}) == ERROR
@@ -448,11 +446,11 @@ def test_a_value_that_a_variable_has_already_is_set_with_one_warning(
 def test_an_input_of_an_intermediate_update_may_come_with_fixed_parameters(fmu3: fmi3.Fmu) -> None:
     with new(fmu3, CO_SIMULATION, INTERMEDIATE) as rov:
         reach(rov, INTERMEDIATE)
-        mass = rov.get(["m_rov"])[0]
+        inertia = rov.get(["I_r"])[0]
 
         def act() -> None:
-            assert rov.set({"m_rov": mass, "u_l": 0.25}) == OK
-            assert rov.set({"m_rov": mass + 1.0}) == ERROR
+            assert rov.set({"I_r": inertia, "u_l": 0.25}) == OK
+            assert rov.set({"I_r": inertia + 1.0}) == ERROR
 
         inside(rov, INTERMEDIATE, act)
         assert rov.get(["u_l"]) == [0.25]

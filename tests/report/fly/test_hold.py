@@ -14,7 +14,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.report.conftest import Visit
 from tests.report.test_live import flying, until
-from verification.references.ardusub import STICK, VECTORED_6DOF, Hold, Motion
+from verification.references.autopilot.ardusub import STICK, VECTORED_6DOF, Hold, Motion
 
 pytestmark = pytest.mark.interop
 
