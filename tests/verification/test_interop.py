@@ -353,11 +353,12 @@ def test_the_page_shows_the_larger_difference_of_both_versions(tmp_path: Path) -
     assert text.endswith("<!-- end -->\nafter\n")
 
 
-def test_the_page_is_not_written_if_an_importer_did_not_run(tmp_path: Path) -> None:
+@pytest.mark.parametrize("verdict", [Verdict.NOT_RUN, Verdict.FAILED, Verdict.DIFFERS])
+def test_the_page_is_not_written_unless_all_importers_agree(tmp_path: Path, verdict: Verdict) -> None:
     page = tmp_path / "page.md"
     page.write_text("<!-- matrix -->\n<!-- end -->\n")
-    with pytest.raises(PageError, match=f"{IMPORTERS[0].name} was not run"):
-        write_table([Outcome(IMPORTERS[0], "a", Verdict.NOT_RUN)], page)
+    with pytest.raises(PageError, match=f"{IMPORTERS[0].name} {verdict.value}, so the table is not written"):
+        write_table([Outcome(IMPORTERS[0], "a", verdict)], page)
     page.write_text("no place for it")
     with pytest.raises(PageError, match="there is no <!-- matrix -->"):
         write_table([_outcome(IMPORTERS[0], "a", 0.0)], page)

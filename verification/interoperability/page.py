@@ -6,7 +6,7 @@ from datetime import date
 from pathlib import Path
 
 from .importers import Importer
-from .run import Outcome, Verdict
+from .run import Outcome
 
 _TABLE = re.compile(r"(?<=<!-- matrix -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
@@ -18,10 +18,10 @@ class PageError(Exception):
 def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
     """Put the table of a run between `<!-- matrix -->` and `<!-- end -->` of a page. Raises PageError.
 
-    Every importer has to have run, so that no row of the table is of another day.
+    Every importer has to have run and to agree, so that no row of the table is of another day.
     """
-    if absent := [one.importer.name for one in outcomes if one.verdict is Verdict.NOT_RUN]:
-        raise PageError(f"{page}: {absent[0]} was not run, so the table would not be complete")
+    if bad := [one for one in outcomes if not one.verdict.is_good]:
+        raise PageError(f"{page}: {bad[0].importer.name} {bad[0].verdict.value}, so the table is not written")
     text = page.read_text(encoding="utf-8")
     if not _TABLE.search(text):
         raise PageError(f"{page}: there is no <!-- matrix --> with an <!-- end --> after it")
@@ -51,7 +51,6 @@ def _cell(outcomes: Sequence[Outcome]) -> str:
     """Return what an importer gave for a vehicle: the difference, or the verdict where there is none."""
     if not outcomes:
         return "–"
-    bad = [one for one in outcomes if not one.verdict.is_good]
-    if bad or outcomes[0].difference is None:
-        return (bad or outcomes)[0].verdict.value
+    if outcomes[0].difference is None:
+        return outcomes[0].verdict.value
     return f"{max(one.difference or 0.0 for one in outcomes):.0e}"
