@@ -181,8 +181,8 @@ class Objective:
     ) -> list[Data]:
         """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
 
-        Those with respect to the motion are derivatives with the gains of the filter frozen: they take a tenth of the
-        time, and the change of the gains adds nothing to them on average. Without those with respect to the noise,
+        Those with respect to the motion, except the scale of the thrust, are derivatives with the gains of the filter
+        frozen: they take a tenth of the time, and the change of the gains adds nothing to them on average. Without those with respect to the noise,
         these are the ones of earlier data, or 0.
         """
         found = [Data.of(run, len(z)) for run in runs]
@@ -206,11 +206,13 @@ class Objective:
     def differentiate(self, z: Array, n: int, k: int, run: Run, into: Data) -> None:
         """Compute the derivatives of the innovations of a log with respect to one parameter."""
         parameter = self.table.parameters[k]
+        # A slow change of the thrust makes up for its scale, so the gains of the filter depend on it.
+        is_frozen = parameter.of_motion and parameter.kind != "thrust scale"
         moved = z.copy()
         moved[k] += parameter.step
-        above = self.run(moved, n, repeated=run, frozen=parameter.of_motion)
+        above = self.run(moved, n, repeated=run, frozen=is_frozen)
         into.slopes[:, k] = (above.innovations - run.innovations) / parameter.step
-        if not parameter.of_motion:
+        if not is_frozen:
             into.log_slopes[:, k] = np.log(above.variances / run.variances) / parameter.step
 
     def _rows_data(self, z: Array) -> Data:
