@@ -182,8 +182,8 @@ class Objective:
         """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
 
         Those with respect to the motion, except the scale of the thrust, are derivatives with the gains of the filter
-        frozen: they take a tenth of the time, and the change of the gains adds nothing to them on average. Without those with respect to the noise,
-        these are the ones of earlier data, or 0.
+        frozen: they take a tenth of the time, and the change of the gains adds nothing to them on average. Without
+        those with respect to the noise, these are the ones of earlier data, or 0.
         """
         found = [Data.of(run, len(z)) for run in runs]
         work: list[Callable[[], None]] = []
