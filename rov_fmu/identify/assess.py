@@ -247,7 +247,8 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle) -> tuple[Answer,
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(np.abs(fitted)).ravel()
 
-    slopes = posterior.slopes(logarithms, posterior.of_vehicle)
+    with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
+        slopes = posterior.slopes(logarithms, posterior.of_vehicle)
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
     variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
     # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.

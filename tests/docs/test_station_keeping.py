@@ -376,8 +376,9 @@ def test_the_picture_shows_all_four(tmp_path: Path) -> None:
     path = tmp_path / "picture.svg"
     run.draw({name: plain(name) for name in SETS}, path)
     text = path.read_text(encoding="utf-8")
-    for title in ("Depth", "Heading", "Track", "Commands", "Table 9", "α = β = 1", "reference model"):
-        assert f">{title}<" in text
+    axes = ("Depth (m)", "Heading (°)", "Way to the north (m)", "way to the east (m)", "Commands (%)", "time (s)")
+    for words in (*axes, "tuned model", "model without tuning", "wanted"):
+        assert f">{words}<" in text
     assert len(text) < 100_000
 
 
