@@ -83,7 +83,7 @@ def test_the_documentation_shows_the_variables_in_groups(
     )
     expected = groupby(declared, lambda v: (v.causality, v.variability, v.initial))
     assert groups == [[row_of(v) for v in members] for _, members in expected]
-    assert len(groups) == 6  # inputs, states, derivatives, thrust, fixed and tunable coefficients
+    assert len(groups) == 7  # inputs, states, derivatives, thrust, the tunable mass, fixed and tunable coefficients
 
 
 # ---- The report of an identification ---------------------------------------------------------------------------------
