@@ -254,21 +254,27 @@ static void check_voltage(fmu *f, double voltage)
     (void)f, (void)voltage;
 }
 
-/* Refuse parameters during a run with which the mass matrix is not positive definite. Before the run, parameters may be
- * set one after the other, and the end of the initialization refuses the matrix. */
+/* Return true when an instance may have these values in a mode: during a run, the mass matrix is positive definite. Before the
+ * run, parameters may be set one after the other, and the end of the initialization refuses the matrix. */
+static bool has_mass(lifecycle mode, const double values[])
+{
+    model_numbers numbers;
+    if (mode == INSTANTIATED || mode == INITIALIZATION) {
+        return true;
+    }
+    model_prepare(values, &numbers);
+    return model_is_definite(&numbers);
+}
+
+/* Refuse parameters with which the mass matrix is not positive definite during a run. */
 static outcome check_mass(fmu *f, const unsigned vr[], size_t n, const double value[])
 {
-    if (f->now.mode == INSTANTIATED || f->now.mode == INITIALIZATION) {
-        return DONE;
-    }
     double at[N_VARIABLES];
-    model_numbers numbers;
     memcpy(at, f->now.values, sizeof at);
     for (size_t i = 0; i < n; i++) {
         at[place_of(vr[i])] = value[i];
     }
-    model_prepare(at, &numbers);
-    if (!model_is_definite(&numbers)) {
+    if (!has_mass(f->now.mode, at)) {
         DISCARD(f, "the mass matrix of these parameters is not positive definite; all of them stay as they are.");
     }
     return DONE;

@@ -123,14 +123,6 @@ static bool is_valid(const fmu_state *s)
     return valid;
 }
 
-/* Return true when the mass matrix of a state is positive definite, as that of a run is. */
-static bool has_mass(const fmu_state *s)
-{
-    model_numbers numbers;
-    model_prepare(s->values, &numbers);
-    return s->mode == INSTANTIATED || s->mode == INITIALIZATION || model_is_definite(&numbers);
-}
-
 /* The memory that an FMU state points to. */
 typedef struct {
     const void *owner; /* the address of VARIABLES, by which a state of this FMU is recognized */
@@ -248,7 +240,7 @@ static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, voi
     }
     const bool valid_line = get_line(&from, &s.line);
     TRY(check_mode_of(f, &s));
-    REQUIRE(is_valid(&s) && valid_line && has_mass(&s), "the bytes contain values that no run can reach.");
+    REQUIRE(is_valid(&s) && valid_line && has_mass(s.mode, s.values), "the bytes contain values that no run can reach.");
     saved_state *const saved = state_memory(state);
     REQUIRE(saved != NULL, "out of memory, or *state is not a state of this FMU.");
     saved->state = s;

@@ -247,7 +247,6 @@ def test_our_bands_cover_on_the_simulated_vehicle(known: Simulated, tmp_path: Pa
     outcome = run(Identified(), load(known, None, tmp_path))
     rows = [*scores(outcome)]
     assert sum(row.inside_95 for row in rows) / len(rows) >= 0.85
-    if known is CALM:  # in rough water V_ss is too low, as the page of the benchmark says
-        several = [*numbers(outcome)]
-        assert len(several) == 20
-        assert sum(row.low <= row.true <= row.high for row in several) >= 18
+    several = [*numbers(outcome)]
+    assert len(several) == 20
+    assert sum(row.low <= row.true <= row.high for row in several) >= 18

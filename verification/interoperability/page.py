@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
-from .importers import Importer
+from rov_fmu.io.output import Output, write_whole
+
 from .run import Outcome
 
 _TABLE = re.compile(r"(?<=<!-- matrix -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -26,7 +27,7 @@ def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
     if not _TABLE.search(text):
         raise PageError(f"{page}: there is no <!-- matrix --> with an <!-- end --> after it")
     content = f"\n{table(outcomes)}\n\nRun on {date.today()}.\n\n"
-    page.write_text(_TABLE.sub(lambda _: content, text), encoding="utf-8")
+    write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()))
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -34,17 +35,14 @@ def table(outcomes: Sequence[Outcome]) -> str:
     vehicles = [*dict.fromkeys(one.vehicle for one in outcomes)]
     rows: dict[tuple[str, str], list[Outcome]] = {}
     for one in outcomes:
-        rows.setdefault((_title(one.importer), one.importer.interface), []).append(one)
+        title = f"{one.importer.title} {one.importer.version}"
+        rows.setdefault((title, one.importer.interface), []).append(one)
     lines = [["importer", "FMI", "interface", *vehicles], ["---"] * (3 + len(vehicles))]
     for (title, interface), row in rows.items():
         versions = ", ".join(f"{n}.0" for n in sorted({one.importer.fmi for one in row}))
         cells = [_cell([one for one in row if one.vehicle == vehicle]) for vehicle in vehicles]
         lines.append([title, versions, interface, *cells])
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def _title(importer: Importer) -> str:
-    return f"{importer.title} {importer.version}"
 
 
 def _cell(outcomes: Sequence[Outcome]) -> str:

@@ -206,13 +206,11 @@ class Objective:
     def differentiate(self, z: Array, n: int, k: int, run: Run, into: Data) -> None:
         """Compute the derivatives of the innovations of a log with respect to one parameter."""
         parameter = self.table.parameters[k]
-        # A slow change of the thrust makes up for its scale, so the gains of the filter depend on it.
-        is_frozen = parameter.of_motion and parameter.kind != "thrust scale"
         moved = z.copy()
         moved[k] += parameter.step
-        above = self.run(moved, n, repeated=run, frozen=is_frozen)
+        above = self.run(moved, n, repeated=run, frozen=parameter.keeps_gains)
         into.slopes[:, k] = (above.innovations - run.innovations) / parameter.step
-        if not is_frozen:
+        if not parameter.keeps_gains:
             into.log_slopes[:, k] = np.log(above.variances / run.variances) / parameter.step
 
     def _rows_data(self, z: Array) -> Data:

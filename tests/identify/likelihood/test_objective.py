@@ -80,7 +80,7 @@ def test_derivatives_of_motion_are_those_with_frozen_gains(objective: Objective,
     runs = objective.runs(place)
     data = objective.data(place, runs)
     for n, p in enumerate(objective.table.parameters):
-        if not p.of_motion or p.kind == "thrust scale":
+        if not p.keeps_gains:
             continue
         (h, above, _), (_, below, _) = both_ways(objective, place, n, runs)
         for number, one in enumerate(data[: len(runs)]):
