@@ -1,5 +1,6 @@
 """The gate of equal bits: it finds the smallest difference, and allows only what it is told to."""
 
+import re
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -75,4 +76,5 @@ def test_a_changed_rounding_is_found(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 1
     assert result.output.startswith("videoray, FMI 2.0: 3 runs, 0 with equal bits; a call fails in 0 and 0 runs\n")
-    assert "\n  psi differs in " in result.output
+    # Which variables differ depends on how the compiler of this machine contracts products.
+    assert re.search(r"^  \S+ differs in \d runs, by \d", result.output, re.MULTILINE)
