@@ -16,6 +16,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
+from tests.identify.scenarios.catalogue import COMPLETE
 from tests.pool import run
 from tests.recordings import PLANS, Measured
 from tests.vehicles import VIDEORAY
@@ -116,3 +117,19 @@ def test_nothing_is_asked_of_a_sensor_that_tells_of_no_motion(tmp_path: Path) ->
     first, second, _ = recordings(HEAVE)
     noise = 0.01 * np.random.default_rng(1).standard_normal(len(second.time))
     assert not told(write_folder(tmp_path, [first, replace(second, values=noise)]))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("column", ["surge velocity [m/s]", "depth [m]", "heading [deg]"])
+def test_a_mirrored_column_of_a_dive_in_all_axes_is_the_only_one_named(column: str, tmp_path: Path) -> None:
+    """The other columns of the file are right, though all thrusters move the vehicle at once."""
+    COMPLETE["pilot"].write(0, tmp_path)
+    file = sorted(tmp_path.glob("*.csv"))[-1]
+    header, *rows = (line.split(",") for line in file.read_text(encoding="utf-8").splitlines())
+    place = header.index(column)
+    for row in rows:
+        row[place] = str(-float(row[place])) if row[place] else ""
+    file.write_text("\n".join(",".join(row) for row in [header, *rows]), encoding="utf-8")
+    quantity, _ = column.split(" [")
+    (line,) = told(tmp_path)
+    assert names([line], file.name, rf"{quantity}.*{_TURNED}")

@@ -19,7 +19,7 @@ from math import log, pi
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError
+from rov_fmu.c.filter import DivergedError, Slow
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.beginning import Tests, begin
 from rov_fmu.identify.likelihood.objective import Objective
@@ -80,12 +80,14 @@ def slips(tests: Tests, known: Beginning, objective: Objective, best: Array) -> 
     Where several explanations are about as good, each is told for its files.
     """
     compared = [one for n in range(len(objective.logs)) for one in _compared(objective, n, known.guessed)]
-    hypotheses = {*_hypotheses({one: one.scales for one in compared if one.scales})}
-    if not hypotheses:
+    untried = {*_hypotheses({one: one.scales for one in compared if one.scales})}
+    if not untried:
         return ()
-    as_it_is, J = _least(tests, frozenset(), best), {one: _least(tests, one) for one in hypotheses}
-    first = min(J, key=lambda one: J[one])
-    J |= {fewer: _least(tests, fewer) for fewer in (first - {member} for member in first) if fewer}
+    as_it_is, J = _least(tests, frozenset(), best), dict[Hypothesis, float]()
+    while untried:  # The best explanation may need fewer channels than it has.
+        J |= {one: _least(tests, one) for one in untried}
+        first = min(J, key=lambda one: J[one])
+        untried = {first - {member} for member in first} - J.keys() - {frozenset()}
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
     for hypothesis in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
         for one, scale in hypothesis:
@@ -159,6 +161,7 @@ def _compared(objective: Objective, number: int, guessed: Sequence[str]) -> Iter
 def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Array:
     """Return the samples of a log by the vehicle of the priors. Measured angles correct only the other channels.
 
+    The slow gain of the thrust stays 0: a heading of the wrong sign would drive it to -2, and all motion with it.
     `guessed` names the axes whose prior of the drag follows from the data: they have the drag of a body of their mass.
     """
     one, record = objective.logs[number], objective.records[number]
@@ -171,6 +174,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
             usual |= {axis.coefficient(f"a_d{end}"): drag, axis.coefficient(f"b_d{end}"): _SLOWEST * drag}
     parameters = replace(parameters, coefficients=usual)
     is_angle = np.array([m.channel.quantity.unit == "rad" for m in one.measured])
+    parameters = replace(parameters, gain=Slow())
     heeding = replace(parameters, white=tuple(np.where(is_angle, 1.0, _UNHEEDED) * parameters.white))
     run = objective.filters[number].run
     alone, corrected = run(record, parameters, begin=0.0), run(record, heeding)
