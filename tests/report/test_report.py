@@ -28,10 +28,12 @@ from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.templates import number, readable, sentence, with_interval
+from rov_fmu.tank.description import read_description
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
 from tests.commands import TESTS
+from tests.folders import HEAD
 from tests.report.conftest import Visit
 from tests.report.pages import (
     UNFOLD,
@@ -256,6 +258,15 @@ def test_points_forces_and_input_files_have_their_rows(page: str) -> None:
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_the_first_screen_names_the_base(tmp_path: Path) -> None:
+    rov_file = tmp_path / "rov.toml"
+    rov_file.write_text(f'base = "bluerov2"\n{HEAD}', encoding="utf-8")
+    result = example()
+    based = replace(result, folder=replace(result.folder, rov_file=read_description(rov_file)))
+    assert "commands of 20 % to 70 %. Its base was bluerov2." in unfolded(report_page(based))
 
 
 @pytest.mark.usefixtures("without_plots")
