@@ -13,7 +13,6 @@ from typing import Any
 import click
 
 from docs import compared
-from rov_fmu.c.source import generated_sources
 from rov_fmu.cli import _commands
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.terminals import terminals
@@ -32,7 +31,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 Table = list[tuple[str, ...]]
 _NAMES = (
     *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md"),
-    *("identify-formats.md", "identify-method.md", "equation.md"),
+    *("identify-formats.md", "identify-method.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
@@ -111,15 +110,12 @@ def filled(page: str) -> str:
             content = _gallery()
         elif kind == "equations":
             content = f"```text\n{_equations(name)}\n```"
-        elif kind == "source":
-            source = generated_sources(load_vehicle(SHIPPED[name]).layout)["equation.h"]
-            content = f"```c\n{source.rstrip()}\n```"
         else:
             content = markdown(found[name] if name in found else compared.tables()[name])
         return f"{match[1]}\n\n{content}\n\n"
 
     return re.sub(
-        r"(<!-- (commands|drawings|equations|source|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
+        r"(<!-- (commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
         text,
         page,
         flags=re.DOTALL,
