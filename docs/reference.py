@@ -13,9 +13,8 @@ from typing import Any
 import click
 
 from docs import compared
-from rov_fmu.c.source import generated_sources
 from rov_fmu.cli import _commands
-from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
@@ -32,27 +31,26 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 Table = list[tuple[str, ...]]
 _NAMES = (
     *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md"),
-    *("identify-formats.md", "identify-method.md", "equation.md"),
+    *("identify-formats.md", "identify-method.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
 """The vehicles with a drawing. The refit of the VideoRay has the same thrusters."""
 
+_KEYS = ("key", "value", "what")
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
 
 def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
-    named = {"vehicle": "FileHead", "provenance": "Provenance", "estimated": "Estimated"} | {
-        f"axis_{name}": f"_{name.capitalize()}" for name in AXES
-    }
+    named = {"vehicle": "FileHead", "provenance": "Provenance", "estimated": "Estimated"}
     named |= {
         name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
     }
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
     found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
-    found |= {"columns": _columns(), "messages": _messages(), "priors": _priors()}
+    found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors()}
     plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
     found |= {name: _plan_table(of) for name, of in plans.items()}
     return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
@@ -62,6 +60,19 @@ def _priors() -> Table:
     """Return the deviations of the priors of an identification, with their keys in rov.toml."""
     rows = ((f"`{key}`", f"{prior.deviation:g}", prior.words, prior.reason) for key, prior in PRIORS.items())
     return [("key", "deviation", "of", "reason"), ("---",) * 4, *rows]
+
+
+def _axis() -> Table:
+    """Return the coefficients of an axis, with their units along an axis and about one."""
+    words = axis_words(SURGE) | {"axis": "the axis", "velocity": "i", "what": "mass or moment of inertia"}
+    words |= {"push": "thrust", "positive": "as its velocity", "negative": "for negative velocities"}
+    rows = []
+    for key, kind in (AXIS | TUNING).items():
+        units = dict.fromkeys(kind.filled(**axis_words(axis)).unit for axis in (SURGE, ROLL))
+        bounds = f"{number(kind.minimum, 6)}\xa0…\xa0{number(kind.maximum, 6)}"
+        value = ", ".join([*(["needed"] if kind.needed else []), " or ".join(units), bounds])
+        rows.append((f"`{key}`", value, kind.filled(**words).description))
+    return [_KEYS, ("---",) * 3, *rows]
 
 
 def _columns() -> Table:
@@ -111,15 +122,12 @@ def filled(page: str) -> str:
             content = _gallery()
         elif kind == "equations":
             content = f"```text\n{_equations(name)}\n```"
-        elif kind == "source":
-            source = generated_sources(load_vehicle(SHIPPED[name]).layout)["equation.h"]
-            content = f"```c\n{source.rstrip()}\n```"
         else:
             content = markdown(found[name] if name in found else compared.tables()[name])
         return f"{match[1]}\n\n{content}\n\n"
 
     return re.sub(
-        r"(<!-- (commands|drawings|equations|source|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
+        r"(<!-- (commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
         text,
         page,
         flags=re.DOTALL,
@@ -181,8 +189,9 @@ def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
         of_value = found.get("properties", {}).get("value")
         unit = found["properties"].get("unit", {}).get("const", "") if of_value else ""
         needed = "needed" if key in table.get("required", ()) else ""
-        rows.append((f"`{key}`", needed, unit, _allowed(of_value or found), _words(found)))
-    return [("key", "", "unit", "allowed", "what"), ("---",) * 5, *rows]
+        value = ", ".join(filter(None, (needed, unit, _allowed(of_value or found))))
+        rows.append((f"`{key}`", value, _words(found)))
+    return [_KEYS, ("---",) * 3, *rows]
 
 
 def _plan_table(of: type[Strict]) -> Table:
