@@ -405,10 +405,8 @@ def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(page: Any
     assert ghost == pytest.approx(vehicle.response(HEAVE, 0.5)[0], rel=1e-12)
     assert page.is_checked("#live-ghost")
     page.click("#live-file")
-    tuned = page.evaluate(
-        "Object.fromEntries(live.vehicle.tunable.map(name => [name, live.flight.pilot.model.get(name)]))"
-    )
-    assert tuned == {name: vehicle[name] for name in tuned}
+    tuned = page.evaluate("names => names.map(name => live.flight.pilot.model.get(name))", [*vehicle.layout.tuning])
+    assert tuned == [vehicle[name] for name in vehicle.layout.tuning]
 
 
 def test_a_vehicle_of_one_axis_flies_too(pages: Callable[[str], str], quiet: Visitor) -> None:

@@ -12,12 +12,14 @@ from rov_fmu.fmu.archive import web_module
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ROOT
 from tests.report.conftest import Visit
 from tests.report.test_live import flying, until
 from verification.references.autopilot.ardusub import STICK, VECTORED_6DOF, Hold, Motion
 
 pytestmark = pytest.mark.interop
 
+REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
 RATE = 400
 """The steps of ArduSub in a second."""
 NAMES = ("u", "v", "w", "p", "q", "r", "z", "phi", "theta", "psi", "x", "y", "der(u)", "der(v)", "der(w)")
@@ -147,3 +149,16 @@ def test_a_vehicle_that_cannot_tilt_has_no_switch(tmp_path: Path, visit: Callabl
     page = flying(visit, target.as_uri()).page
     assert page.locator("#live-hold").count() == 0
     assert not page.evaluate("live.flight.isHeld")
+
+
+def test_a_vehicle_that_no_thruster_rolls_or_pitches_is_not_held(tmp_path: Path, visit: Callable[..., Visit]) -> None:
+    """The REMUS 100 tilts by its fins, which need speed."""
+    vehicle, target = load_vehicle(REMUS), tmp_path / "remus.html"
+    target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
+    page = flying(visit, target.as_uri()).page
+    assert page.locator("#live-hold").count() == 0
+    assert page.inner_text("#live-message").startswith("It is not held level, because no thruster rolls or pitches it.")
+    page.focus("#live-stage")
+    page.keyboard.down("KeyW")
+    until(page, "live.flight.pilot.model.get('u') > 0.1")
+    assert page.evaluate("live.flight.pilot.hold") is None
