@@ -266,7 +266,9 @@ class Live {
       const isShare = kind === "command" || kind === "strength";
       if (kind === "command") slider.value = String(this.flight.pilot.model.get(slider.name));
       const value = Number(slider.value);
-      const words = isShare ? `${shown(value * 100, 0)} %` : `${shown(value, Number(slider.max) < 1 ? 3 : 2)} ${unit ?? ""}`;
+      const words = isShare
+        ? `${shown(value * 100, 0)} %`
+        : `${shown(value, Number(slider.max) < 1 ? 3 : 2)} ${unit ?? ""}`;
       const output = /** @type {HTMLElement} */ (slider.parentElement?.querySelector("output"));
       output.textContent = words;
       slider.setAttribute("aria-valuetext", words);
@@ -354,8 +356,7 @@ class Live {
 
   /** Takes over the sizes on the screen. */
   fit() {
-    this.picture?.fit();
-    for (const chart of [...this.charts, this.dive]) chart?.fit();
+    for (const one of [this.picture, this.track, this.dive, ...this.charts]) one?.fit();
     this.changed = true;
   }
 

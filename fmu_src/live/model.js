@@ -113,7 +113,7 @@ class Model {
   }
 
   /** Sets coefficients. Returns false, and keeps the old ones, when the mass matrix would not be positive definite.
-   * @param {Record<string, number>} given */
+   * @param {Record<string, number>} given @returns {boolean} */
   tune(given) {
     const old = Object.fromEntries(Object.keys(given).map((name) => [name, this.get(name)]));
     this.give(given);

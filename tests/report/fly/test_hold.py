@@ -128,6 +128,26 @@ def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None
     assert max(tilt) < 0.05
 
 
+def test_a_frame_does_not_ask_for_the_layout_of_the_page(page: Any) -> None:
+    """To lay out the page for its sizes in each frame took ten times as long as to draw it."""
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def layouts() -> float:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        count: float = next(one["value"] for one in metrics if one["name"] == "LayoutCount")
+        return count
+
+    page.evaluate("""() => {
+        live.pause(true);
+        live.flight.steer({ demands: new Map([["surge", 1]]), added: {} });
+        live.flight.advance(20);
+    }""")
+    before = layouts()
+    page.evaluate("() => { for (let n = 0; n < 100; n++) { live.fly(1 / 60); live.draw(); } }")
+    assert layouts() - before < 5
+
+
 def test_without_the_hold_the_keys_drive_the_thrusters_alone(page: Any) -> None:
     page.locator("#live-hold").uncheck()
     assert "nothing is held" in page.inner_text("#live-message")
