@@ -605,7 +605,15 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None, time_limit
     help="Number of processes on this machine. The default is its number of cores.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use instead of this machine: tcp://host:8786.")
-def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None) -> None:
+@click.option(
+    "--mcap",
+    "run",
+    type=_number("the number of a run, from 0", 0, 10**9, int),
+    metavar="RUN",
+    help="Run whose kept outputs to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a "
+    "vehicle.",
+)
+def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None) -> None:
     """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
 
     RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
@@ -614,15 +622,22 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     if workers and scheduler is not None:
         raise click.UsageError("study: leave --workers out, because the scheduler already has its workers")
     try:
+        from rov_fmu.study.plan.plan import load_plan
+        from rov_fmu.study.plan.prepared import vehicle_file
         from rov_fmu.study.results.page import check_place, page_output
         from rov_fmu.study.results.summary import print_summary
         from rov_fmu.study.run.run_study import run_study
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
+    from rov_fmu.interface.model import load
+    from rov_fmu.io.output import Output
     from rov_fmu.report.console import print_end
     from rov_fmu.report.progress import StudyParts, parts
 
     check_place(output)
+    vehicle = load_plan(plan).vehicle if run is not None else None
+    if run is not None and not vehicle:
+        raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
     with parts() as shown:
         spent, results = run_study(
             plan,
@@ -633,9 +648,16 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
             lambda message: shown.print(f"warning: {message}"),
         )
     page = page_output(results)
+    written = [page]
     write_whole(page)
     print_summary(results, spent)
-    print_end([page.path], "open it in a browser")
+    if vehicle:
+        if not results.outputs or (motion := results.trajectories([run or 0])).empty:
+            raise FileError(f"{output}: --mcap {run}: there is no such run with outputs, which [keep] names")
+        content = load(vehicle_file("vehicle", vehicle, plan)).to_mcap(motion)
+        written.append(Output(output / f"run-{run}.mcap", content))
+        write_whole(written[-1])
+    print_end([one.path for one in written], "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")
 

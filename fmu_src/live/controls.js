@@ -5,6 +5,7 @@ const SPAN = 20; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
 const HELD = "Depth, heading and attitude are held as by ArduSub.";
+const NOT_HELD = "It is not held level, because no thruster rolls or pitches it.";
 
 /** The axis that each arrow key drives, and the direction. @type {Record<string, [string, number]>} */
 const ARROWS = {
@@ -115,8 +116,9 @@ class Live {
     this.changed = true;
     this.last = 0;
     this.connect();
+    const level = this.flight.isHeld ? `${HELD} ` : pilot.has("phi") ? `${NOT_HELD} ` : "";
     this.say(
-      `${this.flight.isHeld ? `${HELD} ` : ""}Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
+      `${level}Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
     );
     this.arrange();
     this.follow(location.hash);
@@ -150,7 +152,7 @@ class Live {
       ["export", () => this.export()],
       ["share", () => this.share()],
       ["file", () => this.tuneAll((slider) => Number(slider.dataset.start))],
-      ["ones", () => this.tuneAll(() => 1)],
+      ["ones", () => this.tuneAll(({ value, dataset }) => (dataset.unit ? Number(value) : 1))],
       ["run", () => this.run()],
     ])) {
       document.getElementById(`live-${id}`)?.addEventListener("click", act);
@@ -220,7 +222,11 @@ class Live {
   slid(slider) {
     const name = slider.name;
     if (slider.dataset.kind === "tuning") {
-      this.flight.tune({ [name]: Number(slider.value) });
+      const { model } = this.flight.pilot;
+      if (!this.flight.tune({ [name]: Number(slider.value) })) {
+        this.say(`${name} = ${slider.value}: the mass matrix would not be positive definite, so it stays as it was.`);
+        slider.value = String(model.get(name));
+      }
       this.flight.ghostShown ||= !this.flight.isOther && this.isTuned();
     } else if (slider.dataset.kind === "load") {
       this.flight.set({ [name]: Number(slider.value) });
@@ -260,7 +266,9 @@ class Live {
       const isShare = kind === "command" || kind === "strength";
       if (kind === "command") slider.value = String(this.flight.pilot.model.get(slider.name));
       const value = Number(slider.value);
-      const words = isShare ? `${shown(value * 100, 0)} %` : `${shown(value, 2)} ${unit ?? ""}`;
+      const words = isShare
+        ? `${shown(value * 100, 0)} %`
+        : `${shown(value, Number(slider.max) < 1 ? 3 : 2)} ${unit ?? ""}`;
       const output = /** @type {HTMLElement} */ (slider.parentElement?.querySelector("output"));
       output.textContent = words;
       slider.setAttribute("aria-valuetext", words);
@@ -348,8 +356,7 @@ class Live {
 
   /** Takes over the sizes on the screen. */
   fit() {
-    this.picture?.fit();
-    for (const chart of [...this.charts, this.dive]) chart?.fit();
+    for (const one of [this.picture, this.track, this.dive, ...this.charts]) one?.fit();
     this.changed = true;
   }
 

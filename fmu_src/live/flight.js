@@ -42,7 +42,7 @@ class Craft {
     const { model, distances } = this;
     const { axes } = model.vehicle;
     const before = axes.map(({ velocity }) => model.get(velocity));
-    if (sticks && model.has("phi")) {
+    if (sticks && model.canLevel()) {
       if (this.hold?.until !== time) this.hold = new Hold(model, time);
       if (!this.hold.step(h, sticks)) return false;
     } else {
@@ -129,7 +129,7 @@ class Flight {
     /** @type {Replay | null} */
     this.replay = null;
     /** True while the sticks steer a vehicle that is held level. */
-    this.isHeld = pilot.has("phi");
+    this.isHeld = pilot.canLevel();
     /** @type {Sticks} */
     this.sticks = { demands: new Map(), added: {} };
     /** The depth of the seabed, m, which recordings and step tests do not have, and whether it and the surface stop the vehicle. */
@@ -207,12 +207,12 @@ class Flight {
     this.begun = true;
   }
 
-  /** Sets α and β of the pilot's vehicle. @param {Record<string, number>} given */
+  /** Sets tunable coefficients of the pilot's vehicle. Returns false, and keeps the old ones, when they are impossible.
+   * @param {Record<string, number>} given */
   tune(given) {
-    const { model } = this.pilot;
-    model.give(given);
-    model.tune();
-    if (this.replay) this.play(this.replay.recording);
+    const isPossible = this.pilot.model.tune(given);
+    if (isPossible && this.replay) this.play(this.replay.recording);
+    return isPossible;
   }
 
   /** Takes over the sticks of a vehicle that is held level. @param {Sticks} sticks */

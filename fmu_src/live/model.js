@@ -43,11 +43,11 @@
  * Commands are fractions in the page; `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
  * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[],
  *   columns: CommandColumn[], csv: Rules, pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
- *   tunable: string[], tests: StepTest[], size: number}} Vehicle
+ *   tests: StepTest[], size: number}} Vehicle
  */
 /**
  * The exports of fmu_src/live/module.c.
- * @typedef {{memory: WebAssembly.Memory, variables: () => number, marks: () => number, tune: () => void, begin: () => void,
+ * @typedef {{memory: WebAssembly.Memory, variables: () => number, marks: () => number, tune: () => number, begin: () => void,
  *   step: (h: number) => number, observe: () => void}} Exports
  */
 
@@ -68,7 +68,7 @@ class Model {
     this.fractions = new Map();
     for (const [name, start] of vehicle.variables) this.set(name, start);
     this.exports.begin();
-    this.tune();
+    this.tune({});
   }
 
   /** @param {Vehicle} vehicle */
@@ -112,10 +112,20 @@ class Model {
     for (const [name, value] of Object.entries(given)) this.set(name, value);
   }
 
-  /** Takes over changed coefficients. */
-  tune() {
-    this.exports.tune();
+  /** Sets coefficients. Returns false, and keeps the old ones, when the mass matrix would not be positive definite.
+   * @param {Record<string, number>} given @returns {boolean} */
+  tune(given) {
+    const old = Object.fromEntries(Object.keys(given).map((name) => [name, this.get(name)]));
+    this.give(given);
+    const isPossible = this.exports.tune() !== 0;
+    if (!isPossible) this.give(old);
     this.exports.observe();
+    return isPossible;
+  }
+
+  /** Returns true when commands roll or pitch the vehicle, so that it can be held level. */
+  canLevel() {
+    return this.vehicle.axes.some(({ name, held }) => ["roll", "pitch"].includes(name) && Object.keys(held).length > 0);
   }
 
   /** Sets all states to their start values. */

@@ -17,7 +17,7 @@ static model_numbers numbers;        /* these follow from the coefficients */
 
 EXPORT("variables") double *variables_start(void);
 EXPORT("marks") double *marks_start(void);
-EXPORT("tune") void tune(void);
+EXPORT("tune") int tune(void);
 EXPORT("begin") void begin(void);
 EXPORT("step") int step(double h);
 EXPORT("observe") void observe(void);
@@ -32,10 +32,16 @@ double *marks_start(void)
     return &marks[0][0];
 }
 
-/* Take over changed coefficients. */
-void tune(void)
+/* Take over changed coefficients. Return 0, and take over nothing, when the mass matrix is not positive definite. */
+int tune(void)
 {
-    model_prepare(at, &numbers);
+    model_numbers next;
+    model_prepare(at, &next);
+    if (!model_is_definite(&next)) {
+        return 0;
+    }
+    numbers = next;
+    return 1;
 }
 
 /* Begin at rest with the attitude of the parameters at the start, and with no command on its way. */

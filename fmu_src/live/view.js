@@ -224,12 +224,20 @@ class Track {
     this.words = drawn(svg, "text", { x: 6, y: 14 });
     this.lines = ["line ghostly", "line"].map((kind) => drawn(svg, "path", { class: kind }));
     this.here = drawn(svg, "path", { class: "needle", d: "M0 -8L5 6L0 3L-5 6Z" });
+    [this.width, this.height] = [160, 160];
+    this.fit();
+  }
+
+  /** Takes over the size on the screen. */
+  fit() {
+    this.width = this.svg.clientWidth || this.width;
+    this.height = this.svg.clientHeight || this.height;
+    place(this.svg, { viewBox: `0 0 ${this.width} ${this.height}` });
   }
 
   /** @param {Flight} flight @param {boolean} ghost */
   draw({ pilot, ghost: other, times, time }, ghost) {
-    const [width, height] = [this.svg.clientWidth || 160, this.svg.clientHeight || 160];
-    place(this.svg, { viewBox: `0 0 ${width} ${height}` });
+    const { width, height } = this;
     const last = placeOf(times, time);
     const stride = Math.max(1, Math.ceil(last / 500));
     const tracks = [other, pilot].map((craft) => {
@@ -407,7 +415,7 @@ function rangeOf(levels, traces, windows, height) {
 
 /** @param {Trace} trace @param {number[]} window @param {(t: number) => number} px @param {(v: number) => number} py */
 function lineOf({ times, value }, [first, last], px, py) {
-  const stride = Math.max(1, Math.floor((last - first) / 400));
+  const stride = Math.max(1, Math.floor((last - first) / 250));
   /** @type {string[]} */
   const places = [];
   const add = (/** @type {number} */ n) => places.push(`${px(times[n]).toFixed(1)} ${py(value(n)).toFixed(1)}`);

@@ -152,14 +152,15 @@ def nanoseconds(time: Array) -> list[int]:
 def poses(values: Mapping[str, Array]) -> tuple[Array, Rotation]:
     """Return the positions (times, 3) and the orientations of a vehicle in the frame `map`.
 
-    The variables are those of the FMU: x, y, z in m, and the quaternion or the heading psi in rad.
+    The variables are those of the FMU: x, y, z in m, and the quaternion or the Euler angles phi, theta, psi in rad.
     """
     zero = np.zeros_like(next(iter(values.values())))
     north, east, down = (values.get(name, zero) for name in "xyz")
     if values.keys() >= set(QUATERNION):
         turned = Rotation.from_quat(np.stack([values[name] for name in QUATERNION], axis=-1), scalar_first=True)
     else:
-        turned = Rotation.from_euler("z", values.get("psi", zero)[:, None])
+        angles = [values.get(name, zero) for name in ("psi", "theta", "phi")]
+        turned = Rotation.from_euler("ZYX", np.stack(angles, axis=-1))
     return np.stack([east, north, 0.0 - down], axis=-1), _TO_ENU * turned * _TO_FRD
 
 

@@ -33,6 +33,8 @@ from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from rov_fmu.build import Built
 
 _NONE: Mapping[str, float] = MappingProxyType({})
@@ -141,16 +143,23 @@ class VehicleModel(Vehicle):
         workers = checked_workers(workers) or usable_cores()
         return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True)
 
-    def to_mcap(self, result: Result) -> bytes:
+    def to_mcap(self, result: "Result | pd.DataFrame") -> bytes:
         """Return a simulation of this vehicle as the content of an MCAP file, for Foxglove and PlotJuggler.
 
         `Path("run.mcap").write_bytes(vehicle.to_mcap(result))`. The file has the pose and the jets of the vehicle, as
         far as their variables were recorded, and all recorded inputs and outputs by name (rov_fmu/bridges/mcap.py).
+        A data frame has the trajectories of one run of a study: `vehicle.to_mcap(results.trajectories([7]))`.
 
-        Raises InputError if the result is that of many vehicles, or where foxglove-sdk is not installed.
+        Raises InputError if the result is that of many vehicles or runs, or of none, or where foxglove-sdk is not
+        installed.
         """
         from rov_fmu.bridges.mcap import motion_mcap
 
+        if not isinstance(result, Result):
+            if result["run"].nunique() != 1:
+                raise InputError("result: must have the kept outputs of one run of a study")
+            columns = {str(name): column.to_numpy(float) for name, column in result.items()}
+            return motion_mcap(self, columns["t"], columns)
         if any(values.ndim != 1 for values in result.values()):
             raise InputError("result: must be the simulation of one vehicle")
         return motion_mcap(self, result.time, result)

@@ -34,6 +34,8 @@ def tune_vehicle(
     vehicle = load_vehicle(path)
     if not vehicle.layout.has(axis):
         raise InputError(f"tune: {path}: --axis {axis.name}: the vehicle has only {', '.join(vehicle.layout.kinds)}")
+    if not vehicle.layout.signs(axis):
+        raise InputError(f"tune: {path}: --axis {axis.name}: no thruster drives this axis, so it cannot be tuned")
     if output:
         check_targets([output], [*([points] if points else []), *vehicle.files])
         check_written(output, VEHICLE_FILE)

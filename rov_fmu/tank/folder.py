@@ -151,8 +151,7 @@ class Folder:
                 return
             self.inputs |= digests
             if layout := self.logged:
-                logs = [log for path in paths for log in read_logs(path, layout, self.names, is_part=True)]
-                self._add([_together(paths[0], logs, dive.other_clock)])
+                self._add([joined_dive(self.path, dive, layout, self.names)])
         except FileError as error:
             self.mistakes += str(error).splitlines()
 
@@ -288,6 +287,13 @@ def _read_description(folder: Path) -> RovFile:
             "such as the mass"
         )
         raise VehicleFileError(f"{path}: {words}") from None
+
+
+def joined_dive(folder: Path, dive: Dive, layout: Layout, names: Names) -> Log:
+    """Read the log of a dive of several files. Raises DataFileError."""
+    paths = [folder / part for part in dive.files]
+    logs = [log for path in paths for log in read_logs(path, layout, names, is_part=True)]
+    return _together(paths[0], logs, dive.other_clock)
 
 
 # ---- Files -----------------------------------------------------------------------------------------------------------

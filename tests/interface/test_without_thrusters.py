@@ -69,6 +69,10 @@ def test_a_part_of_thrusters_needs_the_rest(path: Path) -> None:
     [
         (["sitl"], "has no thrusters, so there is nothing that ArduSub could drive"),
         (["simulate", "--set", "surge=0.3"], "no thruster drives this axis"),
+        (
+            ["tune", "--axis", "surge", "--command", "0.5", "--v-ss", "0.4"],
+            "no thruster drives this axis, so it cannot",
+        ),
     ],
 )
 def test_what_needs_thrusters_is_refused(

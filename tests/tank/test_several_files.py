@@ -8,9 +8,12 @@ import pytest
 
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
+from rov_fmu.report.page.recording import recording_of
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from rov_fmu.tank.log import Log
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.tank.logs import commanded, measured, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import TIME
@@ -68,6 +71,18 @@ def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
         assert channel.values == pytest.approx(start + rate * (channel.time - 1000.0), abs=1e-6)
     assert commanded(log, "5", 1000.0 + TIME) == pytest.approx(np.where(TIME > 0.999, 0.5, 0.0))
     assert load_tests(folder).inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
+
+
+@pytest.mark.parametrize("name", ["commands.csv", "heading.csv"])
+def test_the_page_that_flies_joins_the_files_of_a_dive(folder: Path, name: str) -> None:
+    recording = recording_of(folder / name, load_vehicle(SHIPPED["bluerov2"]))
+    signals = {signal["quantity"]: signal for signal in recording["signals"]}
+    assert signals.keys() == {"depth", "heading"}
+    assert len(signals["depth"]["times"]) == 50
+    depths, slow = signals["depth"]["values"], np.array(signals["depth"]["times"])
+    assert depths == pytest.approx(1.0 + 0.1 * slow, abs=1e-6)
+    held = np.searchsorted(recording["times"], (0.9, 1.1), side="right") - 1
+    assert [recording["commands"]["u_5"][n] for n in held] == [0.0, 0.5]
 
 
 def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rov_fmu.c.compile import MODULE_SOURCES
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import PITCH, ROLL, Axis
 from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.plots.geometry import place, size_of
@@ -28,6 +28,9 @@ _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
 _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
+_TILTING = (ROLL, PITCH)
+_FARTHEST = 0.2
+"""The farthest that a slider moves a centre of mass or buoyancy, m."""
 _SCRIPTS = ("model.js", "hold.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
 
 
@@ -61,8 +64,11 @@ class Live:
     """The start value of each variable."""
     loads: Sequence[tuple[str, float, str]]
     """The inputs that are not commands: name, end of the slider, unit."""
-    tunable: Sequence[tuple[str, str, float, float, float]]
-    """The tuning factors: name, label, both ends of the slider, value in the vehicle file."""
+    tunable: Mapping[str, Sequence[tuple[str, str, float, float, float, str, str]]]
+    """The tunable coefficients by the title of their group: name, label, both ends of the slider, value in the vehicle
+    file, unit, description."""
+    can_level: bool
+    """True when commands roll or pitch the vehicle, so that it can be held level."""
     title: str
     """The name of the vehicle, or the names of both."""
     other: str | None
@@ -88,7 +94,8 @@ def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> 
         places=_places(pilot),
         start=start,
         loads=list(_loads(pilot, start)),
-        tunable=list(_tunable(pilot)),
+        tunable={"Ballast and payload": list(_ballast(pilot)), "Tuning α and β": list(_tuning(pilot))},
+        can_level=any(data[0]["axes"][n]["held"] for n, form in enumerate(pilot.layout.axes) if form.axis in _TILTING),
         title=" beside ".join(names),
         other=names[1] if len(flown) > 1 else None,
         recording=_json(recording) if recording else None,
@@ -140,7 +147,6 @@ def _data(flown: Flown) -> dict[str, Any]:
             for thruster, label in zip(layout.thrusters, _labels(vehicle), strict=True)
         ],
         "fins": [{"at": fin.position, "along": fin.direction} for fin in layout.fins],
-        "tunable": list(layout.tuning),
         "tests": list(_tests(vehicle)),
         "size": size_of(vehicle),
     }
@@ -285,12 +291,21 @@ def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, 
             yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(declaration.unit)
 
 
-def _tunable(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float]]:
+def _ballast(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
+    """Yield the sliders of the mass, the weight, the buoyancy, their centres, and the scales of tables of thrust."""
+    for name, one in vehicle.layout.coefficients.items():
+        if one.tunable and name not in vehicle.layout.tuning:
+            value, (low, high) = vehicle[name], (0.8, 1.25) if one.unit == "N" else (0.5, 2.0)
+            ends = (value - _FARTHEST, value + _FARTHEST) if one.unit == "m" else (low * value, high * value)
+            yield name, name, *ends, value, "" if one.unit == "1" else pretty_unit(one.unit), one.description
+
+
+def _tuning(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
     """Yield the sliders of the tuning factors."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
         for axis in (form.axis for form in vehicle.layout.axes):
             value = vehicle[name := axis.coefficient(key)]
-            yield name, f"{letter} of {axis.name}", min(0.1, value), max(3.0, 2.0 * value), value
+            yield name, f"{letter} of {axis.name}", min(0.1, value), max(3.0, 2.0 * value), value, "", ""
 
 
 def _round(x: float) -> float:

@@ -1,7 +1,8 @@
 """A log as the page that flies reads it: the commands of the vehicle, what was measured, and what identification adds.
 
-Any format that `rov-fmu identify` reads is converted, with the tables [columns], [topics] and [logs] of the rov.toml
-beside the file. Nothing is resampled: commands and measurements keep their own times.
+Any format that `rov-fmu identify` reads is converted, with the tables [columns], [topics], [dives] and [logs] of the
+rov.toml beside the file. Of a dive of several files, all are read, whichever is named. Nothing is resampled: commands
+and measurements keep their own times.
 """
 
 import re
@@ -20,6 +21,7 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.folder import joined_dive
 from rov_fmu.tank.inspection.headers import axis_in_name
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import unwrapped
@@ -75,9 +77,14 @@ def _read(path: Path, layout: Layout) -> Log:
     names, wrong = names_of(layout, rov_file.tables)
     if wrong or not rov_file.explains_files:
         raise VehicleFileError(*(lines_on(described, wrong) or rov_file.mistakes))
-    log, *others = read_logs(path, layout, names, axis_in_name(path))
-    if others:
+    dives = [dive for dive in rov_file.tables.dives.values() if path.name in dive.files]
+    if dives:
+        logs = [joined_dive(path.parent, dives[0], layout, names)]
+    else:
+        logs = read_logs(path, layout, names, axis_in_name(path))
+    if len(logs) > 1:
         warnings.warn(f"{path}: only the part before the clock restarts is flown", UserWarning, stacklevel=3)
+    log = logs[0]
     for sentence in sentences((f for f in log.findings if f.kind not in _NOT_TOLD), SENTENCES):
         warnings.warn(sentence, UserWarning, stacklevel=3)
     return log

@@ -12,12 +12,14 @@ from rov_fmu.fmu.archive import web_module
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ROOT
 from tests.report.conftest import Visit
 from tests.report.test_live import flying, until
 from verification.references.autopilot.ardusub import STICK, VECTORED_6DOF, Hold, Motion
 
 pytestmark = pytest.mark.interop
 
+REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
 RATE = 400
 """The steps of ArduSub in a second."""
 NAMES = ("u", "v", "w", "p", "q", "r", "z", "phi", "theta", "psi", "x", "y", "der(u)", "der(v)", "der(w)")
@@ -126,6 +128,26 @@ def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None
     assert max(tilt) < 0.05
 
 
+def test_a_frame_does_not_ask_for_the_layout_of_the_page(page: Any) -> None:
+    """To lay out the page for its sizes in each frame took ten times as long as to draw it."""
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def layouts() -> float:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        count: float = next(one["value"] for one in metrics if one["name"] == "LayoutCount")
+        return count
+
+    page.evaluate("""() => {
+        live.pause(true);
+        live.flight.steer({ demands: new Map([["surge", 1]]), added: {} });
+        live.flight.advance(20);
+    }""")
+    before = layouts()
+    page.evaluate("() => { for (let n = 0; n < 100; n++) { live.fly(1 / 60); live.draw(); } }")
+    assert layouts() - before < 5
+
+
 def test_without_the_hold_the_keys_drive_the_thrusters_alone(page: Any) -> None:
     page.locator("#live-hold").uncheck()
     assert "nothing is held" in page.inner_text("#live-message")
@@ -147,3 +169,16 @@ def test_a_vehicle_that_cannot_tilt_has_no_switch(tmp_path: Path, visit: Callabl
     page = flying(visit, target.as_uri()).page
     assert page.locator("#live-hold").count() == 0
     assert not page.evaluate("live.flight.isHeld")
+
+
+def test_a_vehicle_that_no_thruster_rolls_or_pitches_is_not_held(tmp_path: Path, visit: Callable[..., Visit]) -> None:
+    """The REMUS 100 tilts by its fins, which need speed."""
+    vehicle, target = load_vehicle(REMUS), tmp_path / "remus.html"
+    target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
+    page = flying(visit, target.as_uri()).page
+    assert page.locator("#live-hold").count() == 0
+    assert page.inner_text("#live-message").startswith("It is not held level, because no thruster rolls or pitches it.")
+    page.focus("#live-stage")
+    page.keyboard.down("KeyW")
+    until(page, "live.flight.pilot.model.get('u') > 0.1")
+    assert page.evaluate("live.flight.pilot.hold") is None

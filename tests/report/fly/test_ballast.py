@@ -1,0 +1,71 @@
+"""The ballast moves while the page flies: its motion is that of the rigid body, an impossible mass is refused."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rov_fmu.fmu.archive import web_module
+from rov_fmu.report.page.live import Flown, fly_page
+from tests.fmu.results.test_ballast import BALLAST, INPUTS, ROV, expected
+from tests.report.conftest import Visit
+from tests.report.test_live import flying
+from verification.references.rigid_vehicle import compared, places
+
+pytestmark = pytest.mark.interop
+__all__ = ["expected"]
+
+
+@pytest.fixture
+def page(tmp_path: Path, visit: Callable[..., Visit]) -> Any:
+    """The page of a vehicle with six axes, weight and buoyancy."""
+    target = tmp_path / "six.html"
+    target.write_text(fly_page([Flown(ROV, web_module(ROV.layout))]), encoding="utf-8")
+    return flying(visit, target.as_uri()).page
+
+
+def test_a_flight_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(page: Any, expected: list[float]) -> None:
+    values = page.evaluate(
+        """([inputs, ballast, names]) => {
+            live.pause(true);
+            const { flight } = live;
+            Object.assign(flight, { isHeld: false, isBounded: false });
+            flight.set(inputs);
+            flight.advance(10);
+            const done = flight.tune(ballast);
+            flight.advance(10);
+            return [done, names.map((name) => flight.pilot.model.get(name))];
+        }""",
+        [INPUTS, BALLAST, [*ROV.layout.state]],
+    )
+    done, state = values
+    assert done
+    assert compared(ROV, places(ROV, dict(zip(ROV.layout.state, state, strict=True)))) == pytest.approx(
+        expected, abs=1e-9
+    )
+
+
+def test_a_slider_moves_the_ballast_and_the_ghost_keeps_that_of_the_file(page: Any) -> None:
+    page.locator("summary", has_text="Ballast").click()
+    page.locator("input[name=W]").fill("140")
+    weights = page.evaluate("[live.flight.pilot, live.flight.ghost].map(({ model }) => model.get('W'))")
+    assert weights == [140.0, ROV["W"]]
+    assert page.is_checked("#live-ghost")
+    assert page.evaluate("live.flight.pilot.model.get('der(w)') > live.flight.ghost.model.get('der(w)')")
+    page.locator("summary", has_text="Tuning").click()
+    page.click("#live-ones")
+    assert page.evaluate("['W', 'alpha_u'].map((name) => live.flight.pilot.model.get(name))") == [140.0, 1.0]
+    page.click("#live-file")
+    assert page.evaluate("live.flight.pilot.model.get('W')") == ROV["W"]
+
+
+def test_a_mass_that_is_not_positive_definite_is_refused_in_one_line(page: Any) -> None:
+    page.locator("summary", has_text="Ballast").click()
+    page.locator("input[name=m_rov]").fill("27")
+    before = page.evaluate("[...live.flight.pilot.model.values]")
+    page.locator("input[name=z_G]").fill("0.23")
+    words = "z_G = 0.23: the mass matrix would not be positive definite, so it stays as it was."
+    assert page.inner_text("#live-message") == words
+    assert page.input_value("input[name=z_G]") == f"{ROV['z_G']:g}"
+    assert page.evaluate("[...live.flight.pilot.model.values]") == before

@@ -1,0 +1,73 @@
+"""A run of a study as MCAP: its kept outputs, and a pose that follows from roll, pitch and heading."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import rov_fmu
+from rov_fmu.cli import main
+from rov_fmu.io.messages import InputError
+from rov_fmu.study import Results
+from tests.bridges.test_mcap import messages
+
+PLAN = """vehicle = "bluerov2_heavy"
+stop_time = 2.0
+step = 0.1
+runs = 3
+seed = 1
+[inputs]
+u_5.steps = [[0.0, 0.3]]
+[vary]
+m_rov.uniform = [12.0, 15.0]
+[keep]
+outputs = ["x", "y", "z", "phi", "theta", "psi", "F_5"]
+every = 0.1
+[figures]
+end = "z[-1]"
+"""
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("motion") / "plan.toml"
+    path.write_text(PLAN, encoding="utf-8")
+    return path
+
+
+def test_a_run_is_written_by_its_number(plan: Path, scheduler: str) -> None:
+    folder = plan.parent / "results"
+    given = ["study", str(plan), "-o", str(folder), "--scheduler", scheduler]
+    assert main([*given, "--mcap", "2"]) == 0
+    own = Results(folder).trajectories([2])
+    found = messages((folder / "run-2.mcap").read_bytes())
+    assert [values for _, values in found["/outputs"]] == own.drop(columns=["run", "t"]).to_dict("records")
+    assert [stamp for stamp, _ in found["/outputs"]] == [100_000_000 * n for n in range(21)]
+    last, pose = own.iloc[-1], found["/pose"][-1][1].pose
+    assert last.phi > 0.1
+    assert [pose.position.x, pose.position.y, pose.position.z] == [last.y, last.x, -last.z]
+    q = pose.orientation
+    # The columns are the body's axes forward, to port and up, in east, north, up.
+    to_ned = Rotation.from_euler("ZYX", [last.psi, last.theta, last.phi]).as_matrix()
+    expected = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]) @ to_ned @ np.diag([1, -1, -1])
+    assert Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix() == pytest.approx(expected, abs=1e-12)
+    vehicle = rov_fmu.load("bluerov2_heavy")
+    assert vehicle.to_mcap(Results(folder).trajectories([2])) == (folder / "run-2.mcap").read_bytes()
+    with pytest.raises(InputError, match="of one run of a study"):
+        vehicle.to_mcap(Results(folder).trajectories())
+
+
+def test_a_run_that_is_not_there_is_told(plan: Path, scheduler: str, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = plan.parent / "results"
+    assert main(["study", str(plan), "-o", str(folder), "--scheduler", scheduler, "--mcap", "9"]) == 2
+    assert "--mcap 9: there is no such run with outputs" in capsys.readouterr().err
+    assert not (folder / "run-9.mcap").exists()
+
+
+def test_a_plan_of_a_foreign_fmu_has_no_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN.replace("vehicle =", "fmu =").replace("bluerov2_heavy", "x.fmu"), encoding="utf-8")
+    (tmp_path / "x.fmu").touch()
+    assert main(["study", str(path), "-o", str(tmp_path / "results"), "--mcap", "0"]) == 2
+    assert "the plan must have `vehicle`" in capsys.readouterr().err
