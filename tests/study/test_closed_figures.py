@@ -195,8 +195,9 @@ EXPRESSIONS = st.one_of(
     st.recursive(st.one_of(ALLOWED, NUMBERS, ANY_NAME, TEXTS), _improper, max_leaves=8),
 )
 
-HARMLESS = {"compile", "builtins.id", "object.__getattr__", "sys._getframe"}
-"""Audit events of reading a text with `ast`, and of looking at a function's parameters."""
+HARMLESS = {"compile", "exec <figure>", "builtins.id", "object.__getattr__", "sys._getframe"}
+"""Audit events of reading a text with `ast`, of computing the code made of it, and of looking at a function's
+parameters."""
 
 
 class Audit:
@@ -209,7 +210,8 @@ class Audit:
 
     def _hook(self, event: str, arguments: tuple[object, ...]) -> None:
         if self._thread == get_ident():
-            self.events[f"{event} {arguments[0]}" if event in ("open", "import") else event] += 1
+            what = getattr(arguments[0], "co_filename", arguments[0]) if event in ("open", "import", "exec") else ""
+            self.events[f"{event} {what}".strip()] += 1
 
     @contextmanager
     def counting(self) -> Iterator[None]:

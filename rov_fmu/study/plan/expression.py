@@ -1,14 +1,14 @@
 """The expressions of a study's figures: a small closed language over numbers and arrays.
 
 A plan may come from anyone, so an expression can compute and do nothing else. This holds by construction: `Expression`
-accepts only the kinds of syntax that `_Reader` lists, the operators of `_BINARY`, `_UNARY` and `_COMPARED`, and calls
-of named functions with a fixed number of values. There are no attributes, texts, lists, comprehensions or statements,
-and Python's `eval` is not used. Every value is a number or an array with one dimension, and no operation gives an
-array that is longer than those it was given, so sizes and times are bounded by the length of the text.
+accepts only the kinds of syntax that `_Reader` lists, the operators of `_KEPT` and `_CALLED`, and calls of named
+functions with a fixed number of values. There are no attributes, texts, lists, comprehensions or statements. What is
+compiled is not the text, but a new syntax tree that the reader makes; it is evaluated without Python's builtins. Every
+value is a number or an array with one dimension, and no operation gives an array that is longer than those it was
+given, so sizes and times are bounded by the length of the text.
 """
 
 import ast
-import operator
 import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -37,8 +37,16 @@ _ALLOWED = "an expression has numbers, variables, operators, indices and the fun
 
 _Value = Any
 """A number or an array with one dimension."""
-_Term = Callable[[Mapping[str, _Value]], _Value]
-"""A part of an expression: it computes its value from those of the variables."""
+_Part = tuple[ast.expr, str]
+"""A part of an expression: the code that computes it, and its unit, or an empty text where that does not follow."""
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
+"""The units of variables, where nobody asks for that of an expression."""
+_VALUES = "_values"
+"""The name that the values of variables and constants have in the code."""
+
+
+SAME = "same"
+"""The unit of a function whose result has the unit of its first value."""
 
 
 class ExpressionError(ValueError):
@@ -56,13 +64,24 @@ class Function:
     """The number of values that it takes."""
     parameters: tuple[str, ...] = ()
     """The names of all parameters, if values may be given by name."""
+    unit: str = ""
+    """The unit of the result: `SAME` is that of the first value, and an empty text is unknown."""
 
     @classmethod
-    def by_name(cls, compute: Callable[..., _Value]) -> "Function":
+    def by_name(cls, compute: Callable[..., _Value], unit: str) -> "Function":
         """Return a function whose values may be given by the names of its parameters."""
         parameters = signature(compute).parameters
         needed = sum(p.default is Parameter.empty for p in parameters.values())
-        return cls(compute, needed, len(parameters), tuple(parameters))
+        return cls(compute, needed, len(parameters), tuple(parameters), unit)
+
+    def __call__(self, *values: _Value, **by_name: _Value) -> _Value:
+        """Return the result, a number or an array with one dimension. Raises TypeError if it is neither."""
+        result = self.compute(*values, **by_name)
+        if isinstance(result, np.ndarray) and result.ndim == 0:
+            return result[()]
+        if not isinstance(result, float | np.number | np.bool_ | np.ndarray):
+            raise TypeError("a function needs an array, and gets a number")
+        return result
 
 
 # ---- What an expression may use --------------------------------------------------------------------------------------
@@ -70,7 +89,7 @@ class Function:
 
 def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> Function:
     """Return a function that reduces one array as in NumPy, or several values as in Python."""
-    return Function(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100)
+    return Function(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100, unit=SAME)
 
 
 def _round(y: _Value, decimals: float = 0.0) -> _Value:
@@ -87,10 +106,14 @@ _OF_ONE_VALUE = (
 )
 """Functions of NumPy with one value. Their other parameters are not allowed, because `out`, for example, writes into an
 array."""
+_SAME_UNIT = ("abs", "mean", "median", "std", "ptp", "sum", "percentile")
 _OF_TWO_VALUES = ("arctan2", "hypot", "maximum", "minimum", "percentile", "searchsorted")
 FUNCTIONS: Mapping[str, Function] = MappingProxyType(
-    {name: Function(getattr(np, name)) for name in _OF_ONE_VALUE}
-    | {name: Function(getattr(np, name), 2, 2) for name in _OF_TWO_VALUES}
+    {
+        name: Function(getattr(np, name), count, count, unit=SAME if name in _SAME_UNIT else "")
+        for count, names in enumerate((_OF_ONE_VALUE, _OF_TWO_VALUES), 1)
+        for name in names
+    }
     | {
         "clip": Function(np.clip, 3, 3),
         "gradient": Function(np.gradient, 1, 2),
@@ -105,31 +128,24 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
 
-_BINARY: Mapping[type[ast.operator], Callable[[_Value, _Value], _Value]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.FloorDiv: operator.floordiv,
-    ast.Mod: operator.mod,
-    ast.Pow: np.float_power,  # always gives a float, never a huge integer or a complex number
-    ast.BitAnd: np.logical_and,
-    ast.BitOr: np.logical_or,
-    ast.BitXor: np.logical_xor,
+_KEPT = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod)
+"""Python's own operators that an expression may use, beside signs. Of two floats, they give a float."""
+_CALLED: Mapping[str, Callable[..., _Value]] = {
+    "Pow": np.float_power,  # always gives a float, never a huge integer or a complex number
+    "BitAnd": np.logical_and,
+    "BitOr": np.logical_or,
+    "BitXor": np.logical_xor,
+    "Invert": np.logical_not,
+    "Not": lambda value: np.bool_(not _truth(value)),
 }
-_UNARY: Mapping[type[ast.unaryop], Callable[[_Value], _Value]] = {
-    ast.UAdd: operator.pos,
-    ast.USub: operator.neg,
-    ast.Invert: np.logical_not,
-    ast.Not: lambda value: np.bool_(not _truth(value)),
-}
-_COMPARED: Mapping[type[ast.cmpop], Callable[[_Value, _Value], _Value]] = {
-    ast.Lt: np.less,
-    ast.LtE: np.less_equal,
-    ast.Gt: np.greater,
-    ast.GtE: np.greater_equal,
-    ast.Eq: np.equal,
-    ast.NotEq: np.not_equal,
+"""Functions in place of operators, by the name of the operator in the syntax tree."""
+_COMPARED: Mapping[str, Callable[[_Value, _Value], _Value]] = {
+    "Lt": np.less,
+    "LtE": np.less_equal,
+    "Gt": np.greater,
+    "GtE": np.greater_equal,
+    "Eq": np.equal,
+    "NotEq": np.not_equal,
 }
 """NumPy's comparisons, because Python's True + True is an integer, and integers would grow without end."""
 
@@ -138,15 +154,19 @@ _COMPARED: Mapping[type[ast.cmpop], Callable[[_Value, _Value], _Value]] = {
 
 
 class Expression:
-    """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not."""
+    """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not.
 
-    def __init__(self, text: str, functions: Mapping[str, Function]) -> None:
-        reader = _Reader(functions)
+    `units` are those of the variables, from which that of the value follows.
+    """
+
+    def __init__(self, text: str, functions: Mapping[str, Function], units: Mapping[str, str] = NO_UNITS) -> None:
+        reader = _Reader(functions, units)
         try:
             with warnings.catch_warnings():  # Python's own about the text, such as "1if" without a space
                 warnings.simplefilter("ignore")
                 tree = ast.parse(text.strip(), mode="eval")
-            self._term = reader.term(tree.body)
+            code, self.unit = reader.read(tree.body)
+            """The unit of the value; an empty text where it does not follow, for example for a product."""
         except (RecursionError, MemoryError) as error:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels") from error
         except (SyntaxError, UnicodeError) as error:
@@ -155,44 +175,77 @@ class Expression:
         """The variables and constants that it names."""
         self.constant_values = tuple(reader.constant_values)
         """For each call of a function whose parameters have names: the numbers given in the text, by parameter."""
+        self._compute = _compiled(code, functions)
 
     def value(self, values: Mapping[str, _Value]) -> _Value:
         """Return the value, a number or an array, for the values of all names. May raise any exception."""
-        return self._term(values)
+        return self._compute(values)
 
 
 class _Reader:
-    """Turns a syntax tree into terms. Whatever is not listed here is refused."""
+    """Turns the syntax tree of a text into code and its unit. Whatever is not listed here is refused."""
 
-    def __init__(self, functions: Mapping[str, Function]) -> None:
+    def __init__(self, functions: Mapping[str, Function], units: Mapping[str, str]) -> None:
         self.names: list[str] = []
         """The variables and constants, once for each time that they occur."""
         self.constant_values: list[dict[str, _Value]] = []
-        self._functions = functions
+        self._functions, self._units = functions, {TIME: "s", **units}
         self._depth = 0
-        self._readers: Mapping[type[ast.expr], Callable[[Any], _Term | None]] = {
-            ast.Constant: self._constant,
-            ast.Name: self._name,
-            ast.Subscript: self._subscript,
-            ast.Call: self._call,
-            ast.UnaryOp: self._unary,
-            ast.BinOp: self._binary,
-            ast.Compare: self._compare,
-            ast.BoolOp: self._bool,
-            ast.IfExp: self._choice,
-        }
 
-    def term(self, node: ast.expr) -> _Term:
-        """Return the term of a node. Raises ExpressionError."""
+    def read(self, node: ast.expr) -> _Part:
+        """Return the code of a node and its unit. Raises ExpressionError."""
         if self._depth == _DEEPEST:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
         self._depth += 1
-        read = self._readers.get(type(node))
-        found = read(node) if read else None
-        self._depth -= 1
-        if found is None:
-            raise self._refused(node)
-        return found
+        try:
+            return self._read(node)
+        finally:
+            self._depth -= 1
+
+    def _read(self, node: ast.expr) -> _Part:  # noqa: PLR0911, PLR0912 (a case for each kind of syntax)
+        match node:
+            case ast.Constant(value=int() | float() as value):
+                return _constant(value), ""
+            case ast.Name(id=name):
+                return self._variable(name)
+            case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
+                return self._variable(variable)
+            case ast.Subscript(
+                value=ast.Call(func=ast.Name(id="where"), args=[condition], keywords=[]), slice=ast.Constant(value=0)
+            ):
+                return _call("flatnonzero", self._code(condition)), ""
+            case ast.Subscript(value=value, slice=ast.Slice(lower=lower, upper=upper, step=step)):
+                array, unit = self.read(value)
+                ends = (ast.Constant(None) if part is None else self._code(part) for part in (lower, upper, step))
+                return _call("slice", array, *ends), unit
+            case ast.Subscript(value=value, slice=index):
+                array, unit = self.read(value)
+                return _call("index", array, self._code(index)), unit
+            case ast.UnaryOp(op=op, operand=operand):
+                code, unit = self.read(operand)
+                is_sign = isinstance(op, ast.UAdd | ast.USub)
+                return (ast.UnaryOp(op, code), unit) if is_sign else (_call(_kind(op), code), "")
+            case ast.BinOp(left=left, op=op, right=right) if isinstance(op, _KEPT) or _kind(op) in _CALLED:
+                (a, unit), (b, other) = self.read(left), self.read(right)
+                code = ast.BinOp(a, op, b) if isinstance(op, _KEPT) else _call(_kind(op), a, b)
+                return code, unit if isinstance(op, ast.Add | ast.Sub) and unit == other else ""
+            case ast.Compare(left=left, ops=ops, comparators=others) if all(
+                type(op).__name__ in _COMPARED for op in ops
+            ):
+                kinds = ast.Constant(" ".join(type(op).__name__ for op in ops))
+                return _call("compare", kinds, *map(self._code, (left, *others))), ""
+            case ast.BoolOp(op=op, values=values):
+                return ast.BoolOp(op, [_call("truth", self._code(value)) for value in values]), ""
+            case ast.IfExp(test=test, body=body, orelse=otherwise):
+                return ast.IfExp(_call("truth", self._code(test)), self._code(body), self._code(otherwise)), ""
+            case ast.Call(func=ast.Name(id=name)):
+                return self._function(name, node)
+            case ast.Call(func=function):
+                raise self._refused(function)
+        raise self._refused(node)
+
+    def _code(self, node: ast.expr) -> ast.expr:
+        return self.read(node)[0]
 
     def _refused(self, node: ast.expr) -> ExpressionError:
         text = brief(ast.unparse(node), 40)
@@ -200,81 +253,11 @@ class _Reader:
             return ExpressionError(f"{text} is an attribute, which is not allowed: write {node.attr}(...)")
         return ExpressionError(f"{text} is not allowed; {_ALLOWED}")
 
-    def _constant(self, node: ast.Constant) -> _Term | None:
-        if not isinstance(node.value, int | float):
-            return None
-        try:
-            value = float(node.value)  # whole numbers would grow without end, and turn into objects in NumPy
-        except OverflowError:
-            raise ExpressionError("has a number that is too large") from None
-        return lambda _: value
-
-    def _name(self, node: ast.Name) -> _Term:
-        return self._variable(node.id)
-
-    def _variable(self, name: str) -> _Term:
+    def _variable(self, name: str) -> _Part:
         self.names.append(name)
-        return operator.itemgetter(name)
+        return ast.Subscript(_name(_VALUES), ast.Constant(name), ast.Load()), self._units.get(name, "")
 
-    def _subscript(self, node: ast.Subscript) -> _Term | None:
-        match node:
-            case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
-                return self._variable(variable)
-            case ast.Subscript(
-                value=ast.Call(func=ast.Name(id="where"), args=[one], keywords=[]), slice=ast.Constant(value=0)
-            ):
-                condition = self.term(one)
-                return lambda values: np.flatnonzero(condition(values))
-            case ast.Subscript(slice=ast.Slice(lower=lower, upper=upper, step=step)):
-                array = self.term(node.value)
-                first, last, stride = (None if part is None else self.term(part) for part in (lower, upper, step))
-                return lambda values: _array(array(values))[
-                    slice(*(None if part is None else _whole_number(part(values)) for part in (first, last, stride)))
-                ]
-        array, index = self.term(node.value), self.term(node.slice)
-        return lambda values: _array(array(values))[_index(index(values))]
-
-    def _unary(self, node: ast.UnaryOp) -> _Term | None:
-        if (compute := _UNARY.get(type(node.op))) is None:
-            return None
-        operand = self.term(node.operand)
-        return lambda values: compute(operand(values))
-
-    def _binary(self, node: ast.BinOp) -> _Term | None:
-        if (compute := _BINARY.get(type(node.op))) is None:
-            return None
-        left, right = self.term(node.left), self.term(node.right)
-        return lambda values: compute(left(values), right(values))
-
-    def _compare(self, node: ast.Compare) -> _Term | None:
-        """Compare two values, or several element by element, as in 0 < y < 1."""
-        operators = [_COMPARED[type(op)] for op in node.ops if type(op) in _COMPARED]
-        if len(operators) < len(node.ops):
-            return None
-        terms = [self.term(part) for part in (node.left, *node.comparators)]
-        if len(operators) == 1:
-            compare, (left, right) = operators[0], terms
-            return lambda values: compare(left(values), right(values))
-
-        def compare_all(values: Mapping[str, _Value]) -> _Value:
-            found = [term(values) for term in terms]
-            return reduce(np.logical_and, map(lambda f, a, b: f(a, b), operators, found, found[1:]))
-
-        return compare_all
-
-    def _bool(self, node: ast.BoolOp) -> _Term:
-        terms = [self.term(part) for part in node.values]
-        decides = all if isinstance(node.op, ast.And) else any
-        return lambda values: np.bool_(decides(_truth(term(values)) for term in terms))
-
-    def _choice(self, node: ast.IfExp) -> _Term:
-        condition, then, otherwise = (self.term(part) for part in (node.test, node.body, node.orelse))
-        return lambda values: then(values) if _truth(condition(values)) else otherwise(values)
-
-    def _call(self, node: ast.Call) -> _Term | None:
-        if not isinstance(node.func, ast.Name):
-            raise self._refused(node.func)
-        name = node.func.id
+    def _function(self, name: str, node: ast.Call) -> _Part:
         function = self._functions.get(name)
         if function is None:
             near = get_close_matches(name, self._functions, 1, 0.7)
@@ -284,50 +267,72 @@ class _Reader:
             raise ExpressionError("where with one value gives a tuple of one array: write where(...)[0]")
         if strange := [k.arg for k in node.keywords if k.arg not in function.parameters]:
             raise ExpressionError(f"{name} has no parameter named {strange[0] or '**'}")
-        by_name = [k.arg for k in node.keywords if k.arg]
-        given = [*function.parameters[: len(node.args)], *by_name]
+        given = [*function.parameters[: len(node.args)], *(k.arg for k in node.keywords if k.arg)]
         needed = set(function.parameters[: function.least]) - set(given)
-        count = len(node.args) + len(by_name)
+        count = len(node.args) + len(node.keywords)
         if needed or len(set(given)) < len(given) or not function.least <= count <= function.most:
             most = f" to {function.most}" if function.most > function.least else ""
             what = f" ({', '.join(function.parameters)})" if function.parameters else ""
             raise ExpressionError(f"{name} takes {function.least}{most} values{what}, each once, and not {count}")
-        terms, numbers = [], {}
+        codes, numbers, unit = [], {}, function.unit
         for n, part in enumerate([*node.args, *(k.value for k in node.keywords)]):
             named = len(self.names)
-            terms.append(self.term(part))
+            code, own = self.read(part)
+            codes.append(code)
+            if n == 0 and unit == SAME:
+                unit = own
             if function.parameters and len(self.names) == named:
                 with suppress(Exception):  # the error is reported when the run is evaluated
-                    if not isinstance(value := terms[n]({}), np.ndarray):
+                    if not isinstance(value := _compiled(code, self._functions)({}), np.ndarray):
                         numbers[given[n]] = value
         if function.parameters:
             self.constant_values.append(numbers)
-        return _called(function.compute, terms, by_name)
+        places = len(node.args)
+        by_name = [ast.keyword(k.arg, code) for k, code in zip(node.keywords, codes[places:], strict=True)]
+        return ast.Call(_name(name), codes[:places], by_name), unit
 
 
-def _called(compute: Callable[..., _Value], terms: list[_Term], names: list[str]) -> _Term:
-    """Return the call of a function with the values of these terms, the last ones by name."""
-    places = len(terms) - len(names)
-
-    def call(values: Mapping[str, _Value]) -> _Value:
-        given = [term(values) for term in terms]
-        found = compute(*given[:places], **dict(zip(names, given[places:], strict=True)))
-        if isinstance(found, np.ndarray) and found.ndim == 0:
-            return found[()]
-        if not isinstance(found, float | np.number | np.bool_ | np.ndarray):
-            raise TypeError("a function needs an array, and gets a number")
-        return found
-
-    return call
+# ---- Code ------------------------------------------------------------------------------------------------------------
 
 
-# ---- Values ----------------------------------------------------------------------------------------------------------
+def _constant(value: float) -> ast.Constant:
+    """Return a number as a float: whole numbers would grow without end, and turn into objects in NumPy."""
+    try:
+        return ast.Constant(float(value))
+    except OverflowError:
+        raise ExpressionError("has a number that is too large") from None
 
 
-def _truth(value: _Value) -> bool:
+def _kind(operator: ast.AST) -> str:
+    return type(operator).__name__
+
+
+def _name(name: str) -> ast.Name:
+    return ast.Name(name, ast.Load())
+
+
+def _call(helper: str, *values: ast.expr) -> ast.Call:
+    """Return the call of a function of `_HELPERS`, whose names no function of an expression has."""
+    return ast.Call(_name(f"_{helper}"), [*values], [])
+
+
+def _compiled(code: ast.expr, functions: Mapping[str, Function]) -> Callable[[Mapping[str, _Value]], _Value]:
+    """Return a function that computes the value of the code from those of the variables and constants."""
+    program = compile(ast.fix_missing_locations(ast.Expression(code)), "<figure>", "eval")
+    names = {"__builtins__": {}, **_HELPERS, **functions}
+    return lambda values: eval(program, names, {_VALUES: values})
+
+
+def _compare(kinds: str, *values: _Value) -> _Value:
+    """Compare two values, or several element by element, as in 0 < y < 1."""
+    compared = map(lambda kind, a, b: _COMPARED[kind](a, b), kinds.split(), values, values[1:])
+    return reduce(np.logical_and, compared)
+
+
+def _truth(value: _Value) -> np.bool_:
     if isinstance(value, np.ndarray):
         raise ValueError("an array is neither true nor false: write any(...) or all(...), and & or | between arrays")
-    return bool(value)
+    return np.bool_(value)
 
 
 def _array(value: _Value) -> _Value:
@@ -336,19 +341,35 @@ def _array(value: _Value) -> _Value:
     return value
 
 
-def _index(value: _Value) -> _Value:
-    """Return the index that NumPy takes: an integer, an array of integers, or an array of Booleans."""
-    if not isinstance(value, np.ndarray):
-        return _whole_number(value)
-    if value.dtype.kind == "b":
-        return value
-    whole = value.astype(np.intp)
-    if not (whole == value).all():
+def _slice(array: _Value, *ends: _Value) -> _Value:
+    return _array(array)[slice(*(None if end is None else _whole_number(end) for end in ends))]
+
+
+def _index(array: _Value, index: _Value) -> _Value:
+    """Return the part of an array that has an index: a whole number, an array of these, or an array of Booleans."""
+    array = _array(array)
+    if not isinstance(index, np.ndarray):
+        return array[_whole_number(index)]
+    if index.dtype.kind == "b":
+        return array[index]
+    whole = index.astype(np.intp)
+    if not (whole == index).all():
         raise IndexError("an index must be a whole number")
-    return whole
+    return array[whole]
 
 
 def _whole_number(value: _Value) -> int:
     if isinstance(value, np.ndarray) or not np.isfinite(value) or value != int(value):
         raise IndexError("an index must be a whole number")
     return int(value)
+
+
+_HELPERS: Mapping[str, Callable[..., _Value]] = {
+    **{f"_{kind}": function for kind, function in _CALLED.items()},
+    "_compare": _compare,
+    "_flatnonzero": np.flatnonzero,
+    "_index": _index,
+    "_slice": _slice,
+    "_truth": _truth,
+}
+"""What the code calls in place of operators, comparisons and indices."""

@@ -1,7 +1,7 @@
 """The figures of a run: expressions over its outputs, and the functions of time that they may call."""
 
 import warnings
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from math import isfinite, isnan, nan
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
 from rov_fmu.io.messages import brief, shown
-from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, Expression, Function
+from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, NO_UNITS, SAME, TIME, Expression, Function
 
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
@@ -27,15 +27,14 @@ class Responses:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
         self._windows: dict[tuple[float | None, float | None], tuple[slice, slice]] = {}
-        own: dict[str, Callable[..., float]] = {
-            "V_ss": self.steady,
-            "Tau": self.time_constant,
-            "overshoot": self.overshoot,
-            "settling_time": self.settling_time,
-            "at": self.at,
-            "final": self.final,
+        self.functions = {
+            "V_ss": Function.by_name(self.steady, SAME),
+            "Tau": Function.by_name(self.time_constant, "s"),
+            "overshoot": Function.by_name(self.overshoot, "1"),
+            "settling_time": Function.by_name(self.settling_time, "s"),
+            "at": Function.by_name(self.at, SAME),
+            "final": Function.by_name(self.final, SAME),
         }
-        self.functions = {name: Function.by_name(method) for name, method in own.items()}
         """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
@@ -121,9 +120,9 @@ def _functions(times: Array) -> dict[str, Function]:
     return {**FUNCTIONS, **Responses(times).functions}
 
 
-def read_expression(text: str) -> Expression:
-    """Read an expression without a run. Raises ExpressionError with the reason if it is not allowed."""
-    return Expression(text, _functions(np.zeros(1)))
+def read_expression(text: str, units: Mapping[str, str] = NO_UNITS) -> Expression:
+    """Read an expression without a run; `units` are those of the variables. Raises ExpressionError with the reason."""
+    return Expression(text, _functions(np.zeros(1)), units)
 
 
 def meaning(name: str) -> str:

@@ -11,7 +11,7 @@ import pandas as pd
 import pyarrow.dataset as ds
 
 from rov_fmu.io.messages import FileError, shown
-from rov_fmu.study.plan.figure_units import figure_unit
+from rov_fmu.study.plan.figures import read_expression
 from rov_fmu.study.results.store import RUNS, TRAJECTORIES, Store
 from rov_fmu.study.run.worker import FAILED, INCOMPLETE, RUN, STATUS, TIME
 
@@ -47,7 +47,7 @@ class Results:
         self.units: dict[str, str] = study["units"]
         """The units of parameters and outputs."""
         self.figure_units: dict[str, str] = {
-            name: figure_unit(text, self.units) for name, text in self.plan["figures"].items()
+            name: read_expression(text, self.units).unit for name, text in self.plan["figures"].items()
         }
         """The units of figures; an empty text where it does not follow from the expression."""
         self.descriptions: dict[str, str] = study["descriptions"]
