@@ -54,7 +54,7 @@ def minimise(
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    Every other step moves all parameters, and the others those of the motion alone, which takes a fifth of the time.
+    Every other step moves all parameters, and the others those of the motion alone, which takes less time.
     The fit ends when a step of all parameters reduces J by less than `enough`. Without the noise, its parameters keep
     their values. If the fit is not the `last` one, its information may be that of the step before.
     """
