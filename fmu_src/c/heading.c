@@ -11,21 +11,21 @@ static const double BESIDE_NOSE[3] = {1.0, 1e-6, 0.618e-6};
 
 enum { MOST_PARTS = 4096 }; /* of a piece, between which the heading is computed */
 
-static void model_attitude(const double y[N_SERIES], double state[N_STATES]);
-static void model_rotation(const double at[], double y[N_SERIES]);
-static double series_change(const series *s, int i, double t);
+static void model_attitude(const real y[N_SERIES], real state[N_STATES]);
+static void model_rotation(const real at[], real y[N_SERIES]);
+static real series_change(const series *s, int i, real t);
 
 /* Compute the rotation matrix among the states of the table at time t of a motion. */
-typedef void rotation_at(const void *motion, double t, double y[N_SERIES]);
+typedef void rotation_at(const void *motion, real t, real y[N_SERIES]);
 
 /* Return the angle that differs from an angle by whole turns and is the nearest to another one. */
-static double unwrapped(double angle, double near)
+static real unwrapped(real angle, real near)
 {
     return angle + TWO_PI * floor((near - angle) / TWO_PI + 0.5);
 }
 
 /* Compute the horizontal part, north and east, of the direction beside the nose. Each row has three entries of the rotation matrix. */
-static void beside_nose(const double row_1[3], const double row_2[3], double horizontal[2])
+static void beside_nose(const real row_1[3], const real row_2[3], real horizontal[2])
 {
     horizontal[0] = horizontal[1] = 0.0;
     for (int i = 2; i >= 0; i--) {
@@ -36,9 +36,9 @@ static void beside_nose(const double row_1[3], const double row_2[3], double hor
 
 /* Return the heading that counts turns, which differs from `near` by at most half a turn. It is that of a direction beside the
  * nose. */
-static double model_heading(const double at[], double near)
+static real model_heading(const real at[], real near)
 {
-    double y[N_SERIES], horizontal[2];
+    real y[N_SERIES], horizontal[2];
     model_rotation(at, y);
     beside_nose(&y[Y_R_11], &y[Y_R_21], horizontal);
     return unwrapped(atan2(horizontal[1], horizontal[0]), near);
@@ -48,16 +48,16 @@ static double model_heading(const double at[], double near)
  * nose by at most `swing`. In each part of this time, the direction moves by less than its distance from the vertical, so that
  * its heading is that of the same turn; and the vehicle turns by less than half a turn, so that its quaternion has the sign
  * that is nearer to the one before. */
-static void attitude_follow(rotation_at *at, const void *motion, double end, double turn, double swing, double state[N_STATES],
-                            double *heading)
+static void attitude_follow(rotation_at *at, const void *motion, real end, real turn, real swing, real state[N_STATES],
+                            real *heading)
 {
-    const double shortest = end / (double)MOST_PARTS;
-    double y[N_SERIES], horizontal[2], t = 0.0;
+    const real shortest = end / (double)MOST_PARTS;
+    real y[N_SERIES], horizontal[2], t = 0.0;
     at(motion, t, y);
-    for (int n = 1; t < end; n++) {
+    for (int n = 1; ANY(t < end); n++) {
         beside_nose(&y[Y_R_11], &y[Y_R_21], horizontal);
-        const double distance = sqrt(horizontal[0] * horizontal[0] + horizontal[1] * horizontal[1]);
-        const double part = fmin(0.9 * distance / swing, 2.0 / turn);
+        const real distance = sqrt(horizontal[0] * horizontal[0] + horizontal[1] * horizontal[1]);
+        const real part = fmin(0.9 * distance / swing, 2.0 / turn);
         t = n < MOST_PARTS ? fmin(t + fmax(part, shortest), end) : end;
         at(motion, t, y);
         model_attitude(y, state);
@@ -66,7 +66,7 @@ static void attitude_follow(rotation_at *at, const void *motion, double end, dou
     }
 }
 
-static void rotation_in_piece(const void *motion, double t, double y[N_SERIES])
+static void rotation_in_piece(const void *motion, real t, real y[N_SERIES])
 {
     const series *const s = (const series *)motion;
     for (int i = 0; i < N_ROTATION; i++) {
@@ -75,11 +75,11 @@ static void rotation_in_piece(const void *motion, double t, double y[N_SERIES])
 }
 
 /* Follow the attitude through a piece of a step. */
-static void attitude_after_piece(const series *s, double length, double state[N_STATES], double *heading)
+static void attitude_after_piece(const series *s, real length, real state[N_STATES], real *heading)
 {
-    double turn = 0.0, swing = 0.0;
+    real turn = 0.0, swing = 0.0;
     for (int i = FIRST_ROTATION; i < N_MONITORED; i++) {
-        double size = 0.0; /* an upper bound of the angular velocity */
+        real size = 0.0; /* an upper bound of the angular velocity */
         for (int n = s->order; n >= 0; n--) {
             size = size * length + fabs(s->c[n][i]);
         }
@@ -89,6 +89,7 @@ static void attitude_after_piece(const series *s, double length, double state[N_
     attitude_follow(rotation_in_piece, s, length, turn, swing, state, heading);
 }
 
+#if LANES == 1
 /* A rotation with constant velocities. At the angle a, the rotation matrix is start + sin(a) along + (1 - cos(a)) across. */
 typedef struct {
     double start[N_SERIES], along[N_SERIES], across[N_SERIES];
@@ -125,3 +126,4 @@ static void attitude_after_circle(const circle *c, double angle, double state[N_
     }
     attitude_follow(rotation_on_circle, c, angle - turns * TWO_PI, 1.0, swing, state, heading);
 }
+#endif

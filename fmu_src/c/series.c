@@ -3,10 +3,11 @@
  * show how far the series may be used (Jorba and Zou, A software package for the numerical integration of ODEs by means
  * of high-order Taylor methods, 2005). */
 #include <float.h>
-#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
+
+#include "real.h"
 
 #if defined __GNUC__
 #define INLINE static inline __attribute__((always_inline)) /* so that loops over constant orders are unrolled */
@@ -27,55 +28,55 @@ typedef struct {
     int order;                     /* the order of the highest coefficient that is known */
     uint64_t moving;               /* one bit for each component; it is set where the states are not constant */
     unsigned blocks;               /* one bit for each block of equation.h; it is set where the states are not constant */
-    double size[N_SERIES];         /* for each state, the scale of its group plus the size of its first coefficients */
-    double unit;                   /* the unit of time, s */
-    double pace[N_SERIES];         /* the unit of time, or 0 for the states that are constant */
-    double c[ORDER + 1][N_SERIES]; /* the coefficients */
+    real size[N_SERIES];           /* for each state, the scale of its group plus the size of its first coefficients */
+    real unit;                     /* the unit of time, s */
+    real pace[N_SERIES];           /* the unit of time, or 0 for the states that are constant */
+    real c[ORDER + 1][N_SERIES];   /* the coefficients */
 } series;
 
 static const double INVERSE[ORDER + 1] = {0.0,        1.0,        1.0 / 2.0,  1.0 / 3.0,  1.0 / 4.0,  1.0 / 5.0,  1.0 / 6.0,
                                           1.0 / 7.0,  1.0 / 8.0,  1.0 / 9.0,  1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0,
                                           1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0};
 
-/* Compute coefficient m > 0 of the products of state a with `lanes` states, from b on. Blocks that do not move are skipped. */
-INLINE void series_products(const double c[ORDER + 1][N_SERIES], unsigned blocks, int a, int b, int lanes, int m,
-                            double product[])
+/* Compute coefficient m > 0 of the products of state a with `count` states, from b on. Blocks that do not move are skipped. */
+INLINE void series_products(const real c[ORDER + 1][N_SERIES], unsigned blocks, int a, int b, int count, int m,
+                            real product[])
 {
     const bool first_moves = blocks >> BLOCK_OF[a] & 1U, second_moves = blocks >> BLOCK_OF[b] & 1U;
-    for (int i = 0; i < lanes; i++) {
+    for (int i = 0; i < count; i++) {
         product[i] = 0.0;
     }
     if (first_moves && second_moves) {
         for (int j = m - 1; j > 0; j--) {
-            for (int i = 0; i < lanes; i++) {
+            for (int i = 0; i < count; i++) {
                 product[i] += c[j][a] * c[m - j][b + i];
             }
         }
     }
     if (second_moves) { /* coefficient m was computed last, so it is needed last */
-        for (int i = 0; i < lanes; i++) {
+        for (int i = 0; i < count; i++) {
             product[i] += c[0][a] * c[m][b + i];
         }
     }
     if (first_moves) {
-        for (int i = 0; i < lanes; i++) {
+        for (int i = 0; i < count; i++) {
             product[i] += c[m][a] * c[0][b + i];
         }
     }
 }
 
-/* Compute coefficient m > 0 of the squares of `lanes` states, from a on. */
-INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int m, double square[])
+/* Compute coefficient m > 0 of the squares of `count` states, from a on. */
+INLINE void series_squares(real c[ORDER + 1][N_SERIES], int a, int count, int m, real square[])
 {
-    for (int i = 0; i < lanes; i++) {
+    for (int i = 0; i < count; i++) {
         square[i] = 0.0;
     }
     for (int j = (m - 1) / 2; j > 0; j--) {
-        for (int i = 0; i < lanes; i++) {
+        for (int i = 0; i < count; i++) {
             square[i] += c[j][a + i] * c[m - j][a + i];
         }
     }
-    for (int i = 0; i < lanes; i++) {
+    for (int i = 0; i < count; i++) {
         square[i] = 2.0 * (square[i] + c[0][a + i] * c[m][a + i]);
         square[i] += m % 2 == 0 ? c[m / 2][a + i] * c[m / 2][a + i] : 0.0;
     }
@@ -84,8 +85,8 @@ INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int 
 /* The functions of equation.h: SERIES_BLOCK computes coefficient m + 1 of one block of states, SERIES_TERMS of all states. GROW
  * calls a block, or sets its coefficients to 0 where the block does not move. */
 #define SERIES_BLOCK(name)                                                                                      \
-    INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const double pace[N_SERIES], \
-                     double c[ORDER + 1][N_SERIES], int m)
+    INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const real pace[N_SERIES], \
+                     real c[ORDER + 1][N_SERIES], int m)
 #define SERIES_TERMS SERIES_UNROLLED void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
 #define GROW(bit, block, first, size)                    \
     if (s->blocks >> (bit) & 1U) {                       \
@@ -100,7 +101,7 @@ INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int 
 #include "heading.c"
 #else
 /* Without roll and pitch, the heading is a state that counts turns itself. */
-static double model_heading(const double at[], double near)
+static real model_heading(const real at[], real near)
 {
     (void)at;
     return near;
@@ -116,24 +117,14 @@ static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-1
 static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
                                       9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
 
-/* Return the order of the first coefficient of state i that is not 0, or s->order + 1 when all are 0. */
-static int series_first(const series *s, int i)
-{
-    int first = 0;
-    while (first <= s->order && s->c[first][i] == 0.0) {
-        first++;
-    }
-    return first;
-}
-
 /* Return true when the series may be used up to t = 1. The states from N_USED on are integrals of the others and converge with
  * them. */
-INLINE bool series_converges(const series *s)
+INLINE mask series_converges(const series *s)
 {
     const double before = SMALL_BEFORE[s->order - 4];
-    bool done = true;
+    mask done = YES;
     for (int i = 0; i < N_USED; i++) {
-        const double size = s->size[i], a = fabs(s->c[s->order - 1][i]), b = fabs(s->c[s->order][i]);
+        const real size = s->size[i], a = fabs(s->c[s->order - 1][i]), b = fabs(s->c[s->order][i]);
         done &= a + 0.01 * b <= before * size + DBL_MIN; /* b may be infinite */
         /* b * b / a estimates the next coefficient; 8 b keeps a small `a` from making it large */
         done &= b * b <= 0.25 * DBL_EPSILON * size * (a + 8.0 * b);
@@ -142,6 +133,46 @@ INLINE bool series_converges(const series *s)
         }
     }
     return done;
+}
+
+/* Return the change of a state from 0 to t. */
+static real series_change(const series *s, int i, real t)
+{
+    real change = 0.0;
+    for (int n = s->order; n > 0; n--) {
+        change = (change + s->c[n][i]) * t;
+    }
+    return change;
+}
+
+/* Return true when the sizes of the coefficients prove that no velocity reverses before t = 1. */
+INLINE mask series_keeps_directions(const series *s)
+{
+    real others[N_MONITORED];
+    mask keeps = YES;
+    memset(others, 0, sizeof others);
+    for (int n = s->order; n > 1; n--) {
+        for (int i = 0; i < N_MONITORED; i++) {
+            others[i] += fabs(s->c[n][i]);
+        }
+    }
+    for (int i = 0; i < N_MONITORED; i++) {
+        const real c0 = s->c[0][i], c1 = s->c[1][i];
+        const mask against = (c0 > 0.0 && c1 < 0.0) || (c0 < 0.0 && c1 > 0.0); /* a product would underflow */
+        keeps &= (against ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1)) >= others[i];
+    }
+    return keeps;
+}
+
+#if LANES == 1 /* one vehicle at a time: long series, and reversals */
+/* Return the order of the first coefficient of state i that is not 0, or s->order + 1 when all are 0. */
+static int series_first(const series *s, int i)
+{
+    int first = 0;
+    while (first <= s->order && s->c[first][i] == 0.0) {
+        first++;
+    }
+    return first;
 }
 
 /* Return the exponent of the largest power of two that is not above x > 0. Subnormal numbers are treated as 0. */
@@ -192,16 +223,6 @@ static double series_reach(const series *s, const double scale[N_SERIES])
     return pow(2.0, reach);
 }
 
-/* Return the change of a state from 0 to t. */
-static double series_change(const series *s, int i, double t)
-{
-    double change = 0.0;
-    for (int n = s->order; n > 0; n--) {
-        change = (change + s->c[n][i]) * t;
-    }
-    return change;
-}
-
 /* Return the time at which a state is 0, by Newton's method. Its slope must stay within a quarter of the first slope, so there
  * is only one such time. */
 static double series_root(const series *s, int i)
@@ -243,24 +264,6 @@ static double series_sign_kept(const series *s, int i, double length, bool *reve
     return length;
 }
 
-/* Return true when the sizes of the coefficients prove that no velocity reverses before t = 1. */
-INLINE bool series_keeps_directions(const series *s)
-{
-    double others[N_MONITORED] = {0.0};
-    bool keeps = true;
-    for (int n = s->order; n > 1; n--) {
-        for (int i = 0; i < N_MONITORED; i++) {
-            others[i] += fabs(s->c[n][i]);
-        }
-    }
-    for (int i = 0; i < N_MONITORED; i++) {
-        const double c0 = s->c[0][i], c1 = s->c[1][i];
-        const bool against = (c0 > 0.0 && c1 < 0.0) || (c0 < 0.0 && c1 > 0.0); /* a product would underflow */
-        keeps &= (against ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1)) >= others[i];
-    }
-    return keeps;
-}
-
 /* Shorten a piece to the first reversal. Return the velocity that reverses, or NONE. */
 static int series_cut(const series *s, double *length)
 {
@@ -280,3 +283,4 @@ static int series_cut(const series *s, double *length)
     }
     return reversed;
 }
+#endif

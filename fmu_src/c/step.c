@@ -10,94 +10,82 @@
 typedef struct {
     const model_numbers *n;
     model_held q;
-    double y[N_SERIES];            /* the states at the start of a piece */
-    double lost[N_SERIES];         /* the rounding error of each state, to be added to its next change */
-    double displacement[N_SERIES]; /* the changes so far of the integrals, which are the states from N_USED on */
-    double scale[N_SERIES];        /* for each group, the largest of its size and its earlier sizes, / 4 for each piece since */
-    double largest[N_SERIES];      /* the largest size of each group so far */
-    double covered[N_USED];        /* roughly, the integral of the size of each state over time */
+    real y[N_SERIES];              /* the states at the start of a piece */
+    real lost[N_SERIES];           /* the rounding error of each state, to be added to its next change */
+    real displacement[N_SERIES];   /* the changes so far of the integrals, which are the states from N_USED on */
+    real scale[N_SERIES];          /* for each group, the largest of its size and its earlier sizes, / 4 for each piece since */
+    real largest[N_SERIES];        /* the largest size of each group so far */
+    real covered[N_USED];          /* roughly, the integral of the size of each state over time */
     uint64_t settled;              /* one bit for each component; it is set once the component has settled */
-    int reverse[N_MONITORED];      /* 1 for each velocity whose coefficients are those of the negative direction */
+    mask reverse[N_MONITORED];     /* 1 for each velocity whose coefficients are those of the negative direction */
 } motion;
 
-/* Return true when all n numbers are finite. */
-static inline bool all_finite(const double x[], int n)
-{
-    bool finite = true;
-    for (int i = 0; i < n; i++) {
-        finite &= isfinite(x[i]) != 0;
-    }
-    return finite;
-}
-
 /* Return the sum of the sizes of the states in a group. */
-static inline double group_size(const double x[N_SERIES], int group)
+static inline real group_size(const real x[N_SERIES], int group)
 {
-    double size = 0.0;
+    real size = 0.0;
     for (int i = 0; i < N_SERIES; i++) {
         size += GROUP[i] == group ? fabs(x[i]) : 0.0;
     }
     return size;
 }
 
+/* Take the sizes of the states at the start of a piece into account. */
+INLINE void motion_measure(motion *m)
+{
+    for (int i = 0; i < N_USED; i++) {
+        if (GROUP[i] == i) {
+            const real size = group_size(m->y, i);
+            m->scale[i] = fmax(m->scale[i], size);
+            m->largest[i] = fmax(m->largest[i], size);
+        }
+    }
+}
+
 /* Return true when a velocity that is 0, and whose acceleration is 0, may still begin to move. This happens when all states in
  * one of its terms begin to move. */
-static bool motion_may_begin(const motion *m, const series *s)
+static mask motion_may_begin(const motion *m, const series *s)
 {
-    double moves[N_SERIES], size[N_SERIES];
-    bool found = false, again = true;
+    real moves[N_SERIES], size[N_SERIES];
+    mask found = NO, again = YES;
     for (int i = 0; i < N_SERIES; i++) {
         moves[i] = s->c[0][i] != 0.0 || s->c[1][i] != 0.0 ? 1.0 : 0.0;
     }
-    while (again) {
-        again = false;
+    while (ANY(again)) {
+        again = NO;
         model_sizes(m->n, &m->q, moves, size);
         for (int i = 0; i < N_SERIES; i++) {
-            if (moves[i] == 0.0 && size[i] != 0.0) {
-                moves[i] = 1.0;
-                again = true;
-                found |= i < N_MONITORED;
+            const mask begins = moves[i] == 0.0 && size[i] != 0.0;
+            moves[i] = begins ? 1.0 : moves[i];
+            again |= begins;
+            if (i < N_MONITORED) {
+                found |= begins;
             }
         }
     }
     return found;
 }
 
-/* Compute the coefficients one by one, and choose the direction of each velocity when it begins to move. */
-static void motion_grow_slowly(motion *m, series *s)
+/* Return true when the directions have to be chosen while the series grows. */
+INLINE mask motion_waits(const motion *m, const series *s)
 {
-    for (int n = 1; n < ORDER; n++) {
-        bool turned = false;
-        s->order = n - 1;
-        for (int i = 0; i < N_MONITORED; i++) {
-            const int reverse = s->c[series_first(s, i)][i] < 0.0; /* this is coefficient n when all before it are 0 */
-            turned |= reverse != m->reverse[i];
-            m->reverse[i] = reverse;
+    mask waits = NO;
+    for (int i = 0; i < N_MONITORED; i++) {
+        if (s->moving >> COMPONENT_OF[i] & 1U) {
+            waits |= s->c[0][i] == 0.0 && s->c[1][i] == 0.0;
         }
-        if (turned) {
-            model_direct(m->n, m->reverse, &m->q);
-        }
-        series_terms(m->n, &m->q, s, n);
     }
-    s->order = ORDER;
+    return ANY(waits) ? waits && motion_may_begin(m, s) : waits;
 }
 
-/* Begin a series at the current states: compute its first two coefficients, the directions, and which components move. */
-INLINE void motion_begin(motion *m, double unit, series *s)
+#if LANES == 1
+/* Find the components that move, and set the first coefficients of the others to 0. */
+INLINE void motion_find_moving(const motion *m, series *s)
 {
-    double rate[N_SERIES];
-    bool turned = false;
-    s->unit = unit;
     s->moving = s->blocks = 0;
-    for (int i = 0; i < N_MONITORED; i++) {
-        m->reverse[i] = m->y[i] < 0.0;
-    }
-    model_direct(m->n, m->reverse, &m->q);
-    model_rates(m->n, &m->q, m->y, rate);
     for (int i = 0; i < N_SERIES; i++) {
         const uint64_t bit = UINT64_C(1) << COMPONENT_OF[i];
-        s->c[0][i] = m->y[i];
-        s->c[1][i] = m->settled & bit ? 0.0 : unit * rate[i];
+        s->c[1][i] = m->settled & bit ? 0.0 : s->c[1][i];
         s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
     }
     for (int k = 0; k < N_COMPONENTS; k++) {
@@ -115,44 +103,71 @@ INLINE void motion_begin(motion *m, double unit, series *s)
     for (int i = 0; i < N_SERIES; i++) {
         const bool moves = s->moving >> COMPONENT_OF[i] & 1U;
         s->c[1][i] = moves ? s->c[1][i] : 0.0;
-        s->pace[i] = moves ? unit : 0.0;
+        s->pace[i] = moves ? s->unit : 0.0;
         s->blocks |= moves ? 1U << BLOCK_OF[i] : 0U;
+    }
+}
+#else
+/* Let all components move: what is 0 stays 0. */
+INLINE void motion_find_moving(const motion *m, series *s)
+{
+    (void)m;
+    s->moving = ~UINT64_C(0);
+    s->blocks = ~0U;
+    for (int i = 0; i < N_SERIES; i++) {
+        s->pace[i] = s->unit;
+    }
+}
+#endif
+
+/* Begin a series at the current states: compute its first two coefficients, the directions, and which components move. */
+INLINE void motion_begin(motion *m, real unit, series *s)
+{
+    real rate[N_SERIES];
+    mask turned = NO;
+    s->unit = unit;
+    for (int i = 0; i < N_MONITORED; i++) {
+        m->reverse[i] = m->y[i] < 0.0;
+    }
+    model_direct(m->n, m->reverse, &m->q);
+    model_rates(m->n, &m->q, m->y, rate);
+    for (int i = 0; i < N_SERIES; i++) {
+        s->c[0][i] = m->y[i];
+        s->c[1][i] = unit * rate[i];
+    }
+    motion_find_moving(m, s);
+    for (int i = 0; i < N_SERIES; i++) {
         s->size[i] = m->scale[GROUP[i]] + group_size(s->c[1], GROUP[i]);
     }
     for (int i = 0; i < N_MONITORED; i++) {
-        const bool back = m->y[i] == 0.0 && s->c[1][i] < 0.0;
+        const mask back = m->y[i] == 0.0 && s->c[1][i] < 0.0;
         m->reverse[i] |= back;
         turned |= back;
     }
-    if (turned) {
+    if (ANY(turned)) {
         model_direct(m->n, m->reverse, &m->q);
     }
 }
 
-/* Compute coefficients up to a low order. Return true when the series may be used up to t = 1. */
-INLINE bool motion_grow_short(motion *m, series *s)
+/* Compute coefficients up to a low order. Return true when the series may be used up to t = 1. It ends when this holds for
+ * all vehicles that are not `left_out`. */
+INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
 {
-    bool waits = false;
-    for (int i = 0; i < N_MONITORED; i++) {
-        waits |= s->c[0][i] == 0.0 && s->c[1][i] == 0.0 && s->moving >> COMPONENT_OF[i] & 1U;
-    }
-    if (waits && motion_may_begin(m, s)) {
-        motion_grow_slowly(m, s);
-        return series_converges(s);
-    }
     series_terms(m->n, &m->q, s, 1); /* the orders are constants so that the compiler unrolls the loops */
     series_terms(m->n, &m->q, s, 2);
     series_terms(m->n, &m->q, s, 3);
     series_terms(m->n, &m->q, s, 4);
     s->order = 5;
-    if (series_converges(s)) {
-        return true;
+    mask done = series_converges(s);
+    if (ALL(done | left_out)) {
+        return done;
     }
     series_terms(m->n, &m->q, s, 5);
     series_terms(m->n, &m->q, s, 6);
     s->order = 7;
-    if (series_converges(s)) {
-        return true;
+    done = series_converges(s);
+    if (ALL(done | left_out)) {
+        return done;
     }
     series_terms(m->n, &m->q, s, 7);
     series_terms(m->n, &m->q, s, 8);
@@ -160,33 +175,34 @@ INLINE bool motion_grow_short(motion *m, series *s)
     return series_converges(s);
 }
 
-/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return the largest usable t, at most 1; 0 when
- * the series overflows. */
-static double motion_grow_long(const motion *m, series *s)
+/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. */
+INLINE mask motion_grow_long(const motion *m, series *s, mask left_out)
 {
+    mask done = NO;
     while (s->order < ORDER) {
         series_terms(m->n, &m->q, s, s->order);
         series_terms(m->n, &m->q, s, s->order + 1);
         s->order += 2;
-        if (series_converges(s)) {
-            return 1.0;
+        done = series_converges(s);
+        if (ALL(done | left_out)) {
+            break;
         }
     }
-    return series_reach(s, m->scale);
+    return done;
 }
 
 /* Add a change to a state, together with its earlier rounding error (compensated summation). */
-static inline void motion_add(double *to, double change, double *lost)
+static inline void motion_add(real *to, real change, real *lost)
 {
-    const double whole = change + *lost, sum = *to + whole;
+    const real whole = change + *lost, sum = *to + whole;
     *lost = whole - (sum - *to);
     *to = sum;
 }
 
 /* Move the states to the end of a piece, t = length. */
-INLINE void motion_move(motion *m, const series *s, double length, double change[N_SERIES])
+INLINE void motion_move(motion *m, const series *s, real length, real change[N_SERIES])
 {
-    memset(change, 0, sizeof(double[N_SERIES]));
+    memset(change, 0, sizeof(real[N_SERIES]));
     for (int n = s->order; n > 0; n--) {
         for (int i = 0; i < N_SERIES; i++) {
             change[i] = (change[i] + s->c[n][i]) * length;
@@ -199,6 +215,89 @@ INLINE void motion_move(motion *m, const series *s, double length, double change
     for (int i = N_USED; i < N_SERIES; i++) {
         motion_add(&m->displacement[i], change[i], &m->lost[i]);
     }
+}
+
+#if LANES > 1
+/* Compute the states of all vehicles after h > 0 seconds, in a single piece, with the inputs held. Return true for the vehicles
+ * whose step is such a piece: the series converges, no velocity reverses, and the result is finite. All others, and those that
+ * are `left_out`, need motion_step. */
+static mask motion_plain(const real at[], const model_numbers *n, real h, mask left_out, real next[N_STATES], real *heading)
+{
+    real state[N_STATES], change[N_SERIES];
+    motion m;
+    series s;
+    memset(&m, 0, sizeof m);
+    m.n = n;
+    (void)heading;
+    memcpy(state, at + FIRST_STATE, sizeof state);
+    model_start(at, n, &m.q, m.y, m.scale);
+    motion_measure(&m);
+    motion_begin(&m, h, &s);
+    left_out |= motion_waits(&m, &s);
+    mask done = motion_grow_short(&m, &s, left_out);
+    if (!ALL(done | left_out)) {
+        done = motion_grow_long(&m, &s, left_out);
+    }
+    done &= ~left_out & series_keeps_directions(&s);
+#if HAS_ATTITUDE
+    attitude_after_piece(&s, done ? 1.0 : 0.0, state, heading);
+#endif
+    motion_move(&m, &s, 1.0, change);
+#if HAS_LAG
+    model_arrive(at, n, &m.q, m.y, m.scale);
+#endif
+    model_finish(state, &m.q, m.y, m.displacement, next);
+    for (int i = 0; i < N_STATES; i++) {
+        done &= fabs(next[i]) <= DBL_MAX;
+    }
+    return done;
+}
+#endif
+#if LANES == 1
+/* Return true when all n numbers are finite. */
+static inline bool all_finite(const double x[], int n)
+{
+    bool finite = true;
+    for (int i = 0; i < n; i++) {
+        finite &= isfinite(x[i]) != 0;
+    }
+    return finite;
+}
+
+/* Compute the coefficients one by one, and choose the direction of each velocity when it begins to move. */
+static void motion_grow_slowly(motion *m, series *s)
+{
+    for (int n = 1; n < ORDER; n++) {
+        bool turned = false;
+        s->order = n - 1;
+        for (int i = 0; i < N_MONITORED; i++) {
+            const mask reverse = s->c[series_first(s, i)][i] < 0.0; /* this is coefficient n when all before it are 0 */
+            turned |= reverse != m->reverse[i];
+            m->reverse[i] = reverse;
+        }
+        if (turned) {
+            model_direct(m->n, m->reverse, &m->q);
+        }
+        series_terms(m->n, &m->q, s, n);
+    }
+    s->order = ORDER;
+}
+
+/* Compute coefficients up to a low order, or all of them where the directions depend on them. Return true when the series may be
+ * used up to t = 1. */
+INLINE bool motion_grow(motion *m, series *s)
+{
+    if (motion_waits(m, s)) {
+        motion_grow_slowly(m, s);
+        return series_converges(s);
+    }
+    return motion_grow_short(m, s, NO);
+}
+
+/* Compute the coefficients that are left. Return the largest usable t, at most 1; 0 when the series overflows. */
+static double motion_reach(const motion *m, series *s)
+{
+    return motion_grow_long(m, s, NO) ? 1.0 : series_reach(s, m->scale);
 }
 
 /* Put a component to rest when nothing drives it and its states are so small that, in the remaining `rest` seconds, they would
@@ -293,16 +392,10 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
     memcpy(state, at + FIRST_STATE, sizeof state);
     model_start(at, n, &m.q, m.y, m.scale);
     while (++pieces <= MOST_PIECES && unit > 0.0) {
-        for (int i = 0; i < N_USED; i++) {
-            if (GROUP[i] == i) {
-                const double size = group_size(m.y, i);
-                m.scale[i] = fmax(m.scale[i], size);
-                m.largest[i] = fmax(m.largest[i], size);
-            }
-        }
+        motion_measure(&m);
         motion_begin(&m, fmin(rest, unit), &s);
         double reach = 1.0;
-        if (!motion_grow_short(&m, &s)) {
+        if (!motion_grow(&m, &s)) {
             if (pieces == 1) { /* the step is long, and some states may have settled before it */
                 motion_settle(&m, rest);
                 if (motion_coasts(&m, rest, state, heading)) {
@@ -310,10 +403,10 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
                 }
                 if (m.settled != 0U) {
                     motion_begin(&m, s.unit, &s);
-                    (void)motion_grow_short(&m, &s); /* in either case, motion_grow_long continues the series */
+                    (void)motion_grow(&m, &s); /* in either case, motion_grow_long continues the series */
                 }
             }
-            reach = motion_grow_long(&m, &s);
+            reach = motion_reach(&m, &s);
         }
         if (reach == 0.0) {
             unit = 1e-3 * s.unit;
@@ -383,4 +476,5 @@ static inline void delay_commit(const double at[], const delay_line *line, doubl
 {
     (void)at, (void)line, (void)t, (void)h;
 }
+#endif
 #endif

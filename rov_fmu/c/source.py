@@ -334,7 +334,7 @@ def _statements(formulas: Mapping[str, Expression], places: Mapping[str, str], k
     `known` has the C expressions of the names that the formulas contain, besides the local constants.
     """
     in_c = {**known, **{name: name for name in formulas if name not in places}}
-    left = {name: places.get(name, f"const double {name}") for name in formulas}
+    left = {name: places.get(name, f"const real {name}") for name in formulas}
     return [f"{left[name]} = {to_c(formula, in_c.__getitem__)};" for name, formula in formulas.items()]
 
 
@@ -381,6 +381,6 @@ def unused_sources(layout: Layout) -> list[str]:
 
 def sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    names = {"series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"} - {*unused_sources(layout)}
+    names = {"real.h", "series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"} - {*unused_sources(layout)}
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in sorted(names)}
     return generated_sources(layout) | shared

@@ -1,0 +1,65 @@
+/* The numbers of the motion. The FMU computes with doubles. engine/lanes.c defines LANES: then a `real` has the numbers of
+ * LANES vehicles, in a vector type of clang, and a condition (`mask`) is one for each of them. Operators, comparisons and
+ * a ? b : c work on both. What needs control flow for each vehicle stands between #if LANES == 1 and #endif. */
+#ifndef REAL_H
+#define REAL_H
+
+#include <math.h>
+
+#ifndef LANES
+#define LANES 1
+typedef double real;
+typedef int mask;
+#define LANE(x, lane) (x) /* the number of one vehicle */
+#define YES 1
+#define NO 0
+#define ALL(condition) (condition) /* for all vehicles */
+#define ANY(condition) (condition) /* for at least one of them */
+#define SECOND_IF(condition, pair) (pair)[condition] /* of two numbers */
+#else
+typedef double real __attribute__((ext_vector_type(LANES)));
+typedef __typeof__((real)0.0 < (real)0.0) mask;
+#define LANE(x, lane) ((double *)&(x))[lane]
+#define YES (-1)
+#define NO 0
+#define ALL(condition) (__builtin_reduce_and(condition) != 0)
+#define ANY(condition) (__builtin_reduce_or(condition) != 0)
+#define SECOND_IF(condition, pair) ((condition) ? (pair)[1] : (pair)[0])
+
+static inline real lanes_fmin(real a, real b)
+{
+    return __builtin_elementwise_min(a, b);
+}
+
+static inline real lanes_fmax(real a, real b)
+{
+    return __builtin_elementwise_max(a, b);
+}
+
+/* Call a function of math.h for each vehicle. */
+#define EACH_LANE(name, arguments, ...)             \
+    static real lanes_##name arguments              \
+    {                                               \
+        real result;                                \
+        for (int i = 0; i < LANES; i++) {           \
+            LANE(result, i) = name(__VA_ARGS__);    \
+        }                                           \
+        return result;                              \
+    }
+EACH_LANE(sin, (real x), LANE(x, i))
+EACH_LANE(cos, (real x), LANE(x, i))
+EACH_LANE(atan2, (real y, real x), LANE(y, i), LANE(x, i))
+EACH_LANE(pow, (real x, real y), LANE(x, i), LANE(y, i))
+
+#define fabs __builtin_elementwise_abs
+#define sqrt __builtin_elementwise_sqrt
+#define floor __builtin_elementwise_floor
+#define fmin lanes_fmin
+#define fmax lanes_fmax
+#define sin lanes_sin
+#define cos lanes_cos
+#define atan2 lanes_atan2
+#define pow lanes_pow
+#endif
+
+#endif
