@@ -7,46 +7,32 @@
 
 #include "step.c"
 
-struct lone {
-    double at[N_VARIABLES], heading;
+typedef struct {
+    lone own; /* the first member, so a pointer to it is one to the whole */
     model_numbers numbers;
     delay_line line;
-};
+} whole;
 
-/* Return memory for vehicles, or NULL. free() releases it. */
-lone *lone_new(int count)
+/* Return memory for a vehicle, or NULL. free() releases it. */
+lone *lone_new(void)
 {
-    return (lone *)calloc((size_t)count, sizeof(lone));
-}
-
-lone *lone_of(lone *all, int i)
-{
-    return all + i;
-}
-
-double *lone_variables(lone *v)
-{
-    return v->at;
-}
-
-double *lone_heading(lone *v)
-{
-    return &v->heading;
+    return (lone *)calloc(1, sizeof(whole));
 }
 
 /* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
  * differ by whole turns, the one nearest to psi_0 is taken. */
 void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 {
+    whole *const all = (whole *)v;
     double state[N_STATES];
-    memset(v, 0, sizeof *v);
+    memset(all, 0, sizeof *all);
     for (int i = 0; i < FIRST_CALCULATED; i++) {
         v->at[i] = number(&given[i], vehicle, 0);
     }
     for (int i = FIRST_COEFFICIENT; i < N_VARIABLES; i++) {
         v->at[i] = number(&given[i], vehicle, 0);
     }
-    model_prepare(v->at, &v->numbers);
+    model_prepare(v->at, &all->numbers);
     memcpy(state, v->at + FIRST_STATE, sizeof state);
     model_begin(v->at, &v->heading);
     if (HAS_ATTITUDE && model_has_direction(state)) {
@@ -59,7 +45,8 @@ void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 bool lone_waits(const lone *v)
 {
 #if HAS_DEAD_TIME
-    return v->line.waiting > 0 || delay_differs(&v->line, v->at);
+    const delay_line *const line = &((const whole *)v)->line;
+    return line->waiting > 0 || delay_differs(line, v->at);
 #else
     (void)v;
     return false;
@@ -69,35 +56,37 @@ bool lone_waits(const lone *v)
 /* Step over h seconds from time t. Return false when the motion cannot be computed. */
 bool lone_step(lone *v, double t, double h)
 {
+    whole *const all = (whole *)v;
     double next[N_STATES];
-    const int pieces = delayed_step(v->at, &v->numbers, &v->line, t, h, next, &v->heading);
+    const int pieces = delayed_step(v->at, &all->numbers, &all->line, t, h, next, &v->heading);
     if (pieces <= 0 || !all_finite(next, N_STATES)) {
         return false;
     }
     memcpy(v->at + FIRST_STATE, next, sizeof next);
-    delay_commit(v->at, &v->line, t, h);
+    delay_commit(v->at, &all->line, t, h);
     return true;
 }
 
 void simulate(SIMULATION)
 {
     const bool calculates = is_calculated(recorded, records);
-    lone v;
+    whole all;
+    lone *const v = &all.own;
     for (ptrdiff_t vehicle = first; vehicle < last; vehicle++) {
-        lone_begin(&v, given, vehicle);
+        lone_begin(v, given, vehicle);
         failed[vehicle] = times;
         for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
             for (int i = 0; i < N_INPUTS; i++) {
-                v.at[i] = number(&given[i], vehicle, n);
+                v->at[i] = number(&given[i], vehicle, n);
             }
             if (calculates) {
-                model_calculate(v.at, &v.numbers, v.heading);
+                model_calculate(v->at, &all.numbers, v->heading);
             }
             double *to = result + vehicle * times + n;
             for (ptrdiff_t k = 0; k < records; k++) {
-                to[k * vehicles * times] = v.at[recorded[k]];
+                to[k * vehicles * times] = v->at[recorded[k]];
             }
-            if (n + 1 < times && !lone_step(&v, time[n], time[n + 1] - time[n])) {
+            if (n + 1 < times && !lone_step(v, time[n], time[n + 1] - time[n])) {
                 failed[vehicle] = n + 1;
                 break;
             }

@@ -48,13 +48,12 @@ static inline bool is_calculated(const int *recorded, ptrdiff_t records)
 EXPORT void simulate(SIMULATION);
 EXPORT int simulate_in_lanes(SIMULATION);
 
-/* A vehicle that is stepped alone. lanes.c does not know its type, whose numbers are vectors there. */
-typedef struct lone lone;
+/* A vehicle that is stepped alone. engine.c knows more of it, whose numbers would be vectors in lanes.c. */
+typedef struct {
+    double at[N_VARIABLES], heading;
+} lone;
 
-lone *lone_new(int count);
-lone *lone_of(lone *all, int i);
-double *lone_variables(lone *v);
-double *lone_heading(lone *v);
+lone *lone_new(void);
 void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
 bool lone_waits(const lone *v);
 bool lone_step(lone *v, double t, double h);

@@ -42,27 +42,26 @@ static void begin_in_lane(block *b, int i, const table given[N_VARIABLES], ptrdi
     own->pause = own->longest = 0;
     lone_begin(own->alone, given, vehicle);
     for (int k = 0; k < N_VARIABLES; k++) {
-        LANE(b->at[k], i) = lone_variables(own->alone)[k];
+        LANE(b->at[k], i) = own->alone->at[k];
     }
-    LANE(b->heading, i) = *lone_heading(own->alone);
+    LANE(b->heading, i) = own->alone->heading;
 }
 
 /* Step the vehicle of a lane alone. Return false when its motion cannot be computed. */
 static bool step_alone(block *b, int i, double t, double h)
 {
-    lane *const own = &b->lanes[i];
-    double *const at = lone_variables(own->alone);
+    lone *const alone = b->lanes[i].alone;
     for (int k = 0; k < FIRST_CALCULATED; k++) {
-        at[k] = LANE(b->at[k], i);
+        alone->at[k] = LANE(b->at[k], i);
     }
-    *lone_heading(own->alone) = LANE(b->heading, i);
-    if (!lone_step(own->alone, t, h)) {
+    alone->heading = LANE(b->heading, i);
+    if (!lone_step(alone, t, h)) {
         return false;
     }
     for (int k = FIRST_STATE; k < FIRST_COEFFICIENT; k++) {
-        LANE(b->at[k], i) = at[k];
+        LANE(b->at[k], i) = alone->at[k];
     }
-    LANE(b->heading, i) = *lone_heading(own->alone);
+    LANE(b->heading, i) = alone->heading;
     return true;
 }
 
@@ -70,10 +69,8 @@ static bool step_alone(block *b, int i, double t, double h)
 static bool is_alone(block *b, int i)
 {
     lane *const own = &b->lanes[i];
-    if (HAS_DEAD_TIME) {
-        for (int k = 0; k < N_COMMANDS; k++) {
-            lone_variables(own->alone)[k] = LANE(b->at[k], i);
-        }
+    for (int k = 0; HAS_DEAD_TIME && k < N_COMMANDS; k++) {
+        own->alone->at[k] = LANE(b->at[k], i);
     }
     return own->pause > 0 || lone_waits(own->alone);
 }
@@ -97,33 +94,35 @@ static mask step_together(block *b, real h, mask alone)
 int simulate_in_lanes(SIMULATION)
 {
     const bool calculates = is_calculated(recorded, records);
-    lone *const alone = lone_new(LANES);
     ptrdiff_t waiting = first;
+    int memory = 1, busy = 1;
     block b;
-    if (alone == NULL) {
-        return 0;
-    }
     memset(&b, 0, sizeof b);
     for (int i = 0; i < LANES; i++) {
         b.lanes[i].vehicle = -1;
-        b.lanes[i].alone = lone_of(alone, i);
+        b.lanes[i].alone = lone_new();
+        memory &= b.lanes[i].alone != NULL;
     }
-    for (int busy = 1; busy > 0 && *stop == 0;) {
+    while (memory && busy > 0 && *stop == 0) {
         mask apart = YES;
         real h = 1.0;
+        bool begins = false;
         busy = 0;
         for (int i = 0; i < LANES; i++) {
             lane *const own = &b.lanes[i];
             if (own->vehicle < 0 && waiting < last) {
                 failed[waiting] = times;
                 begin_in_lane(&b, i, given, waiting++);
-                model_prepare(b.at, &b.numbers);
+                begins = true;
             }
             for (int k = 0; k < N_INPUTS && own->vehicle >= 0; k++) {
                 if (given[k].per_time != 0) {
                     LANE(b.at[k], i) = number(&given[k], own->vehicle, own->n);
                 }
             }
+        }
+        if (begins) {
+            model_prepare(b.at, &b.numbers);
         }
         if (calculates) {
             model_calculate(b.at, &b.numbers, b.heading);
@@ -164,6 +163,8 @@ int simulate_in_lanes(SIMULATION)
             own->n++;
         }
     }
-    free(alone);
-    return 1;
+    for (int i = 0; i < LANES; i++) {
+        free(b.lanes[i].alone);
+    }
+    return memory;
 }
