@@ -1,96 +1,95 @@
-/* Simulation for Python (rov_fmu/c/): many vehicles of the same layout, all at the same times. */
-#include <stddef.h>
+/* Simulation for Python, one vehicle after the other, with the bits of the FMU. */
+#include <stdlib.h>
 
-#include "model.h"
+#include "engine.h"
 
 #include "series.c"
 
 #include "step.c"
 
-#if defined _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-
-/* A table of numbers by vehicle and time, with its strides. A stride is 0 when the numbers do not depend on that index. */
 typedef struct {
-    const double *at;
-    ptrdiff_t per_vehicle, per_time;
-} table;
+    lone own; /* the first member, so a pointer to it is one to the whole */
+    model_numbers numbers;
+    delay_line line;
+} whole;
 
-EXPORT void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
-                     ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,
-                     const volatile int *stop);
-
-static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
+/* Return memory for a vehicle, or NULL. free() releases it. */
+lone *lone_new(void)
 {
-    return t->at[vehicle * t->per_vehicle + time * t->per_time];
+    return (lone *)calloc(1, sizeof(whole));
 }
 
 /* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
  * differ by whole turns, the one nearest to psi_0 is taken. */
-static void begin(double at[], double *heading)
+void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 {
+    whole *const all = (whole *)v;
     double state[N_STATES];
-    const bool is_given = HAS_ATTITUDE && model_has_direction(at + FIRST_STATE);
-    memcpy(state, at + FIRST_STATE, sizeof state);
-    model_begin(at, heading);
-    if (is_given) {
-        memcpy(at + FIRST_STATE, state, sizeof state);
-        *heading = model_heading(at, *heading);
+    memset(all, 0, sizeof *all);
+    for (int i = 0; i < FIRST_CALCULATED; i++) {
+        v->at[i] = number(&given[i], vehicle, 0);
+    }
+    for (int i = FIRST_COEFFICIENT; i < N_VARIABLES; i++) {
+        v->at[i] = number(&given[i], vehicle, 0);
+    }
+    model_prepare(v->at, &all->numbers);
+    memcpy(state, v->at + FIRST_STATE, sizeof state);
+    model_begin(v->at, &v->heading);
+    if (HAS_ATTITUDE && model_has_direction(state)) {
+        memcpy(v->at + FIRST_STATE, state, sizeof state);
+        v->heading = model_heading(v->at, v->heading);
     }
 }
 
-/* Simulate the vehicles from `first` to `last` - 1. The simulation ends early when *stop becomes nonzero.
- *
- * `given` has one table for each variable, at its place. Inputs are held from each time to the next. Of states and
- * parameters, only the number at the first time counts. `recorded` has the places of the variables to record. They are
- * written to result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be
- * computed, or `times`. From that time on, nothing is recorded. */
-void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
-              ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,
-              const volatile int *stop)
+/* Return true when changes of the commands wait for the dead time, so that the next step may have several parts. */
+bool lone_waits(const lone *v)
 {
-    bool calculates = false;
-    for (ptrdiff_t k = 0; k < records; k++) {
-        calculates |= recorded[k] >= FIRST_CALCULATED && recorded[k] < FIRST_COEFFICIENT;
+#if HAS_DEAD_TIME
+    const delay_line *const line = &((const whole *)v)->line;
+    return line->waiting > 0 || delay_differs(line, v->at);
+#else
+    (void)v;
+    return false;
+#endif
+}
+
+/* Step over h seconds from time t. Return false when the motion cannot be computed. */
+bool lone_step(lone *v, double t, double h)
+{
+    whole *const all = (whole *)v;
+    double next[N_STATES];
+    const int pieces = delayed_step(v->at, &all->numbers, &all->line, t, h, next, &v->heading);
+    if (pieces <= 0 || !all_finite(next, N_STATES)) {
+        return false;
     }
+    memcpy(v->at + FIRST_STATE, next, sizeof next);
+    delay_commit(v->at, &all->line, t, h);
+    return true;
+}
+
+void simulate(SIMULATION)
+{
+    const bool calculates = is_calculated(recorded, records);
+    whole all;
+    lone *const v = &all.own;
     for (ptrdiff_t vehicle = first; vehicle < last; vehicle++) {
-        double at[N_VARIABLES] = {0.0}, next[N_STATES], heading = 0.0;
-        delay_line line;
-        model_numbers numbers;
-        memset(&line, 0, sizeof line);
-        for (int i = 0; i < FIRST_CALCULATED; i++) {
-            at[i] = number(&given[i], vehicle, 0);
-        }
-        for (int i = FIRST_COEFFICIENT; i < N_VARIABLES; i++) {
-            at[i] = number(&given[i], vehicle, 0);
-        }
-        model_prepare(at, &numbers);
-        begin(at, &heading);
+        lone_begin(v, given, vehicle);
         failed[vehicle] = times;
         for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
             for (int i = 0; i < N_INPUTS; i++) {
-                at[i] = number(&given[i], vehicle, n);
+                v->at[i] = number(&given[i], vehicle, n);
             }
             if (calculates) {
-                model_calculate(at, &numbers, heading);
+                model_calculate(v->at, &all.numbers, v->heading);
             }
             double *to = result + vehicle * times + n;
             for (ptrdiff_t k = 0; k < records; k++) {
-                to[k * vehicles * times] = at[recorded[k]];
+                to[k * vehicles * times] = v->at[recorded[k]];
             }
-            if (n + 1 == times) {
-                break;
-            }
-            const int pieces = delayed_step(at, &numbers, &line, time[n], time[n + 1] - time[n], next, &heading);
-            if (pieces <= 0 || !all_finite(next, N_STATES)) {
+            if (n + 1 < times && !lone_step(v, time[n], time[n + 1] - time[n])) {
                 failed[vehicle] = n + 1;
                 break;
             }
-            memcpy(at + FIRST_STATE, next, sizeof next);
-            delay_commit(at, &line, time[n], time[n + 1] - time[n]);
         }
     }
 }

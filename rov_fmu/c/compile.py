@@ -27,8 +27,10 @@ C_SOURCES = FMU_SRC / "c"
 UNITY_FILE = "fmu.c"
 MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
+ENGINE_HEADER = FMU_SRC / "engine" / "engine.h"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
 FILTER_FILE = FMU_SRC / "engine" / "filter.c"
+LANES_FILE = FMU_SRC / "engine" / "lanes.c"
 _LOCATION_FILE = FMU_SRC / "python" / "location.c"
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """The name by which PythonFMU's library for Linux knows itself."""
@@ -197,11 +199,18 @@ def compile_location(pythonfmu: bytes) -> bytes:
 
 
 def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
-    """Return the compiler's arguments for a file of the engine: those of the FMU, so the numbers are the same."""
+    """Return the compiler's arguments for a file of the engine: those of the FMU, so the numbers are the same.
+
+    The file that computes many vehicles in the lanes of a vector is compiled together with the engine, for the widest
+    vectors of this processor. The compiler warns wrongly about conditions that are vectors (-Wno-conversion).
+    """
     name = host_platform(fmi=3)
-    target = ["-target", PLATFORMS[name].target] if name else ["-mcpu=baseline"]
+    in_lanes = file == LANES_FILE.name
+    target = ["-target", PLATFORMS[name].target] if name else []
+    processor = ["-mcpu=native", "-Wno-conversion"] if in_lanes else [] if name else ["-mcpu=baseline"]
     libraries = PLATFORMS[name].flags if name else ("-lm",)
-    return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, "-Wno-unused-function", file, *libraries]
+    files = [file, ENGINE_FILE.name] if in_lanes else [file]
+    return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, *processor, "-Wno-unused-function", *files, *libraries]
 
 
 def compile_engine(sources: Mapping[str, str]) -> bytes:

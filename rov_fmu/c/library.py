@@ -12,7 +12,15 @@ from threading import Lock
 
 from platformdirs import user_cache_path
 
-from rov_fmu.c.compile import ENGINE_FILE, BuildError, compile_engine, engine_flags
+from rov_fmu.c.compile import (
+    ENGINE_FILE,
+    ENGINE_HEADER,
+    FILTER_FILE,
+    LANES_FILE,
+    BuildError,
+    compile_engine,
+    engine_flags,
+)
 from rov_fmu.c.source import sources
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
@@ -31,7 +39,8 @@ def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     key = f"{file.name} {vehicle.layout!r}"
     with _LOADING:
         if key not in _LOADED:
-            texts = {**sources(vehicle.layout), file.name: file.read_text(encoding="utf-8")}
+            files = [file] if file == FILTER_FILE else [ENGINE_HEADER, ENGINE_FILE, file]
+            texts = sources(vehicle.layout) | {path.name: path.read_text(encoding="utf-8") for path in files}
             try:
                 _LOADED[key] = _load(texts)
             except OSError as error:
@@ -60,9 +69,19 @@ def _key(texts: dict[str, str]) -> str:
         compiler = version("ziglang")
     except PackageNotFoundError:
         compiler = ""  # the compiler is not installed as a package
+    *_, file = texts
     machine = sys.platform, platform.machine(), ctypes.sizeof(ctypes.c_void_p)
-    inputs = json.dumps([texts, engine_flags(), compiler, machine], sort_keys=True)
+    processor = _processor() if file == LANES_FILE.name else ""
+    inputs = json.dumps([texts, engine_flags(file), compiler, machine, processor], sort_keys=True)
     return hashlib.sha256(inputs.encode()).hexdigest()[:32]
+
+
+def _processor() -> str:
+    """Return what this processor can do, because vectors as wide as its own are used."""
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next((line for line in lines if line.startswith(("flags", "Features"))), "")
+    return platform.processor()
 
 
 def _find(folder: Path, key: str) -> Path | None:

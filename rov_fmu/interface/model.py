@@ -125,6 +125,7 @@ class VehicleModel(Vehicle):
         coefficients: Mapping[str, Any] = _NONE,
         record: str | Sequence[str] | None = None,
         workers: int | None = None,
+        lanes: bool = False,
     ) -> Result:
         """Simulate many variations of the vehicle at once, on all cores.
 
@@ -135,13 +136,18 @@ class VehicleModel(Vehicle):
 
         `workers` is the number of threads; the default is the number of usable cores. The results do not depend on it.
 
+        By default the results have the bits of the FMU. With `lanes=True`, the vectors of the processor step two to
+        eight vehicles at once. This takes a third to two thirds of the time for steps of up to about 0.1 s, and the
+        results differ from the default by rounding errors: by less than 1e-12 of the scale of each variable. The first
+        such simulation of a kind of vehicle compiles an engine of its own.
+
         The arrays of the result have the shape (vehicles, times). Where the motion of a vehicle cannot be computed, its
         values are NaN from there on, and `result.failed` has its number.
 
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
         workers = checked_workers(workers) or usable_cores()
-        return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True)
+        return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True, lanes=lanes)
 
     def to_mcap(self, result: "Result | pd.DataFrame") -> bytes:
         """Return a simulation of this vehicle as the content of an MCAP file, for Foxglove and PlotJuggler.
@@ -220,6 +226,7 @@ class VehicleModel(Vehicle):
         *,
         workers: int,
         many: bool,
+        lanes: bool = False,
     ) -> Result:
         layout = self.layout
         check_coefficients(layout, self.coefficients)  # `dataclasses.replace` does not check them
@@ -237,7 +244,7 @@ class VehicleModel(Vehicle):
             attitude = QUATERNION if layout.has_attitude else ()
             others = (*attitude, *(() if many else layout.commands))
             recording = [*recorded, *(name for name in others if name not in recorded)]
-            found = simulate(self, commands.time, values, recording, vehicles=vehicles, workers=workers)
+            found = simulate(self, commands.time, values, recording, vehicles=vehicles, workers=workers, lanes=lanes)
         except MemoryError as error:
             size = 8e-9 * vehicles * len(commands.time) * len(recorded)
             raise InputError(

@@ -158,6 +158,9 @@ def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:
         assert {name: values.tolist() for name, values in one.items()} == {
             name: values[n].tolist() for name, values in many.items()
         }
+    lanes = videoray.simulate_many(TIMES, inputs, start={"u": start, "z": 2}, coefficients={"a_d_u": drag}, lanes=True)
+    for name, values in many.items():
+        np.testing.assert_allclose(lanes[name], values, rtol=1e-12, atol=1e-14)
 
 
 def test_a_simulation_goes_on_where_another_one_ended(videoray: VehicleModel) -> None:

@@ -211,3 +211,24 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
     times_ours = next(line.split()[4] for line in printed.splitlines() if line.startswith("CVODE BDF  "))
     assert float(times_ours) > 10.0, printed
     assert etree.parse(str(picture)).getroot().tag.endswith("svg")
+
+
+def test_many_vehicles_are_measured_in_each_way(vehicle: Vehicle) -> None:
+    found = taylor.many_vehicles(vehicle, 1.0, 2)
+    ways = {taylor.OURS, taylor.LANES, taylor.TURNING, *(taylor.BATCHES if taylor.installed() else ())}
+    assert {way: len(costs) for way, costs in found.seconds.items()} == dict.fromkeys(ways, 2)
+    assert all(costs.min() > 0.0 for costs in found.seconds.values())
+    headings, *rows = sections.many(vehicle.name, [found], 0.8)
+    assert headings[1:] == ["1 s"]
+    assert [row[0] for row in rows[:3]] == [taylor.OURS, taylor.LANES, taylor.TURNING]
+    assert float(rows[-1][1]) == pytest.approx(found.ratio(taylor.LANES, [taylor.OURS]), rel=0.01)
+
+
+@pytest.mark.skipif(not taylor.installed(), reason="heyoka is not installed")
+@pytest.mark.parametrize("size", taylor.BATCHES.values())
+def test_heyoka_takes_at_least_the_steps_that_were_asked_for(vehicle: Vehicle, size: int) -> None:
+    commands, start = np.full((8, 3), 0.4), np.zeros((8, len(vehicle.layout.state)))
+    seconds, taken, finite = taylor.Fleet(vehicle, commands, start).step(size, 0.01, 20)
+    assert seconds > 0.0
+    assert taken >= 1.0
+    assert finite

@@ -2,13 +2,14 @@
 
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
 import fmpy
 from rich.console import Console
+from rich.status import Status
 
 from rov_fmu.build import build
 from rov_fmu.c.compile import BuildError, host_platform
@@ -23,6 +24,7 @@ from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import HeavyPlan, Measured, Plan, TaylorPlan
 from .studies import Study
+from .taylor import STEPS, many_vehicles
 from .work import Work
 
 
@@ -46,6 +48,8 @@ A cell's second number is the error at the end of a held command against 50 digi
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
 fmi3SetFloat64.
 """
+_FLEETS = {0.8: load_vehicle(VIDEORAY), 1.0: load_vehicle(SHIPPED["bluerov2_heavy"])}
+"""Vehicles by the promised ratio of the cost of many of them to that of heyoka's best batches."""
 _QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, (200, 100, 400), all_platforms=False)
 
 
@@ -70,9 +74,8 @@ def _command(quick: bool, picture_file: Path | None) -> None:
 
 
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
-    vehicle = load_vehicle(VIDEORAY)
-    rov, say = vehicle, Console(stderr=True).status
-    plain_c = PlainC(vehicle, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
+    rov, say = load_vehicle(VIDEORAY), Console(stderr=True).status
+    plain_c = PlainC(rov, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
     if plain_c:
         with say("steps in plain C"):
             plan = Plan(rov, effort.commands, effort.known)
@@ -91,9 +94,10 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
             yield sections.taylor(series, measured_series := Measured(plain_c, series.jobs, effort.repetitions))
     else:
         yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
+    yield from _many(effort, say)
     with say("building"):
         native, python = folder / "native.fmu", folder / "python.fmu"
-        build(vehicle, python, backend="pythonfmu")
+        build(rov, python, backend="pythonfmu")
         builds = {"for this machine": archive.build(native, ["host"])}
         if effort.all_platforms:
             builds["for all platforms"] = archive.build(folder / "all.fmu", [])
@@ -120,6 +124,12 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
     yield from sections.archive(builds, loaded)
     if plain_c:
         yield sections.promises(plan, measured, heavier, measured_heavy, series, measured_series)
+
+
+def _many(effort: Effort, say: Callable[[str], Status]) -> Iterator[Section]:
+    for limit, rov in _FLEETS.items():
+        with say(f"many of {rov.name}"):
+            yield sections.many(rov.name, [many_vehicles(rov, h, effort.repetitions) for h in STEPS], limit)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,7 +10,7 @@ from .page import Section, digits, duration, error
 from .plain_c import ADAMS, BDF, CORE, EULER, FMU, FMU_3, FMU_3_SET, FMU_SET, HEYOKA, RK4, Reals
 from .steps import METHODS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, TaylorPlan, compared
 from .studies import Cost, overhead
-from .taylor import NOT_INSTALLED
+from .taylor import BATCHES, LANES, NOT_INSTALLED, OURS, Many
 
 _STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
 _OURS = {FMU: "ours, fmi2DoStep", CORE: "ours, without FMI"}
@@ -69,6 +69,31 @@ def taylor(plan: TaylorPlan, measured: Measured) -> Section:
         return [*section, [f"heyoka: {NOT_INSTALLED}"]]
     ratios = (digits(_ratio(measured, plan.rows[HEYOKA][h], plan.rows[CORE][h])) for h in H)
     return [*section, ["heyoka / ours", *ratios]]
+
+
+def many(name: str, found: Sequence[Many], limit: float) -> Section:
+    """Return the cost of many vehicles that are stepped together, and the ratio to the best of heyoka's batches.
+
+    At 10 ms the promised ratio is at most `limit`.
+    """
+    section = [[f"Many of {name}, one core, each and step", *(f"{one.h:g} s" for one in found)]]
+    for way in found[0].seconds:
+        cells = [duration(float(np.median(one.seconds[way]))) for one in found]
+        if way in found[0].taken:
+            steps = (one.taken[way] for one in found)
+            cells = [
+                f"{cell}  {f'{n:.3g} steps' if np.isfinite(n) else 'not finite'}"
+                for cell, n in zip(cells, steps, strict=True)
+            ]
+        section.append([way, *cells])
+    if set(BATCHES) <= set(found[0].seconds):
+        section.append(
+            [
+                f"lanes / best of heyoka, promised ≤ {limit:g} at 0.01 s",
+                *(digits(one.ratio(LANES, BATCHES)) for one in found),
+            ]
+        )
+    return [*section, ["lanes / one after the other", *(digits(one.ratio(LANES, [OURS])) for one in found)]]
 
 
 def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:

@@ -6,12 +6,17 @@ commands must not turn any velocity back. It computes no thrust and looks for no
 """
 
 import time
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.expression import Expression, compiled
 from rov_fmu.equation.terms import ONE, Term, equation_of
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -47,8 +52,9 @@ class Heyoka:
             first = heyoka.expression(_value(term.coefficient, {})) if coefficient is None else coefficient
             return heyoka.prod([first, *(symbols[name] for name in term.factors)])
 
-        system = [(symbols[name], heyoka.sum([product(term) for term in terms])) for name, terms in rows.items()]
-        self._integrator = heyoka.taylor_adaptive(system, np.zeros(len(rows)), pars=np.zeros(len(self._parameters)))
+        self._system = [(symbols[name], heyoka.sum([product(term) for term in terms])) for name, terms in rows.items()]
+        start, parameters = np.zeros(len(rows)), np.zeros(len(self._parameters))
+        self._integrator = heyoka.taylor_adaptive(self._system, start, pars=parameters)
 
     def hold(self, h: float, steps: int, commands: Reals, start: Reals) -> tuple[float, Reals]:
         """Hold commands one after the other, each for `steps` steps of h. Return seconds per step, and the final state.
@@ -68,6 +74,21 @@ class Heyoka:
             assert taken >= steps
             end = self._end(at, integrator.state)
         return 1e-9 * seconds / (len(commands) * steps), end
+
+    @cache  # noqa: B019 - heyoka compiles for seconds, and few of these objects are made
+    def integrator(self, size: int) -> Any:
+        """Return the integrator of `size` vehicles at once; that of one is the scalar one."""
+        import heyoka
+
+        if size == 1:
+            return self._integrator
+        start, parameters = np.zeros((len(self._system), size)), np.zeros((len(self._parameters), size))
+        return heyoka.taylor_adaptive_batch(self._system, start, pars=parameters)
+
+    def begun(self, command: Reals, state: Reals) -> tuple[list[float], list[float]]:
+        """Return the states of the equation and the parameters with which a held command begins at a state."""
+        at = self._at(command, state)
+        return self._initial(at), [_value(formula, at) for formula in self._parameters]
 
     def _initial(self, at: dict[str, float]) -> list[float]:
         return [at.get(name, 0.0) for name in self._equation.states]
@@ -92,3 +113,92 @@ class Heyoka:
             is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"constant_{v}"] < 0.0)
             at[name] = _value(directed.reverse if is_reverse else directed.forward, at)
         return at
+
+
+class Fleet:
+    """Vehicles in heyoka, each at its own state with commands of its own."""
+
+    def __init__(self, rov: Vehicle, commands: Reals, starts: Reals) -> None:
+        self._series = Heyoka(rov)
+        begun = [self._series.begun(*both) for both in zip(commands, starts, strict=True)]
+        self._states, self._parameters = (np.array(part) for part in zip(*begun, strict=True))
+
+    def step(self, size: int, h: float, steps: int) -> tuple[float, float, bool]:
+        """Step `size` vehicles at once; 1 is the scalar integrator.
+
+        Return the seconds and the steps that heyoka took, each per vehicle and step of h, and whether the states
+        remained finite.
+        """
+        integrator = self._series.integrator(size)
+        seconds, taken, finite = 0, 0, True
+        for first in range(0, len(self._states), size):
+            states, parameters = (each[first : first + size].T for each in (self._states, self._parameters))
+            began = time.thread_time_ns()
+            if size == 1:
+                integrator.time = 0.0
+                integrator.state[:], integrator.pars[:] = states[:, 0], parameters[:, 0]
+                taken += integrator.propagate_for(h * steps, max_delta_t=h)[3]
+            else:
+                integrator.set_time(0.0)
+                integrator.state[:], integrator.pars[:] = states, parameters
+                integrator.propagate_for([h * steps] * size, max_delta_t=[h] * size)
+                taken += sum(result[3] for result in integrator.propagate_res)
+            seconds += time.thread_time_ns() - began
+            finite &= bool(np.isfinite(integrator.state).all())
+        per_step = len(self._states) * steps
+        return 1e-9 * seconds / per_step, taken / per_step, finite
+
+
+VEHICLES = 256
+"""The number of vehicles that are stepped together. It is a multiple of the sizes of heyoka's batches."""
+STEPS = {0.001: 300, 0.01: 100, 1.0: 10}
+"""The steps of each length, s. With lag, heyoka leaves the finite numbers when the thrust has arrived."""
+OURS, LANES, TURNING = "simulate_many", "simulate_many(lanes=True)", "lanes=True, commands that reverse"
+BATCHES = {"heyoka": 1, "heyoka, batches of 4": 4, "heyoka, batches of 8": 8}
+
+
+@dataclass(frozen=True)
+class Many:
+    """What many vehicles cost with steps of one length."""
+
+    h: float
+    seconds: Mapping[str, Reals]
+    """For each way to step them, the seconds per vehicle and step in each repetition."""
+    taken: Mapping[str, float]
+    """The steps that heyoka took for one of h, or NaN where its states did not remain finite."""
+
+    def ratio(self, way: str, others: Iterable[str]) -> float:
+        """Return the median of the ratio of the seconds to those of another way, of that with the smallest median."""
+        best = min((self.seconds[other] for other in others), key=lambda seconds: float(np.median(seconds)))
+        return float(np.median(self.seconds[way] / best))
+
+
+def many_vehicles(rov: Vehicle, h: float, repetitions: int) -> Many:
+    """Step vehicles that hold commands of their own, in turn by each way on one core.
+
+    They have moved for 1 s with their commands before, so no velocity turns back in what is measured. simulate_many
+    computes the thrust, looks for reversals, and records all states after each step, which heyoka does not. In a run of
+    their own, which heyoka cannot make, all commands change at random to and fro, each second or at each longer step.
+    """
+    commands = np.random.default_rng(48).uniform(0.2, 0.6, (VEHICLES, len(rov.layout.commands)))
+    steps, layout = STEPS[h], rov.layout
+    inputs: dict[str, Reals] = {name: commands[:, [n]] for n, name in enumerate(layout.commands)}
+    starts = simulate(rov, [0.0, 1.0], inputs, vehicles=VEHICLES).values[:, :, -1].T
+    values = inputs | {name: starts[:, [n]] for n, name in enumerate(layout.state)}
+    times = h * np.arange(steps + 1)
+    held = max(1, round(1.0 / h))
+    changes = np.random.default_rng(49).uniform(-0.6, 0.6, (len(commands.T), VEHICLES, steps // held + 1))
+    turning = values | dict(zip(inputs, np.repeat(changes, held, axis=2)[..., : steps + 1], strict=True))
+    seconds, taken = defaultdict(list), {}
+    heyoka = Fleet(rov, commands, starts) if installed() else None
+    for _ in range(repetitions + 1):  # the first one is not counted: it compiles
+        for way, given in {OURS: values, LANES: values, TURNING: turning}.items():
+            began = time.process_time_ns()
+            simulate(rov, times, given, vehicles=VEHICLES, workers=1, lanes=way != OURS)
+            seconds[way].append(1e-9 * (time.process_time_ns() - began) / (VEHICLES * steps))
+        if heyoka:
+            for way, size in BATCHES.items():
+                cost, count, finite = heyoka.step(size, h, steps)
+                seconds[way].append(cost)
+                taken[way] = count if finite else np.nan
+    return Many(h, {way: np.array(costs[1:]) for way, costs in seconds.items()}, taken)

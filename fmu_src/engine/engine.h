@@ -1,0 +1,61 @@
+/* Simulation for Python (rov_fmu/c/): many vehicles of the same layout, all at the same times. engine.c steps one vehicle after
+ * the other, and lanes.c many at once. */
+#ifndef ENGINE_H
+#define ENGINE_H
+
+#include <stddef.h>
+
+#include "model.h"
+
+#if defined _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+/* A table of numbers by vehicle and time, with its strides. A stride is 0 when the numbers do not depend on that index. */
+typedef struct {
+    const double *at;
+    ptrdiff_t per_vehicle, per_time;
+} table;
+
+static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
+{
+    return t->at[vehicle * t->per_vehicle + time * t->per_time];
+}
+
+/* Return true when one of the recorded variables has to be calculated from the states. */
+static inline bool is_calculated(const int *recorded, ptrdiff_t records)
+{
+    bool calculates = false;
+    for (ptrdiff_t k = 0; k < records; k++) {
+        calculates |= recorded[k] >= FIRST_CALCULATED && recorded[k] < FIRST_COEFFICIENT;
+    }
+    return calculates;
+}
+
+/* The arguments of both ways to simulate the vehicles from `first` to `last` - 1. The simulation ends early when *stop becomes
+ * nonzero.
+ *
+ * `given` has one table for each variable, at its place. Inputs are held from each time to the next. Of states and
+ * parameters, only the number at the first time counts. `recorded` has the places of the variables to record. They are
+ * written to result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be
+ * computed, or `times`. From that time on, nothing is recorded. */
+#define SIMULATION                                                                                                         \
+    const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,           \
+        ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records, const volatile int *stop
+
+EXPORT void simulate(SIMULATION);
+EXPORT int simulate_in_lanes(SIMULATION);
+
+/* A vehicle that is stepped alone. engine.c knows more of it, whose numbers would be vectors in lanes.c. */
+typedef struct {
+    double at[N_VARIABLES], heading;
+} lone;
+
+lone *lone_new(void);
+void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
+bool lone_waits(const lone *v);
+bool lone_step(lone *v, double t, double h);
+
+#endif
