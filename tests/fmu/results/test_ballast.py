@@ -1,12 +1,14 @@
 """The mass, the ballast and their places change during a run: velocities go on, and an impossible mass is refused."""
 
 import struct
+from pathlib import Path
 from typing import Any
 
 import pytest
 from fmpy import read_model_description
 
-from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, OK, STEP, Fmu
+from tests import fmi3
+from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, OK, STEP, WITH_EVENTS, Fmu
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.fmu.calls.test_state_bytes import checksum
 from tests.vehicles import SIX, a_vehicle
@@ -45,6 +47,25 @@ def test_a_run_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(fmu: 
         assert rov.step(10.0, 10.0) == OK
         state = dict(zip(ROV.layout.state, rov.get([*ROV.layout.state]), strict=True))
         assert not [line for line in rov.log if "must not be set" in line.text]
+    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
+
+
+def test_ballast_changed_in_event_mode_is_the_rigid_body_restarted_there(six3_dir: Path, expected: list[float]) -> None:
+    with fmi3.Fmu(six3_dir).instance(WITH_EVENTS) as rov:
+        assert rov.set(INPUTS) == OK
+        rov.reach(STEP)
+        assert rov.step(0.0, 10.0) == OK
+        rov.expect("EnterEventMode")
+        velocities = rov.get([*ROV.layout.velocities])
+        assert rov.set(IMPOSSIBLE) == DISCARD
+        rov.log.clear()
+        assert rov.set(BALLAST) == OK
+        rov.update()
+        rov.expect("EnterStepMode")
+        assert rov.get([*ROV.layout.velocities]) == velocities
+        assert rov.step(10.0, 10.0) == OK
+        state = dict(zip(ROV.layout.state, rov.get([*ROV.layout.state]), strict=True))
+        assert rov.log == []
     assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
 
 
