@@ -44,7 +44,7 @@ _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number",
 def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
-    named = {"vehicle": "FileHead", "provenance": "Provenance", "estimated": "Estimated"}
+    named = {"vehicle": "FileHead", "estimated": "Estimated"}
     named |= {
         name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
     }
@@ -199,11 +199,12 @@ def _plan_table(of: type[Strict]) -> Table:
     schema, rows = json_schema(of), []
     for (key, entry), field in zip(schema["properties"].items(), of.model_fields.values(), strict=True):
         found = _resolved(entry, schema)
-        without = "needed" if field.is_required() else f"`{field.default}`" if field.default not in (None, {}) else ""
         keys = ", ".join(f"{inner} = ..." for inner in found.get("properties", ()))
-        allowed = f"`{{ {keys} }}`" if keys else _allowed(found)
-        rows.append((f"`{key}`", without, allowed, _words(found)))
-    return [("key", "without it", "allowed", "what"), ("---",) * 4, *rows]
+        parts = ["needed"] if field.is_required() else []
+        parts.append(f"`{{ {keys} }}`" if keys else _allowed(found))
+        parts += [f"default `{field.default}`"] if field.default not in (None, {}) and not field.is_required() else []
+        rows.append((f"`{key}`", ", ".join(parts), _words(found)))
+    return [_KEYS, ("---",) * 3, *rows]
 
 
 def _resolved(entry: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
