@@ -200,7 +200,9 @@ class VehicleModel(Vehicle):
         """Build the FMU of the vehicle. The arguments, the result and the errors are those of `rov_fmu.build.build`."""
         from rov_fmu.build import build
 
-        return build(self, output, platforms=platforms, backend=backend, fmi=fmi, interface=interface, osp=osp, sign=sign)
+        return build(
+            self, output, platforms=platforms, backend=backend, fmi=fmi, interface=interface, osp=osp, sign=sign
+        )
 
     def _simulated(
         self,
