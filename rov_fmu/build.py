@@ -16,6 +16,8 @@ from rov_fmu.c.compile import (
     host_platform,
 )
 from rov_fmu.fmu.archive import archive, native_content, python_content, web_module
+from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
+from rov_fmu.fmu.evidence.signature import private_key, signature_path, signed
 from rov_fmu.fmu.model_description import NATIVE
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
@@ -60,6 +62,7 @@ def build(
     fmi: int = 2,
     interface: str | None = None,
     osp: bool = False,
+    sign: Path | None = None,
     inputs: Sequence[Path] = (),
     on_content: Callable[[], None] = lambda: None,
     on_compiled: Callable[[str], None] = lambda _: None,
@@ -71,39 +74,30 @@ def build(
     `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the version of
     FMI, 2 or 3. `interface` names what the FMU offers: `cs` for Co-Simulation, `me` for Model Exchange, or `both`,
     which is the default; the FMU in pure Python has only `cs`. `osp` also writes <identifier>_OspModelDescription.xml
-    to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `inputs` are further files that must not be
+    to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `sign` is the file of a private key by Ed25519, which
+    signs the FMU in <output>.sig; it needs the extra `sign`. `inputs` are further files that must not be
     overwritten, like those that the vehicle names. `on_content` is called once the content is made and the compilers
     begin, and `on_compiled` with the name of each platform that has been compiled.
 
-    Raises InputError if `vehicle` is not a vehicle or its coefficients are invalid; OptionError if another argument
-    is; BuildError if the build fails; FileError if a file of the vehicle cannot be read, or if `output` does not end
-    with .fmu; WriteError, an OSError, if a path cannot be written.
+    Raises InputError if `vehicle` is not a vehicle, if its coefficients are invalid or if the extra is missing;
+    OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the
+    vehicle cannot be read, or if `output` does not end with .fmu; WriteError, an OSError, if a path cannot be written.
     """
     if not isinstance(vehicle, Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
     check_coefficients(vehicle.layout, vehicle.coefficients)
-    if backend not in BACKENDS:
-        raise OptionError(f"there is no backend {shown(backend)}, only {', '.join(BACKENDS)}")
+    _check_options(backend, fmi, interface, osp=osp)
     native = backend == "native"
-    if fmi not in NATIVE:
-        raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, NATIVE))}")
-    if fmi == 3 and not native:
-        raise OptionError("--fmi 3: PythonFMU makes FMI 2.0 alone")
-    if interface is not None and interface not in INTERFACES:
-        raise OptionError(f"there is no interface {shown(interface)}, only {', '.join(INTERFACES)}")
-    if not native and interface not in (None, "cs"):
-        raise OptionError(f"--interface {interface}: PythonFMU makes Co-Simulation (cs) alone")
-    if osp and interface == "me":
-        raise OptionError("--interface me: libcosim and the OSP tools, which --osp is for, run Co-Simulation alone")
     interface = interface or ("both" if native else "cs")
-    if fmi == 3 and osp:
-        raise OptionError("--fmi 3: libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone")
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{'.fmi3' if fmi == 3 else ''}.fmu")
     beside = []
     if osp:
         description = osp_model_description(vehicle.layout)
         beside = [Output(osp_path(output, vehicle.identifier), description)]
-    check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
+    key = private_key(sign) if sign else None
+    signature = [signature_path(output)] if key else []
+    used = [*inputs, *vehicle.files, *([sign] if sign else [])]
+    check_targets([output, *(other.path for other in beside), *signature], used)
     check_written(output, FMU)
     if output.suffix.lower() != ".fmu":
         raise FileError(f"{output}: the name must end with .fmu")
@@ -126,14 +120,35 @@ def build(
         for name, library in binaries.items()
     }
     files = {**content.files, **libraries}
+    files[META_DATA] = meta_data(vehicle, files)
     packed, lost = archive(files), sorted(_platforms_in(output) - _folders(files))
     checked: list[tuple[str, bool]] = []
+    if key:
+        beside.append(Output(signature_path(output), signed(packed, key)))
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen if native else None, fmi)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     written = [other.path for other in beside]
     note, was_run = checked[0]
     return Built(output, len(packed), content.guid, sizes, seconds, note, was_run, written, lost)
+
+
+def _check_options(backend: str, fmi: int, interface: str | None, *, osp: bool) -> None:
+    """Raise OptionError about the first option that is invalid or cannot be combined with another."""
+    if backend not in BACKENDS:
+        raise OptionError(f"there is no backend {shown(backend)}, only {', '.join(BACKENDS)}")
+    if fmi not in NATIVE:
+        raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, NATIVE))}")
+    if fmi == 3 and backend != "native":
+        raise OptionError("--fmi 3: PythonFMU makes FMI 2.0 alone")
+    if interface is not None and interface not in INTERFACES:
+        raise OptionError(f"there is no interface {shown(interface)}, only {', '.join(INTERFACES)}")
+    if backend != "native" and interface not in (None, "cs"):
+        raise OptionError(f"--interface {interface}: PythonFMU makes Co-Simulation (cs) alone")
+    if osp and interface == "me":
+        raise OptionError("--interface me: libcosim and the OSP tools, which --osp is for, run Co-Simulation alone")
+    if fmi == 3 and osp:
+        raise OptionError("--fmi 3: libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone")
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:

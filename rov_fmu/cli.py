@@ -204,6 +204,12 @@ def _commands(context: click.Context) -> None:
     is_flag=True,
     help="Also write <identifier>_OspModelDescription.xml beside the FMU (OSP-IS 1.0.1; FMI 2.0 only).",
 )
+@click.option(
+    "--sign",
+    type=_FILE,
+    metavar="KEY",
+    help="File of a private key (Ed25519, by ssh-keygen or in PEM) that signs the FMU. The signature is FILE.fmu.sig.",
+)
 def _build(
     vehicle: Path,
     output: Path | None,
@@ -212,6 +218,7 @@ def _build(
     interface: str | None,
     platforms: tuple[str, ...],
     osp: bool,
+    sign: Path | None,
 ) -> None:
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
@@ -232,6 +239,7 @@ def _build(
             fmi=fmi,
             interface=interface,
             osp=osp,
+            sign=sign,
             inputs=[vehicle],
             on_content=begin,
             on_compiled=done,
@@ -578,16 +586,28 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     default=60.0,
     help="Time that the FMU may take for each experiment. The default is 60 s.",
 )
-def _prove(fmu: Path, interface: str | None, tolerance: float | None, time_limit: float) -> None:
-    """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do."""
+@click.option(
+    "--key",
+    type=_FILE,
+    metavar="KEY.pub",
+    help="Public key that must have signed the FMU. Without it, any key may have.",
+)
+def _prove(fmu: Path, interface: str | None, tolerance: float | None, time_limit: float, key: Path | None) -> None:
+    """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do.
+
+    Before, the hashes in the FMU and the signature beside it are checked, if there are any.
+    """
     _refuse_vehicle(fmu, f"must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
+    from rov_fmu.fmu.evidence.check import check_evidence
     from rov_fmu.fmu.proof import prove
-    from rov_fmu.report.console import print_proof
+    from rov_fmu.report.console import print_evidence, print_proof
     from rov_fmu.report.progress import parts
 
+    evidence = check_evidence(fmu, key)
     with parts() as shown:
         findings = prove(fmu, interface, tolerance, time_limit, shown.begin("running the experiments"))
     print_proof(findings)
+    print_evidence(evidence)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
 

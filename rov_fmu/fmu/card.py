@@ -32,7 +32,7 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     ]
     if made:
         data.append(f"Identified from {vehicle.measured_from} by {made.tool}: {made.method}.")
-        data += [f"{name}: SHA-256 {digest}" for name, digest in made.inputs.items()]
+        data += [f"{name}: {made.hash} {digest}" for name, digest in made.inputs.items()]
         trust = [*made.verdicts, *(f"Unseen data: {error}." for error in made.errors)]
         trust += [f"Open: {warning}." for warning in made.warnings] or ["There are no warnings."]
         holds += [f"Tested: {quantity}." for quantity in made.tested]

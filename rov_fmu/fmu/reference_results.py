@@ -1,18 +1,22 @@
-"""Write the experiments and the expected results in an FMU. Their format is the layered standard FMI-LS-REF.
+"""Write the experiments, the expected results and the evidence in an FMU, in the form of the standard FMI-LS-REF.
 
 The experiments are a step of each axis from rest to its largest command, and a manoeuvre of all axes, which begins
 tilted if the vehicle rolls or pitches. If the vehicle has published tables, the steps are those of the tables, with and
 without its tuning. The expected results are computed in plain Python, and not with the C code that they prove.
+
+If coefficients have confidence intervals, further experiments repeat the manoeuvre at the ends of these intervals. They
+have no expected results, because they are there to show how uncertain the motion is.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, isfinite, sqrt
 
 from rov_fmu.equation.attitude import QUATERNION, start_formulas
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
 from rov_fmu.equation.expression import compiled
-from rov_fmu.fmu.experiments import FOLDER
+from rov_fmu.fmu.evidence.related import Related, ends_of_intervals, manifest, origin
+from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.io.messages import listed
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned
@@ -64,6 +68,8 @@ class _Experiment:
     """The variables that the expected results may contain."""
     parameters: tuple[str, Values] | None = None
     """The name and the values of the parameters that are set; None for those of the vehicle."""
+    like: str = ""
+    """The experiment whose stimuli it has. It then has no expected results."""
 
     @property
     def stop(self) -> float:
@@ -96,29 +102,72 @@ class _Experiment:
 
 
 def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
-    """Return the files by their path in the FMU. Raises DataFileError."""
-    experiments = [*_steps(vehicle), _manoeuvre(vehicle)]
-    sets = dict(one.parameters for one in experiments if one.parameters)
-    files = {
+    """Return the files of the standard's folder by their path in the FMU. Raises FileError."""
+    proofs = [*_steps(vehicle), _manoeuvre(vehicle)]
+    variants = _at_ends_of_intervals(vehicle, proofs[-1])
+    sets = dict(one.parameters for one in (*proofs, *variants) if one.parameters)
+    text = {
         f"{name}.ssv": render(
             "parameters.ssv.j2", name=name, values={key: repr(value) for key, value in values.items()}
         )
         for name, values in sets.items()
     }
-    for one in experiments:
-        files[f"{one.name}.csv"] = _csv(one.stimuli(), one.inputs)
-        files[f"{one.name}_expected.csv"] = _csv(one.references(), one.compared)
-    files["experiments.exp"] = render(
-        "experiments.exp.j2",
-        experiments=experiments,
-        tolerance=f"{TOLERANCE:g}",
-        steps=_STEPS,
-        seconds=_text,
-        description=f"{vehicle.name}: velocities and pose that the FMU must reproduce, "
-        f"within {TOLERANCE:g} of the largest value of each variable",
-    )
-    files["fmi-ls-manifest.xml"] = render("fmi-ls-manifest.xml.j2", sets=sets)
-    return {f"{FOLDER}/{name}": text.encode() for name, text in files.items()}
+    related = [
+        Related(f"{name}.ssv", "parameter", "application/x-ssp-parameter-set", words)
+        for name, words in _SETS.items()
+        if name in sets
+    ]
+    for one in proofs:
+        text[f"{one.name}.csv"] = _csv(one.stimuli(), one.inputs)
+        text[f"{one.name}_expected.csv"] = _csv(one.references(), one.compared)
+        related.append(Related(f"{one.name}_expected.csv", "result", "text/csv", f"Expected: {one.description}"))
+    for some, name, purpose, title, words in (
+        (proofs, "experiments", "validation", "Expected results", _EXPECTED),
+        (variants, "uncertainty", "uncertainty-analysis", "Ends of the 95 % intervals", _UNCERTAIN),
+    ):
+        if some:
+            text[f"{name}.exp"] = render(
+                "experiments.exp.j2",
+                experiments=some,
+                title=title,
+                tolerance=f"{TOLERANCE:g}",
+                steps=_STEPS,
+                seconds=_text,
+                description=f"{vehicle.name}: {words}",
+            )
+            related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
+    files = {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}
+    of_origin, roles = origin(vehicle)
+    return {**files, **of_origin, MANIFEST: manifest([*related, *roles])}
+
+
+_EXPECTED = (
+    f"velocities and pose that the FMU must reproduce, within {TOLERANCE:g} of the largest value of each variable"
+)
+_UNCERTAIN = (
+    "the manoeuvre with each coefficient at an end of its 95 % interval, and the others where its correlations put them"
+)
+_SETS = {
+    "tuned": "alpha and beta as identified",
+    "untuned": "alpha = beta = 1: without tuning",
+    "attitude": "Euler angles at the start",
+}
+"""The parameter sets of the experiments with expected results, in words."""
+
+
+def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: _Experiment) -> list[_Experiment]:
+    """Return the manoeuvre with each identified coefficient at each end of its interval."""
+    _, started = manoeuvre.parameters or ("", {})
+    return [
+        replace(
+            manoeuvre,
+            name=name,
+            description=words,
+            parameters=(f"uncertainty/{name}", {**started, **values}),
+            like=manoeuvre.name,
+        )
+        for name, words, values in ends_of_intervals(vehicle)
+    ]
 
 
 # ---- Steps from rest -------------------------------------------------------------------------------------------------

@@ -70,7 +70,7 @@ def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
 
     try:
         with zipfile.ZipFile(archive) as zipped:
-            if reason := _refusal(zipped):
+            if reason := refusal(zipped):
                 raise FileError(f"{fmu}: {reason}")
             zipped.extractall(folder)
     except FileError:
@@ -88,7 +88,7 @@ def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
         raise FileError(f"{fmu}: is not an FMU that FMPy can read: {brief(reason)}") from error
 
 
-def _refusal(zipped: zipfile.ZipFile) -> str:
+def refusal(zipped: zipfile.ZipFile) -> str:
     """Return the reason why an archive is refused, or an empty text if it is not."""
     members = zipped.infolist()
     for member in members:

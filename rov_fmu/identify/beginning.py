@@ -49,7 +49,7 @@ class Tests:
     given: GivenVehicle
     tested: TestContents
     inputs: Mapping[str, str]
-    """The SHA-256 hash of every file that was read, by its name."""
+    """The SHA3-256 of every file that was read, by its name."""
     findings: tuple[Finding, ...]
     """What was left out of the vehicle and of the files."""
 

@@ -70,7 +70,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
                 correlation={k: round(v, 6) for k, v in others.items() if abs(v) > 1e-6},
             )
     validity = given.description.tables.validity
-    made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, inputs=dict(tests.inputs))
+    made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.inputs))
     vehicle = replace(
         rov,
         **dict(given.head),

@@ -210,11 +210,14 @@ class VehicleModel(Vehicle):
         fmi: int = 2,
         interface: str | None = None,
         osp: bool = False,
+        sign: Path | None = None,
     ) -> "Built":
         """Build the FMU of the vehicle. The arguments, the result and the errors are those of `rov_fmu.build.build`."""
         from rov_fmu.build import build
 
-        return build(self, output, platforms=platforms, backend=backend, fmi=fmi, interface=interface, osp=osp)
+        return build(
+            self, output, platforms=platforms, backend=backend, fmi=fmi, interface=interface, osp=osp, sign=sign
+        )
 
     def _simulated(
         self,

@@ -22,6 +22,7 @@ from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from rov_fmu.fmu.evidence.check import Evidence
     from rov_fmu.fmu.proof import Finding
 
 DEVIATION = "+.1%"
@@ -161,6 +162,17 @@ def print_proof(findings: "Sequence[Finding]") -> None:
             if not f.passed:
                 found.add_row(experiment, *_deviation(f), "FAIL", f.error or f.variable)
     print_table(found, out)
+
+
+def print_evidence(evidence: "Evidence") -> None:
+    """Print what the hashes in an FMU and its signature say, if it has any."""
+    lines = []
+    if evidence.files:
+        lines.append(f"All {len(evidence.files)} files are as they were built.")
+    if evidence.signer:
+        lines.append(f"Signed with the key {evidence.signer}.")
+    if lines:
+        paragraph(console(), " ".join(lines))
 
 
 def _deviation(f: "Finding") -> tuple[str, str]:

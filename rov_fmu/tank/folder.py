@@ -55,7 +55,7 @@ class Folder:
     """The rows of tables by kind of test and by curve or axis."""
     logs: list[Log] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
-    """The SHA-256 hash of each file by its name."""
+    """The SHA3-256 of each file by its name."""
     findings: list[Finding] = field(default_factory=list)
     mistakes: list[str] = field(default_factory=list)
     """A line for every mistake in a file of tests."""
@@ -384,7 +384,7 @@ def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
 
 
 def file_hash(path: Path) -> str:
-    found = hashlib.sha256()
+    found = hashlib.sha3_256()
     try:
         with path.open("rb") as file:  # in pieces, because a bag may be larger than the memory
             while piece := file.read(2**20):

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
@@ -149,5 +149,7 @@ class Provenance(Strict):
     """What the data do not determine, and what speaks against the model, in sentences."""
     facts: _Sentences = ()
     """What was found, and what was done with the data, in sentences."""
+    hash: Literal["SHA-256", "SHA3-256"] = "SHA-256"
+    """The kind of the hashes in `inputs`."""
     inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
-    """The SHA-256 of every input file, by file name."""
+    """The hash of every input file, by file name."""

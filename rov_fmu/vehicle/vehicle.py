@@ -102,6 +102,8 @@ class Vehicle:
     provenance: Provenance | None = None
     measured_from: str = field(default="measurements", compare=False)
     """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
+    path: Path | None = field(default=None, compare=False)
+    """The vehicle file that was read. Coefficients may have changed since."""
 
     def __getitem__(self, name: str) -> float:
         """Return a coefficient."""
@@ -373,4 +375,5 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=file.estimates,
         provenance=file.provenance,
+        path=path,
     )

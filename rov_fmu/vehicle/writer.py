@@ -109,13 +109,13 @@ def _curve(curve: Curve) -> dict[str, Any]:
 
 def _driven(driven: Thruster | Fin) -> dict[str, Any]:
     """Return the keys of a thruster or a fin without its coefficients."""
-    position = {"value": driven.position, "unit": "m", "source": driven.sources.get("position")}
+    position = {"value": driven.position, "unit": "m", "source": driven.sources.get("position", NOT_GIVEN)}
     arm = getattr(driven, "arm", 0)
     return {
         "name": driven.name,
         "description": driven.description,
         "curve": getattr(driven, "curve", None),
-        "direction": {"value": driven.direction, "source": driven.sources["direction"]},
+        "direction": {"value": driven.direction, "source": driven.sources.get("direction", NOT_GIVEN)},
         "position": position if driven.position else None,
         "arm": {0: None, 1: "port", -1: "starboard"}[arm],
     }

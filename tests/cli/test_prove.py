@@ -15,6 +15,7 @@ import pytest
 from pythonfmu import FmuBuilder
 
 from rov_fmu.cli import main
+from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.reference_results import reference_results
@@ -27,8 +28,8 @@ Files = Mapping[str, str | None]
 
 
 def _with(fmu: Path, files: Files, path: Path) -> Path:
-    """Write a copy of an FMU with these files, and return its path."""
-    changed = {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
+    """Write a copy of an FMU with these files, and return its path. It has no hashes, so that it may differ."""
+    changed = {META_DATA: None} | {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
         for member in set(old.namelist()) - changed.keys():
             new.writestr(member, old.read(member))
@@ -170,9 +171,12 @@ def test_what_deviates_or_fails_is_printed(
 
 
 def _changed(fmu: Path, begin: str, change: Callable[[bytes], bytes], path: Path) -> Path:
-    """Write a copy of an FMU in which the members whose name begins with `begin` are changed; return its path."""
+    """Write a copy of an FMU in which the members whose name begins with `begin` are changed; return its path.
+
+    It has no hashes.
+    """
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
-        for member in old.namelist():
+        for member in {*old.namelist()} - {META_DATA}:
             content = old.read(member)
             new.writestr(member, change(content) if member.startswith(begin) else content)
     return path

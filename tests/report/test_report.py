@@ -254,7 +254,7 @@ def test_points_forces_and_input_files_have_their_rows(page: str) -> None:
     assert any(row[0] == "top" and row[2] == "20 %" and row[-1].endswith("(does not count)") for row in table)
     assert "Force over the command: top" in labels(page)
     for name, digest in example().vehicle.provenance.inputs.items():  # type: ignore[union-attr]
-        assert f"{name}: SHA-256 {digest}" in text_of(page)
+        assert f"{name}: SHA3-256 {digest}" in text_of(page)
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------

@@ -56,7 +56,7 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
     }
     assert all("Table 9" in q.source for q in known.values())
     assert found.inputs == {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        path.name: hashlib.sha3_256(path.read_bytes()).hexdigest()
         for path in TESTS.iterdir()
         if path.suffix == ".csv" or path.name == "rov.toml"
     }

@@ -1,0 +1,64 @@
+"""The meta-data of an FMU: a file SRMD of SSP-LS-Traceability 1.0 with the hashes of all that it was made from.
+
+The hashes are SHA3-256, as the standard demands. They cover every other file of the FMU, the program that made it, and,
+if the vehicle was identified, its logs.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from hashlib import sha3_256
+from pathlib import Path
+
+from rov_fmu import __version__
+from rov_fmu.io.paths import FMU_SRC
+from rov_fmu.io.templates import render
+from rov_fmu.vehicle.vehicle import Vehicle
+
+META_DATA = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
+"""The path in the FMU that the standard prescribes."""
+FILES, INPUTS, GENERATOR = "rov-fmu.files", "rov-fmu.inputs", "rov-fmu.generator"
+"""The classifications: the files of the FMU, the files that identification read, and the program. Each entry has a
+name and a hash."""
+_PACKAGE = Path(__file__).parents[2]
+_SOURCES = (".py", ".c", ".h", ".js", ".j2")
+"""The kinds of files that the program consists of."""
+
+
+def meta_data(vehicle: Vehicle, files: Mapping[str, bytes]) -> bytes:
+    """Return the document for an FMU that has these other files. The same files give the same bytes."""
+    made = vehicle.provenance
+    classifications = {
+        FILES: [(name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())],
+        INPUTS: [(name, f"{made.hash}: {digest}") for name, digest in made.inputs.items()] if made else [],
+        GENERATOR: [(f"rov-fmu {__version__}", generator_hash())],
+    }
+    head = {
+        "name": vehicle.name,
+        "description": vehicle.summary,
+        "author": vehicle.source,
+        "fileversion": vehicle.version,
+        "generationTool": f"rov-fmu {__version__}",
+    }
+    return render(
+        "resourceMetaData.srmd.j2",
+        head=head,
+        classifications={name: entries for name, entries in classifications.items() if entries},
+    ).encode()
+
+
+@cache
+def generator_hash() -> str:
+    """Return the SHA3-256 of the program: of the names and the contents of its files, in the order of their names."""
+    found = sha3_256()
+    for name, content in sorted(_program()):
+        found.update(name.encode() + b"\0" + content + b"\0")
+    return found.hexdigest()
+
+
+def _program() -> Iterator[tuple[str, bytes]]:
+    """Yield the files of the program. Their names are the same in a checkout and in an installed package."""
+    for folder, top in ((_PACKAGE, "rov_fmu"), (FMU_SRC, "fmu_src")):
+        for path in folder.rglob("*"):
+            name = path.relative_to(folder).as_posix()
+            if path.suffix in _SOURCES and not name.startswith("data/"):
+                yield f"{top}/{name}", path.read_bytes()

@@ -1,0 +1,366 @@
+"""The evidence in an FMU: the vehicle file, the covariance, the meta-data with hashes, and the signature beside it."""
+
+import csv
+import hashlib
+import io
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+import tomlkit
+from lxml import etree
+
+from rov_fmu.build import build
+from rov_fmu.cli import main
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.evidence.check import check_evidence
+from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
+from rov_fmu.fmu.experiments import FOLDER, MANIFEST
+from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+Capsys = pytest.CaptureFixture[str]
+_REFIT = SHIPPED["videoray_refit"]
+_SSH_KEYGEN = shutil.which("ssh-keygen")
+needs_ssh = pytest.mark.skipif(_SSH_KEYGEN is None, reason="OpenSSH is the other tool here")
+
+
+@pytest.fixture(scope="module")
+def refit() -> Mapping[str, bytes]:
+    """The files of an identified vehicle in the folder of FMI-LS-REF."""
+    return reference_results(load_vehicle(_REFIT))
+
+
+def _roles(files: Mapping[str, bytes]) -> dict[str, str]:
+    return {x.get("source"): x.get("role") for x in etree.fromstring(files[MANIFEST])}
+
+
+# ---- The files and their roles ---------------------------------------------------------------------------------------
+
+
+def test_the_roles_are_those_of_the_standard(refit: Mapping[str, bytes]) -> None:
+    roles = _roles(refit)
+    assert roles["vehicle/videoray_refit.toml"] == "model"
+    assert roles["../../documentation/model_card.txt"] == "report"
+    assert roles["surge_70_expected.csv"] == roles["covariance.csv"] == "result"
+    assert roles["experiments.exp"] == "experiment/validation"
+    assert roles["uncertainty.exp"] == "experiment/uncertainty-analysis"
+    assert roles[f"../../{META_DATA}"] == "meta-data"
+
+
+def test_the_videoray_has_the_tables_of_the_paper(videoray_fmu: Path) -> None:
+    with zipfile.ZipFile(videoray_fmu) as fmu:
+        files = {name: fmu.read(name) for name in fmu.namelist()}
+    tables = [
+        source for source, role in _roles(files).items() if source.startswith("vehicle/tables") and role == "result"
+    ]
+    assert len(tables) == 6
+    folder = SHIPPED["videoray"].parent
+    for source in (*tables, "vehicle/videoray.toml"):
+        assert files[f"{FOLDER}/{source}"] == (folder / source.removeprefix("vehicle/")).read_bytes()
+    for source in _roles(files):
+        assert source.removeprefix("../../") in files or f"{FOLDER}/{source}" in files, "what is listed is there"
+
+
+def test_a_vehicle_can_be_read_from_its_fmu(tmp_path: Path) -> None:
+    """With its table of thrust, whose path leads into the folder of another vehicle."""
+    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
+    for path, content in reference_results(vehicle).items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    assert load_vehicle(tmp_path / FOLDER / "vehicle" / "bluerov2_heavy.toml") == vehicle
+
+
+def test_coefficients_set_by_hand_are_in_the_vehicle_file() -> None:
+    vehicle = load_vehicle(_REFIT).with_(a_d_u=7.5)
+    text = reference_results(vehicle)[f"{FOLDER}/vehicle/videoray_refit.toml"].decode()
+    assert tomlkit.parse(text)["axes"]["surge"]["a_d"]["value"] == 7.5
+
+
+def test_the_covariance_is_that_of_the_vehicle_file(refit: Mapping[str, bytes]) -> None:
+    estimates = tomlkit.parse(_REFIT.read_text(encoding="utf-8"))["estimates"]
+    rows = {row["name"]: row for row in csv.DictReader(io.StringIO(refit[f"{FOLDER}/covariance.csv"].decode()))}
+    assert rows.keys() == estimates.keys()
+    for name, row in rows.items():
+        for other in rows:
+            pair = estimates[name].get("correlation", {}), estimates[other].get("correlation", {})
+            r = 1.0 if name == other else pair[0].get(other, pair[1].get(name, 0.0))
+            expected = r * estimates[name]["error"] * estimates[other]["error"]
+            assert float(row[other]) == pytest.approx(expected, rel=1e-5, abs=1e-300)
+    assert (rows["a_d_r"]["unit"], rows["a_d_r"]["value"]) == ("N.m.s2/rad2", "0.0985115")
+
+
+def test_the_parameter_sets_are_the_most_probable_ones_at_the_end_of_an_interval(refit: Mapping[str, bytes]) -> None:
+    """By the conditional mean of a normal distribution; β has the logarithmic one."""
+    vehicle = load_vehicle(_REFIT)
+    rows = [*csv.DictReader(io.StringIO(refit[f"{FOLDER}/covariance.csv"].decode()))]
+    names = [row["name"] for row in rows]
+    mean = np.array([float(row["value"]) for row in rows])
+    C = np.array([[float(row[name]) for name in names] for row in rows])
+    experiments = etree.fromstring(refit[f"{FOLDER}/uncertainty.exp"])
+    assert len(experiments) == 2 * len(names)
+    for experiment in experiments:
+        name, _, end = experiment.get("name").rpartition("_")
+        k, sign = names.index(name), {"low": -1.0, "high": 1.0}[end]
+        shift = C[:, k] / C[k, k] * sign * 1.959964 * np.sqrt(C[k, k])
+        factor = np.array([n.startswith("beta_") for n in names])
+        expected = np.where(factor, mean * np.exp(shift / mean), mean + shift)
+        bounds = [(vehicle.layout.coefficients[n].minimum, vehicle.layout.coefficients[n].maximum) for n in names]
+        expected = np.clip(expected, *np.array(bounds).T)
+        parameters = etree.fromstring(refit[f"{FOLDER}/{experiment.find('Parameters').get('source')}"])
+        values = {x.get("name"): float(x[0].get("value")) for x in parameters.iter("{*}Parameter")}
+        for n, other in enumerate(names):
+            assert values.get(other, mean[n]) == pytest.approx(expected[n], rel=1e-4, abs=1e-4 * np.sqrt(C[n, n]))
+        vehicle.with_(**values)  # raises an exception about what is not possible
+
+
+# ---- The meta-data ---------------------------------------------------------------------------------------------------
+
+
+def _check_meta_data(fmu: Path) -> None:
+    """Assert that the meta-data have the form of the standard, and the hash of every other file."""
+    common = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureCommon.xsd"
+    here = Path(__file__).parent
+
+    class Here(etree.Resolver):  # type: ignore[misc]
+        def resolve(self, url: str, _: object, context: object) -> object:
+            path = common if url.endswith(common.name) else here / Path(url).name
+            return self.resolve_filename(str(path), context)
+
+    parser = etree.XMLParser()
+    parser.resolvers.add(Here())
+    schema = etree.XMLSchema(etree.parse(str(here / "srmd.xsd"), parser))
+    with zipfile.ZipFile(fmu) as zipped:
+        document = etree.fromstring(zipped.read(META_DATA))
+        schema.assertValid(document)
+        expected = {name: hashlib.sha3_256(zipped.read(name)).hexdigest() for name in zipped.namelist()}
+    del expected[META_DATA]
+    found = {x.get("type"): {e.get("keyword"): e.text for e in x} for x in document}
+    assert found["rov-fmu.files"] == expected
+    (generator,) = found["rov-fmu.generator"]
+    assert document.get("generationTool") == generator
+    assert "generationDateAndTime" not in document.attrib
+    assert check_evidence(fmu).files == expected
+
+
+def test_the_meta_data_have_the_form_of_the_standard(videoray_fmu: Path, videoray3_fmu: Path) -> None:
+    for fmu in (videoray_fmu, videoray3_fmu):
+        _check_meta_data(fmu)
+
+
+def test_the_meta_data_of_an_identified_vehicle_have_the_hashes_of_its_logs(tmp_path: Path) -> None:
+    vehicle = load_vehicle(_REFIT)
+    assert vehicle.provenance
+    fmu = tmp_path / "refit.fmu"
+    fmu.write_bytes(archive({META_DATA: meta_data(vehicle, {})}))
+    found = check_evidence(fmu)
+    assert found.inputs == {name: f"SHA-256: {digest}" for name, digest in vehicle.provenance.inputs.items()}
+    assert next(iter(found.generator)).startswith("rov-fmu ")
+
+
+# ---- An FMU that was altered -----------------------------------------------------------------------------------------
+
+
+def _altered(fmu: Path, path: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
+    """Write a copy of an FMU whose files have been changed, and return its path."""
+    with zipfile.ZipFile(fmu) as zipped:
+        files = {name: zipped.read(name) for name in zipped.namelist()}
+    change(files)
+    path.write_bytes(archive(files))
+    return path
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "modelDescription.xml",
+        "binaries/",
+        f"{FOLDER}/vehicle/videoray.toml",
+        f"{FOLDER}/surge_70_tuned_expected.csv",
+        f"{FOLDER}/vehicle/tables/",
+        "sources/",
+        "documentation/model_card.txt",
+        MANIFEST,
+    ],
+)
+def test_one_altered_byte_is_named(part: str, videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    names = []
+
+    def change(files: dict[str, bytes]) -> None:
+        name = next(name for name in files if name.startswith(part))
+        names.append(name)
+        middle = len(files[name]) // 2
+        files[name] = files[name][:middle] + bytes([files[name][middle] ^ 1]) + files[name][middle + 1 :]
+
+    fmu = _altered(videoray_fmu, tmp_path / "altered.fmu", change)
+    assert main(["prove", str(fmu)]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.fullmatch(
+        re.escape(f"rov-fmu: {fmu}: '{names[0]}': was altered after the FMU was built: ")
+        + r"its SHA3-256 is [0-9a-f]{16}\.\.\., and was [0-9a-f]{16}\.\.\.\n",
+        err,
+    )
+
+
+def test_files_that_were_added_or_taken_away_are_named(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    for words, change in (
+        ("'resources/more.txt': was added after", lambda files: files.update({"resources/more.txt": b""})),
+        (f"'{MANIFEST}': is missing", lambda files: files.pop(MANIFEST)),
+    ):
+        fmu = _altered(videoray_fmu, tmp_path / "altered.fmu", change)
+        assert main(["prove", str(fmu)]) == 1
+        assert words in capsys.readouterr().err
+    fmu = tmp_path / "two.fmu"
+    files = {"a": b"1"}
+    fmu.write_bytes(archive({**files, META_DATA: meta_data(load_vehicle(_REFIT), files)}))
+    with zipfile.ZipFile(fmu, "a") as twice, pytest.warns(UserWarning, match="Duplicate name"):
+        twice.writestr("a", b"2")
+    assert main(["prove", str(fmu)]) == 1
+    assert capsys.readouterr().err == f"rov-fmu: {fmu}: 'a': is 2 times in the archive\n"
+
+
+def test_a_byte_changed_in_the_archive_itself_names_the_file(
+    videoray_fmu: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    content = bytearray(videoray_fmu.read_bytes())
+    with zipfile.ZipFile(videoray_fmu) as zipped:
+        entry = next(entry for entry in zipped.infolist() if entry.filename.startswith("binaries/"))
+    content[entry.header_offset + 1000] ^= 1
+    (tmp_path / "damaged.fmu").write_bytes(content)
+    assert main(["prove", str(tmp_path / "damaged.fmu")]) == 1
+    assert f"'{entry.filename}': was altered after the FMU was built: " in capsys.readouterr().err
+
+
+# ---- Signatures ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with Ed25519 keys in both formats, a public one, and keys that cannot be used."""
+    from cryptography.hazmat.primitives import serialization
+    from cryptography.hazmat.primitives.asymmetric import ec, ed25519
+
+    folder = tmp_path_factory.mktemp("keys")
+    key, other = (ed25519.Ed25519PrivateKey.from_private_bytes(bytes([n] * 32)) for n in (1, 2))
+    pem, openssh = serialization.PrivateFormat.PKCS8, serialization.PrivateFormat.OpenSSH
+    plain, secret = serialization.NoEncryption(), serialization.BestAvailableEncryption(b"secret")
+    for name, content in {
+        "key": key.private_bytes(serialization.Encoding.PEM, openssh, plain),
+        "key.pem": key.private_bytes(serialization.Encoding.PEM, pem, plain),
+        "secret.pem": key.private_bytes(serialization.Encoding.PEM, pem, secret),
+        "other": other.private_bytes(serialization.Encoding.PEM, openssh, plain),
+        "curve.pem": ec.generate_private_key(ec.SECP256R1()).private_bytes(serialization.Encoding.PEM, pem, plain),
+        "text": b"no key\n",
+    }.items():
+        (folder / name).write_bytes(content)
+        (folder / name).chmod(0o600)
+    line = serialization.Encoding.OpenSSH, serialization.PublicFormat.OpenSSH
+    (folder / "key.pub").write_bytes(key.public_key().public_bytes(*line))
+    (folder / "other.pub").write_bytes(other.public_key().public_bytes(*line))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def signed_fmu(keys: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A signed FMU in pure Python, which needs no compiler."""
+    path = tmp_path_factory.mktemp("signed") / "refit.fmu"
+    built = build(load_vehicle(_REFIT), path, backend="pythonfmu", sign=keys / "key")
+    assert [*built.beside] == [path.with_name("refit.fmu.sig")]
+    return path
+
+
+def test_a_signed_fmu_is_proved(signed_fmu: Path, keys: Path, capsys: Capsys) -> None:
+    for option in ([], ["--key", str(keys / "key.pub")]):
+        assert main(["prove", str(signed_fmu), *option]) == 0
+        out, err = capsys.readouterr()
+        assert err == ""
+        assert re.search(
+            r"All \d+ files are as they were built\. Signed with the key SHA256:\S{43}\.", " ".join(out.split())
+        )
+    _check_meta_data(signed_fmu)
+
+
+@needs_ssh
+def test_openssh_agrees(signed_fmu: Path, keys: Path, tmp_path: Path) -> None:
+    """ssh-keygen checks our signature, and makes the same one, as Ed25519 has no random numbers."""
+    assert _SSH_KEYGEN
+    ours = signed_fmu.with_name("refit.fmu.sig")
+    with signed_fmu.open("rb") as content:
+        check = [_SSH_KEYGEN, "-Y", "check-novalidate", "-n", "rov-fmu", "-s", str(ours)]
+        done = subprocess.run(check, stdin=content, capture_output=True, text=True, check=True)
+    assert check_evidence(signed_fmu).signer in done.stdout
+    copy = Path(shutil.copy(signed_fmu, tmp_path))
+    subprocess.run(
+        [_SSH_KEYGEN, "-Y", "sign", "-q", "-n", "rov-fmu", "-f", str(keys / "key"), str(copy)],
+        check=True,
+        capture_output=True,
+    )
+    assert copy.with_name("refit.fmu.sig").read_bytes() == ours.read_bytes()
+
+
+def test_a_signature_that_does_not_fit_fails(signed_fmu: Path, keys: Path, tmp_path: Path, capsys: Capsys) -> None:
+    def refused(fmu: Path, *options: str) -> str:
+        assert main(["prove", str(fmu), *options]) == 1
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        return err.removeprefix(f"rov-fmu: {fmu}: ")
+
+    fmu, signature = (Path(shutil.copy(path, tmp_path)) for path in (signed_fmu, f"{signed_fmu}.sig"))
+    assert "is signed by another key, SHA256:" in refused(fmu, "--key", str(keys / "other.pub"))
+    with zipfile.ZipFile(fmu, "a") as longer:
+        longer.comment = b"altered, and no file is"
+    assert refused(fmu).startswith(f"the signature {signature} does not fit: the FMU was altered or built again after")
+    signature.unlink()
+    assert refused(fmu, "--key", str(keys / "key.pub")) == f"is not signed: there is no file {signature}\n"
+
+
+def test_bad_keys_and_signatures_are_one_line(signed_fmu: Path, keys: Path, tmp_path: Path, capsys: Capsys) -> None:
+    make = "must be an Ed25519 key, which `ssh-keygen -t ed25519 -f KEY` makes"
+    for name, reason in {
+        "text": f"is not a private key: {make}",
+        "key.pub": f"is not a private key: {make}",
+        "secret.pem": "has a passphrase; a key to sign with must have none",
+        "curve.pem": f"is a key of another kind: {make}",
+        "none": "there is no such file",
+    }.items():
+        assert main(["build", str(_REFIT), "-o", str(tmp_path / "a.fmu"), "--sign", str(keys / name)]) == 2
+        assert capsys.readouterr().err == f"rov-fmu: {keys / name}: {reason}\n"
+    assert not [*tmp_path.iterdir()]
+    for name in ("text", "none", "key"):
+        assert main(["prove", str(signed_fmu), "--key", str(keys / name)]) == 2
+        assert capsys.readouterr().err.startswith(f"rov-fmu: {keys / name}: ")
+    fmu, good = Path(shutil.copy(signed_fmu, tmp_path)), Path(f"{signed_fmu}.sig").read_text(encoding="ascii")
+    for text in ("", "none", good[:100], good.replace("U1NIU0lH", "U1NIU0lI"), good.replace("\nAAAA", "\nBBBB")[::-1]):
+        Path(f"{fmu}.sig").write_text(text, encoding="ascii")
+        assert main(["prove", str(fmu)]) == 2
+        expected = f"rov-fmu: {fmu}.sig: is not a signature by Ed25519 for rov-fmu, in OpenSSH's format\n"
+        assert capsys.readouterr().err == expected
+
+
+def test_without_the_library_a_line_says_what_to_install(
+    signed_fmu: Path, keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+) -> None:
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    expected = "rov-fmu: signatures need cryptography: pip install 'rov-fmu[sign]'\n"
+    for arguments in (
+        ["prove", str(signed_fmu)],
+        ["build", str(_REFIT), "-o", str(tmp_path / "a.fmu"), "--sign", str(keys / "key")],
+    ):
+        assert main(arguments) == 2
+        assert capsys.readouterr().err == expected
+
+
+def test_a_key_is_not_overwritten(keys: Path, tmp_path: Path, capsys: Capsys) -> None:
+    key = Path(shutil.copy(keys / "key", tmp_path / "a.fmu.sig"))
+    assert main(["build", str(_REFIT), "-o", str(tmp_path / "a.fmu"), "--sign", str(key)]) == 2
+    assert "would overwrite" in capsys.readouterr().err
+    assert key.read_bytes() == (keys / "key").read_bytes()
