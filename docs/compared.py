@@ -14,7 +14,7 @@ from scipy.signal import TransferFunction, step
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE
-from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -195,7 +195,7 @@ def _sticks(layout: Layout) -> Table:
     for axis in AXES.values():
         signs = layout.signs(axis)
         if axis in (ROLL, PITCH):  # ArduSub rolls and pitches with the vertical thrusters alone
-            signs = {f"u_{t.name}": signs[f"u_{t.name}"] for t in layout.thrusters if t.direction[2]}
+            signs = {f"u_{t.name}": signs[f"u_{t.name}"] for t in layout.thrusters if t.direction.value[2]}
         cells = [{1.0: "+", -1.0: "−"}.get(signs.get(f"u_{thruster.name}", 0.0), "") for thruster in layout.thrusters]
         found.append((f"{axis.name}, {axis.positive}", *cells))
     return found
@@ -327,15 +327,19 @@ def _published_motion(six: Vehicle, eight: Vehicle) -> Table:
     return found
 
 
+def _at_depth(thruster: Thruster, z: float) -> Thruster:
+    """Return a thruster at another height relative to the centre of mass (m)."""
+    assert thruster.position
+    position = thruster.position.model_copy(update={"value": (*thruster.place[:2], z)})
+    return thruster.model_copy(update={"position": position})
+
+
 def of_wu(rov: Vehicle, below: float, above: float) -> Vehicle:
     """The BlueROV2 with Wu's roll and pitch: thrusters below, and buoyancy above the centre of mass (m)."""
     layout = rov.layout
     forms = {form.axis: replace(form, keys=tuple(key for key in form.keys if key != "F_0")) for form in layout.axes}
     forms |= {axis: VehicleAxis(axis, forms[HEAVE].keys) for axis in (ROLL, PITCH)}
-    thrusters = tuple(
-        replace(t, position=(*t.position[:2], below)) if t.position and not t.direction[2] else t
-        for t in layout.thrusters
-    )
+    thrusters = tuple(_at_depth(t, below) if t.position and not t.direction.value[2] else t for t in layout.thrusters)
     axes = tuple(forms[axis] for axis in AXES.values())
     layout = replace(layout, axes=axes, thrusters=thrusters, restoring=("W", "B", "z_B"))
     values = {**rov.coefficients, "W": WU.weight, "B": WU.buoyancy, "z_B": -above}

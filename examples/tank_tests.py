@@ -13,18 +13,19 @@ import click
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.pool import Array, swim
 
 _CURVE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0")
+_AHEAD, _DOWN = (Direction(value=along, source="drawing") for along in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 _LAYOUT = Layout(
     (VehicleAxis(SURGE), VehicleAxis(HEAVE, ("a_d", "b_d", "F_0")), VehicleAxis(YAW)),
     (Curve("rear", _CURVE, together=2), Curve("top", _CURVE)),
     (
-        Thruster("l", "rear", (1.0, 0.0, 0.0), arm=1),
-        Thruster("r", "rear", (1.0, 0.0, 0.0), arm=-1),
-        Thruster("t", "top", (0.0, 0.0, 1.0)),
+        Thruster(name="l", curve="rear", direction=_AHEAD, arm="port"),
+        Thruster(name="r", curve="rear", direction=_AHEAD, arm="starboard"),
+        Thruster(name="t", curve="top", direction=_DOWN),
     ),
 )
 OTTER = Vehicle(

@@ -11,7 +11,7 @@ import pytest
 
 from tests.commands import ROOT
 
-# From the top down. A part imports from itself and from parts below it; io/ and equation/ stand side by side.
+# From the top down. A part imports from itself and from parts below it.
 PARTS = (
     "cli",
     "study",
@@ -24,6 +24,7 @@ PARTS = (
     "tank",
     "c",
     "vehicle",
+    "equation",
     "process",
     "io",
 )
@@ -107,7 +108,7 @@ def test_the_imports_are_seen(imports: dict[str, set[str]]) -> None:
     assert imports["rov_fmu.build"] >= {"rov_fmu.fmu.archive", "rov_fmu.report.page.fmu_page"}
     assert "rov_fmu.report.report" in imports["rov_fmu.interface.identify_command"], "inside a function"
     assert "rov_fmu.equation.step" in imports["rov_fmu.fmu.slave"], "from a package"
-    assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "equation", "__main__"}
+    assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "__main__"}
 
 
 def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
@@ -119,8 +120,8 @@ def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
 
 
 def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
-    below = {part: {part, *PARTS[n:], "equation", ""} for n, part in enumerate(PARTS)}
-    below |= {"equation": {"equation", ""}, "__main__": {"cli", "process"}, "": {"interface"}}
+    below = {part: {*PARTS[n:], ""} for n, part in enumerate(PARTS)}
+    below |= {"__main__": {"cli", "process"}, "": {"interface"}}
     upward = {
         f"{module} imports {name}"
         for module in FILES
@@ -132,14 +133,13 @@ def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
 
 
 def test_the_page_shows_the_imports_that_exist(imports: dict[str, set[str]]) -> None:
-    real: dict[str, set[str]] = {part: set() for part in (*PARTS, "equation")}
+    real: dict[str, set[str]] = {part: set() for part in PARTS}
     for module in FILES:
         if module.startswith("rov_fmu.") and _part(module) in real:
             real[_part(module)] |= {_part(name) for name in imports[module] if name.startswith("rov_fmu.")}
-    order = (*PARTS, "equation")
     rows = [
-        f"| `{part}` | {', '.join(f'`{name}`' for name in order if name in real[part] - {part}) or '–'} |"
-        for part in order
+        f"| `{part}` | {', '.join(f'`{name}`' for name in PARTS if name in real[part] - {part}) or '–'} |"
+        for part in PARTS
     ]
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     shown = re.findall(r"^\| `\w+` \| (?:–|`\w+`(?:, `\w+`)*) \|$", page, re.M)

@@ -6,11 +6,11 @@ from dataclasses import replace
 from itertools import combinations, permutations
 from math import hypot, prod, sqrt
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Literal, TypeVar
 
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Curve, Direction, Driven, Fin, Layout, Position, Thruster, Vector, VehicleAxis
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -20,6 +20,31 @@ State = dict[str, float]
 Case = tuple[Vehicle, State, State, float]
 """A vehicle, its inputs and states, and the length of a step."""
 
+
+Side = Literal["port", "starboard"] | None
+
+
+def _places(direction: Vector, position: Vector | None) -> dict[str, Any]:
+    at = position and Position(value=position, unit="m", source="a drawing")
+    return {"direction": Direction(value=direction, source="a drawing"), "position": at}
+
+
+def thruster(
+    name: str,
+    curve: str,
+    direction: Vector,
+    position: Vector | None = None,
+    arm: Side = None,
+) -> Thruster:
+    """Return a thruster with a direction and a position that have a source."""
+    return Thruster(name=name, curve=curve, arm=arm, **_places(direction, position))
+
+
+def fin(name: str, direction: Vector, position: Vector, has_drag: bool = False) -> Fin:
+    """Return a fin with a direction and a position that have a source."""
+    return Fin(name=name, has_drag=has_drag, **_places(direction, position))
+
+
 _DRAG = ("a_d", "b_d")
 _EITHER = (*_DRAG, "a_d_reverse", "b_d_reverse")
 _ALL = ("m_a", *_EITHER, "F_0")
@@ -27,18 +52,18 @@ _T200 = Curve("t200", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0"))
 _LAGGING = Curve("t200", (*_T200.keys, "T"))
 _S = sqrt(0.5)
 _PLANAR = (  # four vectored thrusters, as ArduSub numbers them
-    Thruster("1", "t200", (_S, -_S, 0.0), (0.156, 0.111, 0.0)),
-    Thruster("2", "t200", (_S, _S, 0.0), (0.156, -0.111, 0.0)),
-    Thruster("3", "t200", (-_S, -_S, 0.0), (-0.156, 0.111, 0.0)),
-    Thruster("4", "t200", (-_S, _S, 0.0), (-0.156, -0.111, 0.0)),
+    thruster("1", "t200", (_S, -_S, 0.0), (0.156, 0.111, 0.0)),
+    thruster("2", "t200", (_S, _S, 0.0), (0.156, -0.111, 0.0)),
+    thruster("3", "t200", (-_S, -_S, 0.0), (-0.156, 0.111, 0.0)),
+    thruster("4", "t200", (-_S, _S, 0.0), (-0.156, -0.111, 0.0)),
 )
-_VERTICAL = tuple(Thruster(name, "t200", (0.0, 0.0, -1.0), (0.1, 0.1, 0.0)) for name in "56")
+_VERTICAL = tuple(thruster(name, "t200", (0.0, 0.0, -1.0), (0.1, 0.1, 0.0)) for name in "56")
 _ALL_ROUND = (*_PLANAR, *_VERTICAL)
 _PAIR = (
-    Thruster("l", "t200", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)),
-    Thruster("r", "t200", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)),
+    thruster("l", "t200", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)),
+    thruster("r", "t200", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)),
 )
-_BOW = Thruster("b", "t200", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0))
+_BOW = thruster("b", "t200", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0))
 _MIX = {
     "ahead": {"1": 1.0, "2": 1.0, "3": -1.0, "4": -1.0},
     "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
@@ -126,12 +151,18 @@ THRUST_EFFECTS = EVERYTHING.with_name("thrust_effects.toml")
 SIX_AXES = EVERYTHING.with_name("six_axes.toml")
 
 
+def sources_of(driven: Driven) -> dict[str, str]:
+    """The sources of the direction and the position of a thruster or a fin."""
+    places = {"direction": driven.direction, "position": driven.position}
+    return {key: place.source for key, place in places.items() if place}
+
+
 def carried(vehicle: Vehicle) -> tuple[object, ...]:
     """What the parts of a vehicle carry along and `==` does not compare."""
     layout = vehicle.layout
     tables = {curve.name: [table.path for table in curve.tables] for curve in layout.curves}
     currents = {curve.name: curve.electric_current for curve in layout.curves}
-    return {one.name: {**one.sources} for one in layout.driven}, tables, currents, layout.voltage_source
+    return tables, currents, layout.voltage_source
 
 
 def four_axes(vehicle: Vehicle) -> Vehicle:
@@ -181,9 +212,9 @@ VEHICLES = {
 }
 
 _SKEW = (
-    Thruster("a", "t200", (0.6, 0.0, 0.8), (0.2, 0.1, -0.05)),
-    Thruster("b", "t200", (0.0, 1.0, 0.0), (-0.3, 0.05, 0.1)),
-    Thruster("c", "t200", (0.0, 0.6, -0.8), (0.05, -0.25, 0.15)),
+    thruster("a", "t200", (0.6, 0.0, 0.8), (0.2, 0.1, -0.05)),
+    thruster("b", "t200", (0.0, 1.0, 0.0), (-0.3, 0.05, 0.1)),
+    thruster("c", "t200", (0.0, 0.6, -0.8), (0.05, -0.25, 0.15)),
 )
 _BETWEEN = (("m_a", "u", "q"), ("m_a", "v", "r"), ("b_d", "q", "w"), ("a_d", "p", "v"), ("lift", "v", "u", "r"))
 SIX = numbered(
@@ -252,7 +283,7 @@ def random_body(rng: random.Random, axes: str) -> Vehicle:
         length = sqrt(sum(x * x for x in direction))
         x, y, z = (part / length for part in direction)
         thrusters.append(
-            Thruster(f"t{n}", "main", (x, y, z), (0.2 * position[0], 0.2 * position[1], 0.2 * position[2]))
+            thruster(f"t{n}", "main", (x, y, z), (0.2 * position[0], 0.2 * position[1], 0.2 * position[2]))
         )
     forms = tuple(VehicleAxis(form.axis, rng.choice([("m_a", *_DRAG), _ALL])) for form in _axes(axes))
     restoring = tuple(RESTORING) if rng.random() < 0.7 else ()
@@ -278,8 +309,8 @@ def random_layout(rng: random.Random) -> Layout:
         length = sqrt(sum(x * x for x in direction))
         x, y, z = (part / length for part in direction) if length else (1.0, 0.0, 0.0)
         position = (rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), 0.0) if rng.random() < 0.7 else None
-        arm = rng.choice([-1, 0, 1]) if position is None else 0
-        thrusters.append(Thruster(f"t{n}", rng.choice(curves).name, (x, y, z), position, arm))
+        arm: Side = rng.choice(["starboard", None, "port"]) if position is None else None
+        thrusters.append(thruster(f"t{n}", rng.choice(curves).name, (x, y, z), position, arm))
     mix = {}
     if rng.random() < 0.3:
         mix = {name: {t.name: rng.uniform(-1.0, 1.0) for t in thrusters} for name in ("a", "b")}

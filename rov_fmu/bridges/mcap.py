@@ -234,7 +234,7 @@ def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iter
         share = shares.get(thruster.name, 0.0)
         if share == 0.0:
             continue
-        jet = _TO_FRD.apply(np.multiply(-np.sign(share), thruster.direction))
+        jet = _TO_FRD.apply(np.multiply(-np.sign(share), thruster.direction.value))
         turned, _ = Rotation.align_vectors([jet], [[1.0, 0.0, 0.0]])
         length = abs(share) * longest
         yield ArrowPrimitive(

@@ -344,7 +344,7 @@ def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
     if scale == 0.0:
         return None
     direction = force / scale
-    given = _SIGNS[:3] * (thruster.position or (0.0, 0.0, 0.0))
+    given = _SIGNS[:3] * thruster.place
     curve = vehicle.layout.curve_of[thruster.name]
     return _Propeller(
         name=thruster.name,

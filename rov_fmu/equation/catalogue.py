@@ -13,6 +13,7 @@ which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the c
 
 import re
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import degrees, inf, pi
 
 from .attitude import INITIAL, QUATERNION
@@ -52,7 +53,7 @@ class Axis:
         """Return the name of a coefficient of the axis by its key: a_d, b_d_reverse, alpha ..."""
         return coefficient_name(key, self.velocity)
 
-    @property
+    @cached_property
     def is_rotation(self) -> bool:
         """True when the vehicle turns about the axis instead of moving along it."""
         return self.unit == "rad/s"

@@ -196,7 +196,7 @@ def _steering(layout: Layout, names: Names) -> Iterator[Force]:
             angle = names("angle", fin.name)
             parts.append((fin.effect(form.axis), Name(fin.coefficient("lift")) * angle))
             if fin.has_drag:
-                effect = effect_along(form.axis, ahead, fin.position)
+                effect = effect_along(form.axis, ahead, fin.place)
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
         acting = total(scaled(*part) for part in parts if abs(part[0]) > FAINT)
         if acting.names:

@@ -1,19 +1,21 @@
 """The layout of a vehicle: its axes, thrust curves, thrusters and fins, and which coefficients it has.
 
 A layout does not contain the values of the coefficients. `catalogue.py` declares the kinds of coefficients and
-variables. Standard library only.
-
-Two layouts are equal if the same compiled equation serves both. What a part only carries along, such as the source of a
-direction, is not compared.
+variables. Thrusters are the tables of the vehicle file themselves.
 """
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, sin
+from math import hypot, inf, sin
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Annotated, Literal, NamedTuple, TypeVar
+
+from pydantic import AfterValidator, BeforeValidator, InstanceOf, WithJsonSchema
+
+from rov_fmu.io.field_types import Finite, Name, Symbol, Text
+from rov_fmu.io.toml_file import Strict
 
 from .catalogue import (
     ANGLES,
@@ -179,25 +181,92 @@ def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
     return force[axis.place]
 
 
-@dataclass(frozen=True)
-class Thruster:
-    """A thruster. Its moments follow from its position.
+_FARTHEST = 100.0
+"""The largest coordinate of a position, m."""
 
-    A thruster with an arm instead of a position has only the torque ±R sin γ F about z, (4).
-    """
 
-    name: str
+def _vector(vector: object) -> object:
+    """Return a list of three entries as a tuple. Raises ValueError."""
+    if not isinstance(vector, list | tuple) or len(vector) != 3:
+        raise ValueError("must be three numbers: forward, starboard, down")
+    return tuple(vector)
+
+
+def _near(vector: Vector) -> Vector:
+    """Return a position if it can be on a vehicle. Raises ValueError."""
+    if max(map(abs, vector)) > _FARTHEST:
+        raise ValueError(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m")
+    return vector
+
+
+def _unit_vector(direction: Vector) -> Vector:
+    """Return a direction as a unit vector. Raises ValueError if its length is zero or extreme."""
+    x, y, z = direction
+    length = hypot(x, y, z)
+    if not 1e-6 <= length <= 1e6:
+        raise ValueError("must have a length, from 1e-6 to 1e6")
+    if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
+        length = 1.0
+    return x / length, y / length, z / length
+
+
+_Vector = Annotated[
+    tuple[Finite, Finite, Finite],
+    BeforeValidator(_vector),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
+]
+
+
+class Direction(Strict):
+    """The direction of the force at a positive command, and of a fin's lift while the vehicle moves ahead: forward,
+    starboard, down. It has any length except zero."""
+
+    value: Annotated[_Vector, AfterValidator(_unit_vector)]
+    """Three numbers: forward, starboard, down."""
+    source: Text
+    """Where the value comes from."""
+
+
+class Position(Strict):
+    """The position from the origin of the body frame, which is the centre of mass unless [body] says otherwise:
+    forward, starboard, down. It is needed for roll, pitch and yaw, unless the thruster has the key `arm`, or only turns
+    in yaw and acts straight up or down."""
+
+    value: Annotated[_Vector, AfterValidator(_near)]
+    """Three numbers: forward, starboard, down."""
+    unit: Literal["m"]
+    source: Text
+    """Where the value comes from."""
+
+
+class Driven(Strict):
+    """A thruster or a fin: a part that commands drive, without its numbers."""
+
+    name: Symbol
+    """The name. The FMU's variables contain it: `u_<name>` for the command, and `F_<name>` for a thruster's force."""
+    description: Name = ""
+    """A short description, for example "left thruster" or "rudder"."""
+    direction: Direction
+    position: Position | None = None
+
+    @property
+    def place(self) -> Vector:
+        """The position (m), or the centre of mass where there is none."""
+        return self.position.value if self.position else (0.0, 0.0, 0.0)
+
+
+class Thruster(Driven):
+    """A thruster: its curve, its direction and its place."""
+
     curve: str
-    """The name of its thrust curve."""
-    direction: tuple[float, float, float]
-    """The direction of a positive force: a unit vector in the body frame."""
-    position: tuple[float, float, float] | None = None
-    """The position relative to the centre of mass, m."""
-    arm: int = 0
-    """1 on the port side, where a force ahead turns the bow to starboard; -1 on the starboard side; 0 without arm."""
-    description: str = ""
-    sources: Mapping[str, str] = field(default_factory=dict, compare=False)
-    """The sources of `direction` and `position`."""
+    """The name of the thrust curve."""
+    arm: Literal["port", "starboard"] | None = None
+    """The side of a thruster that pushes ahead with the arm R sin γ, (4). This key replaces a position."""
+
+    @property
+    def side(self) -> float:
+        """1 on the port side, where a force ahead turns the bow to starboard; -1 on the other side; 0 without arm."""
+        return {None: 0.0, "port": 1.0, "starboard": -1.0}[self.arm]
 
     def effect(self, axis: Axis) -> float:
         """Return the force along an axis, or the torque about it, of a thrust of 1 N.
@@ -205,38 +274,28 @@ class Thruster:
         The torque by an arm is in units of R sin γ.
         """
         if self.position is None and axis.is_rotation:
-            return float(self.arm) if axis is YAW else 0.0
-        return effect_along(axis, self.direction, self.position or (0.0, 0.0, 0.0))
+            return self.side if axis is YAW else 0.0
+        return effect_along(axis, self.direction.value, self.place)
 
 
-@dataclass(frozen=True)
 class BodyForce(Thruster):
     """The force along one axis of the body, or the moment about it, where logs have a wrench and not thrusters."""
 
-    axis: Axis = SURGE
+    axis: InstanceOf[Axis]
 
     def effect(self, axis: Axis) -> float:
         """Return 1 for its own axis, and 0 for the others."""
         return float(axis is self.axis)
 
 
-@dataclass(frozen=True)
-class Fin:
+class Fin(Driven):
     """A control surface. Its lift is proportional to its angle."""
 
-    name: str
-    direction: tuple[float, float, float]
-    """The direction of the lift at a positive command ahead: a unit vector in the body frame."""
-    position: tuple[float, float, float]
-    """The position relative to the centre of mass, m."""
     has_drag: bool = False
-    description: str = ""
-    sources: Mapping[str, str] = field(default_factory=dict, compare=False)
-    """The sources of `direction` and `position`."""
 
     def effect(self, axis: Axis) -> float:
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
-        found = effect_along(axis, self.direction, self.position)
+        found = effect_along(axis, self.direction.value, self.place)
         return found if abs(found) > FAINT else 0.0
 
     def coefficient(self, key: str) -> str:
@@ -341,12 +400,13 @@ class Layout:
 
         Each axis has a force of its own, which is linear in its command. It has the name of the load from outside.
         """
-        axes, centre = tuple(axes), (0.0, 0.0, 0.0)
+        axes, source = tuple(axes), "The axis of the body"
+        centre = Position(value=(0.0, 0.0, 0.0), unit="m", source=source)
         forces = []
         for axis in (form.axis for form in axes):
             x, y, z = (float(n == axis.place) for n in range(3))
-            sources = {"direction": "The axis of the body"}
-            forces.append(BodyForce(axis.external, axis.external, (x, y, z), centre, sources=sources, axis=axis))
+            along, name = Direction(value=(x, y, z), source=source), axis.external
+            forces.append(BodyForce(name=name, curve=name, direction=along, position=centre, axis=axis))
         return cls(axes, tuple(Curve(force.name) for force in forces), tuple(forces))
 
     def extended(self, names: Iterable[str]) -> "Layout":
@@ -650,14 +710,16 @@ def _pushes(direction: tuple[float, float, float]) -> str:
 def _command(driven: Thruster | Fin) -> str:
     kind = "fin" if isinstance(driven, Fin) else "thruster"
     words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
-    return f"{words}, positive {_pushes(driven.direction)}"
+    return f"{words}, positive {_pushes(driven.direction.value)}"
 
 
 def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
     words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
     rest = ", in water at rest" if "d" in curve.keys else ""
-    return Declaration("N", f"{words}{share}{rest}, positive {_pushes(thruster.direction)}{cited(curve.equation)}")
+    return Declaration(
+        "N", f"{words}{share}{rest}, positive {_pushes(thruster.direction.value)}{cited(curve.equation)}"
+    )
 
 
 def arm(R: float, gamma: float) -> float:

@@ -44,7 +44,9 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     along = tuple(zip((SURGE, SWAY, HEAVE), "xyz", strict=True))
     yield "external_force", {axis.external: letter for axis, letter in along}
     for thruster in layout.thrusters:
-        only = [letter for part, (_, letter) in zip(thruster.direction, along, strict=True) if abs(part) > 1.0 - 1e-9]
+        only = [
+            letter for part, (_, letter) in zip(thruster.direction.value, along, strict=True) if abs(part) > 1.0 - 1e-9
+        ]
         yield f"thrust_{thruster.name}", {f"F_{thruster.name}": next(iter(only), None)}
     about = tuple(zip((ROLL, PITCH, YAW), "xyz", strict=True))
     yield "external_torque", {axis.external: letter for axis, letter in about}

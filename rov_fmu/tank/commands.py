@@ -23,6 +23,7 @@ from pydantic import Field
 
 from rov_fmu.equation.layout import BodyForce
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
+from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import listed, shown
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.tank.arrays import Array, spread
@@ -31,7 +32,6 @@ from rov_fmu.tank.channels import Topic, frames_of
 from rov_fmu.tank.clocks import ascending, held
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
-from rov_fmu.vehicle.quantity import Finite
 
 PULSE_RANGE = 800.0, 2200.0
 """The range of pulses that speed controllers get, µs."""

@@ -27,6 +27,7 @@ from rov_fmu.equation.catalogue import (
     coefficient_name,
 )
 from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
@@ -43,7 +44,7 @@ from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
-from rov_fmu.vehicle.quantity import Finite, Quantity
+from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, read_tables
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle

@@ -10,10 +10,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
+from rov_fmu.io.field_types import Name, Text, not_blank, printable
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped
 from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
-from rov_fmu.vehicle.quantity import Name, Text, not_blank, printable
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
 """Names of devices in Windows. No file can have such a name there, whatever its extension."""

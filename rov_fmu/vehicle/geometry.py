@@ -37,7 +37,7 @@ def check_thruster_places(layout: Layout) -> Iterator[str]:
     """Check that each thruster has either a position or an arm, where the vehicle turns."""
     losing = {curve.name for curve in layout.curves if "d" in curve.keys}
     for thruster in layout.thrusters:
-        key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
+        key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction.value
         if thruster.arm and thruster.position:
             yield key_line(f"{key}.arm", "must not be given together with position")
         elif thruster.arm and x <= 0.0:

@@ -1,4 +1,4 @@
-"""The building blocks of the tables of a vehicle file: texts, names, and values with their unit and source.
+"""The values in the tables of a vehicle file, with their unit and source.
 
 Hydrodynamic derivatives in the notation of Fossen and SNAME (X_udot, X_u|u|, X_u) are negative; hints say what to give
 instead of them.
@@ -7,54 +7,21 @@ instead of them.
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo, WithJsonSchema
 
 from rov_fmu.equation.catalogue import AXES, Axis, Declaration, cross_name
+from rov_fmu.io.field_types import SYMBOL_SCHEMA, Finite, Text, symbol
 from rov_fmu.io.toml_file import Strict, as_tuple, table_of
-
-
-def printable(text: str) -> str:
-    """Return the text if it has no control characters. Raises ValueError."""
-    if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
-        raise ValueError(f"must be without the control character {found[0]!a}")
-    return text
-
-
-def not_blank(text: str) -> str:
-    """Return the text if it has more than white space. Raises ValueError."""
-    if not text.strip():
-        raise ValueError("must not be blank")
-    return text
-
-
-Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(printable), AfterValidator(not_blank)]
-Name = Annotated[
-    str,
-    Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"),
-    AfterValidator(printable),
-    AfterValidator(not_blank),
-]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def _symbol(text: str) -> str:
-    """Return the text if it can be part of a variable's name. Raises ValueError."""
-    if not re.fullmatch(r"[A-Za-z0-9_]{1,30}", text):
-        raise ValueError("must be at most 30 letters, digits and underscores")
-    return text
 
 
 def _cross_symbol(text: str) -> str:
     """Return the text if it can be the name of a coefficient of several axes. Raises ValueError."""
     if "|" in text and (hint := derivative_hint(text)):
         raise ValueError(f"is not a coefficient of several axes{hint}")
-    return _symbol(text)
+    return symbol(text)
 
 
-_SYMBOL = WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})
-Symbol = Annotated[str, AfterValidator(_symbol), _SYMBOL]
-"""A name that becomes part of the names of FMU variables."""
-CrossSymbol = Annotated[str, AfterValidator(_cross_symbol), _SYMBOL]
+CrossSymbol = Annotated[str, AfterValidator(_cross_symbol), SYMBOL_SCHEMA]
 """A key of [cross], which is also a name in the FMU."""
 
 Interval = Annotated[

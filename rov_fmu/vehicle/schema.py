@@ -5,7 +5,6 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
-from math import hypot
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
@@ -29,23 +28,13 @@ from rov_fmu.equation.catalogue import (
     cross_of,
     declarations_of,
 )
-from rov_fmu.equation.layout import CurrentTable, Layout, ThrustTable, VehicleAxis
+from rov_fmu.equation.layout import CurrentTable, Driven, Layout, Position, Thruster, ThrustTable, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.field_types import Finite, Name, Symbol, Text, not_blank
 from rov_fmu.io.paths import inside_or_shipped
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, as_tuple, folder_of, table_of, validate
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, folder_of, table_of, validate
 from rov_fmu.vehicle.description import FileHead, Provenance, Validity
-from rov_fmu.vehicle.quantity import (
-    CrossSymbol,
-    Finite,
-    Name,
-    Quantity,
-    Symbol,
-    Text,
-    derivative,
-    derivative_hint,
-    not_blank,
-    quantity,
-)
+from rov_fmu.vehicle.quantity import CrossSymbol, Quantity, derivative, derivative_hint, quantity
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 
 FORMAT = 2
@@ -66,6 +55,7 @@ def _coefficients(
     words: str = "",
     negative: Mapping[str, str] = _NONE,
     needed: bool = True,
+    base: type[Strict] = Strict,
 ) -> Any:
     """Return a table with a key for each coefficient, of which any may be missing.
 
@@ -77,7 +67,7 @@ def _coefficients(
         one = quantity(f"{name}_{key}", declaration, negative.get(key, ""))
         fields[key] = (one | None, Field(None, description=declaration.description))
     told = [key for key, declaration in declarations.items() if needed and declaration.needed]
-    return table_of(f"_{name}", Strict, fields, words, told)
+    return table_of(f"_{name}", base, fields, words, told)
 
 
 def given_quantities(table: Strict, kinds: Mapping[str, Declaration]) -> dict[str, Quantity]:
@@ -253,120 +243,24 @@ class Axes(table_of("_Axes", Strict, _axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
 
 
-# ---- Thrusters -------------------------------------------------------------------------------------------------------
+# ---- Fins, battery ---------------------------------------------------------------------------------------------------
 
 
-_FARTHEST = 100.0
-"""The largest coordinate of a position, m."""
+_FIN = {key: kind.filled(fin="fin") for key, kind in FIN.items()}
 
 
-def _vector(vector: object) -> object:
-    """Return a list of three entries as a tuple. Raises ValueError."""
-    if not isinstance(vector, list) or len(vector) != 3:
-        raise ValueError("must be three numbers: forward, starboard, down")
-    return as_tuple(vector)
-
-
-def _near(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return a position if it can be on a vehicle. Raises ValueError."""
-    if max(map(abs, vector)) > _FARTHEST:
-        raise ValueError(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m")
-    return vector
-
-
-def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return a direction if its length is neither zero nor extreme. Raises ValueError."""
-    if not 1e-6 <= hypot(*vector) <= 1e6:
-        raise ValueError("must have a length, from 1e-6 to 1e6")
-    return vector
-
-
-def _unit_vector(direction: layout.Vector) -> layout.Vector:
-    """Return a direction as a unit vector."""
-    x, y, z = direction
-    length = hypot(x, y, z)
-    if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
-        length = 1.0
-    return x / length, y / length, z / length
-
-
-_Vector = Annotated[
-    tuple[Finite, Finite, Finite],
-    BeforeValidator(_vector),
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
-]
-
-
-class Direction(Strict):
-    """The direction of the force at a positive command: forward, starboard, down. It has any length except zero."""
-
-    value: Annotated[_Vector, AfterValidator(_not_zero)]
-    """Three numbers: forward, starboard, down."""
-    source: Text
-    """Where the value comes from."""
-
-
-class Position(Strict):
-    """The position from the origin of the body frame, which is the centre of mass unless [body] says otherwise:
-    forward, starboard, down. It is needed for roll, pitch and yaw, unless the thruster has the key `arm`, or only turns
-    in yaw and acts straight up or down."""
-
-    value: Annotated[_Vector, AfterValidator(_near)]
-    """Three numbers: forward, starboard, down."""
-    unit: Literal["m"]
-    source: Text
-    """Where the value comes from."""
-
-
-class Thruster(Strict):
-    """A thruster: its curve, its direction and its place."""
-
-    name: Symbol
-    """The name. The FMU's variables for the command and the force contain it: `u_<name>`, `F_<name>`."""
-    description: Name = ""
-    """A short description, for example "left thruster"."""
-    curve: str
-    """The name of the thrust curve."""
-    direction: Direction
-    position: Position | None = None
-    arm: Literal["port", "starboard"] | None = None
-    """The side of a thruster that pushes ahead with the arm R sin γ, (4). This key replaces a position."""
-
-    def for_model(self) -> layout.Thruster:
-        """Return the thruster of the model, with a unit vector as its direction."""
-        arm = {None: 0, "port": 1, "starboard": -1}[self.arm]
-        position = self.position.value if self.position else None
-        return layout.Thruster(self.name, self.curve, position=position, arm=arm, **_driven(self))
-
-
-class Fin(_coefficients("Fin", {key: kind.filled(fin="fin") for key, kind in FIN.items()})):  # type: ignore[misc]
+class Fin(_coefficients("Fin", _FIN, base=Driven)):  # type: ignore[misc]
     """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
     command."""
 
     model_config = DOCUMENTED
 
-    name: Symbol
-    """The name. The FMU's variable for the command contains it: `u_<name>`."""
-    description: Name = ""
-    """A short description, for example "rudder"."""
-    direction: Direction
-    """The direction of the lift at a positive command while the vehicle moves ahead."""
     position: Position
 
     def for_model(self) -> layout.Fin:
-        """Return the fin of the model, with a unit vector as its direction."""
-        has_drag = self.drag is not None
-        return layout.Fin(self.name, position=self.position.value, has_drag=has_drag, **_driven(self))
-
-
-def _driven(one: Thruster | Fin) -> dict[str, Any]:
-    """Return the direction of a thruster or a fin, its description, and the sources of its direction and position."""
-    given = {"direction": one.direction, "position": one.position}
-    return {
-        "direction": _unit_vector(one.direction.value),
-        "description": one.description,
-        "sources": {key: place.source for key, place in given.items() if place},
-    }
+        """Return the fin of the model, which has no numbers."""
+        own = {key: getattr(self, key) for key in Driven.model_fields}
+        return layout.Fin.model_construct(**own, has_drag=self.drag is not None)
 
 
 class Battery(Strict):
@@ -447,7 +341,6 @@ class Tables(Strict):
         axes = tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items())
         curves = tuple(curve.for_model(name) for name, curve in self.curves.items())
         coupled = bool(self.body and self.body.coupling)
-        thrusters = tuple(t.for_model() for t in self.thruster)
         cross = tuple(filter(None, map(cross_of, self.cross)))
         restoring = tuple(given_quantities(self.body, RESTORING)) if self.body else ()
         fins = tuple(fin.for_model() for fin in self.fin)
@@ -456,7 +349,18 @@ class Tables(Strict):
         source = self.battery.voltage.source if self.battery else ""
         pulse = self.commands.pulse if self.commands else None
         return Layout(
-            axes, curves, thrusters, self.inputs, coupled, cross, restoring, fins, has_dead_time, voltage, pulse, source
+            axes,
+            curves,
+            tuple(self.thruster),
+            self.inputs,
+            coupled,
+            cross,
+            restoring,
+            fins,
+            has_dead_time,
+            voltage,
+            pulse,
+            source,
         )
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:

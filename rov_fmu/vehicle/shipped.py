@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
 from rov_fmu.io.messages import NO_FILE, FileError, did_you_mean
 from rov_fmu.io.paths import MODELS
@@ -12,7 +12,8 @@ SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODE
 """The vehicle files that ship, by name."""
 VIDEORAY = SHIPPED["videoray"]
 
-_SOURCES = {"direction": "the form of the paper's vehicle: two rear thrusters ahead, one down"}
+_FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
+_AHEAD, _DOWN = (Direction(value=along, source=_FORM) for along in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 PAPER = Layout(
     axes=(VehicleAxis(SURGE), VehicleAxis(HEAVE), VehicleAxis(YAW)),
     curves=(
@@ -20,9 +21,9 @@ PAPER = Layout(
         Curve("top", description="top thruster", equation="(10)"),
     ),
     thrusters=(
-        Thruster("l", "rear", (1.0, 0.0, 0.0), arm=1, description="left thruster", sources=_SOURCES),
-        Thruster("r", "rear", (1.0, 0.0, 0.0), arm=-1, description="right thruster", sources=_SOURCES),
-        Thruster("t", "top", (0.0, 0.0, 1.0), description="top thruster", sources=_SOURCES),
+        Thruster(name="l", description="left thruster", direction=_AHEAD, curve="rear", arm="port"),
+        Thruster(name="r", description="right thruster", direction=_AHEAD, curve="rear", arm="starboard"),
+        Thruster(name="t", description="top thruster", direction=_DOWN, curve="top"),
     ),
 )
 """The layout of the paper's vehicle: surge, heave and yaw, a pair of rear thrusters and one on top."""

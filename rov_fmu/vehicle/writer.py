@@ -9,7 +9,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from rov_fmu.equation.layout import Curve, Fin, Thruster
+from rov_fmu.equation.layout import Curve
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
@@ -58,8 +58,8 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "commands": {"pulse": layout.pulse} if layout.pulse else {},
         "battery": {} if layout.voltage is None else {"voltage": voltage},
         "curves": {curve.name: _curve(curve) for curve in layout.curves},
-        "thruster": [_driven(thruster) for thruster in layout.thrusters],
-        "fin": [_driven(fin) for fin in layout.fins],
+        "thruster": [thruster.model_dump() for thruster in layout.thrusters],
+        "fin": [fin.model_dump(exclude={"has_drag"}) for fin in layout.fins],
         "axes": {name: {} for name in layout.kinds},
         "cross": {},
         "inputs": layout.mix,
@@ -104,20 +104,6 @@ def _curve(curve: Curve) -> dict[str, Any]:
         "table": tables[0]["table"] if len(tables) == 1 else None,
         "tables": tables if len(tables) > 1 else None,
         "electric_current": {"voltage": current.voltage, "table": current.path} if current else None,
-    }
-
-
-def _driven(driven: Thruster | Fin) -> dict[str, Any]:
-    """Return the keys of a thruster or a fin without its coefficients."""
-    position = {"value": driven.position, "unit": "m", "source": driven.sources.get("position", NOT_GIVEN)}
-    arm = getattr(driven, "arm", 0)
-    return {
-        "name": driven.name,
-        "description": driven.description,
-        "curve": getattr(driven, "curve", None),
-        "direction": {"value": driven.direction, "source": driven.sources.get("direction", NOT_GIVEN)},
-        "position": position if driven.position else None,
-        "arm": {0: None, 1: "port", -1: "starboard"}[arm],
     }
 
 

@@ -151,7 +151,7 @@ def test_jets_leave_against_the_force() -> None:
     for thruster, arrow in zip(pushing, entity.arrows, strict=True):
         q = arrow.pose.orientation
         x_axis = np.array([1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y + q.z * q.w), 2 * (q.x * q.z - q.y * q.w)])
-        forward, starboard, down = thruster.direction
+        forward, starboard, down = thruster.direction.value
         against = -np.sign(forces[thruster.name]) * np.array([forward, -starboard, -down])
         np.testing.assert_allclose(x_axis, against, atol=1e-12)
         lengths.append((arrow.shaft_length + arrow.head_length) / abs(forces[thruster.name]) * longest)

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.layout import Curve, Thruster
+from rov_fmu.equation.layout import Curve
 from rov_fmu.vehicle.schema import MOST
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
-from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, numbered, random_inputs, random_state
+from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, numbered, random_inputs, random_state, thruster
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def test_a_vehicle_with_the_most_curves_moves_as_in_python() -> None:
     """Each curve with a lag is a component of its own, so there are more components than bits in an int."""
     curves = tuple(Curve(f"c{n}", ("a_t", "b_t", "T")) for n in range(MOST))
     thrusters = tuple(
-        Thruster(f"{n}", f"c{n}", (cos(n), sin(n), 0.1 * (n % 3)), (0.1 * (n % 4), 0.2 - 0.1 * (n % 5), 0.05))
+        thruster(f"{n}", f"c{n}", (cos(n), sin(n), 0.1 * (n % 3)), (0.1 * (n % 4), 0.2 - 0.1 * (n % 5), 0.05))
         for n in range(MOST)
     )
     layout = replace(SIX.layout, curves=curves, thrusters=thrusters, fins=(), mix={})

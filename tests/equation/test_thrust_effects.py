@@ -14,11 +14,11 @@ from scipy.interpolate import PchipInterpolator
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.equation.layout import Curve, Fin, ThrustTable
+from rov_fmu.equation.layout import Curve, ThrustTable
 from rov_fmu.equation.step import MOST_WAITING, Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import SIX, THRUST_EFFECTS, Values, at_rest, numbered, random_inputs, random_state
+from tests.vehicles import SIX, THRUST_EFFECTS, Values, at_rest, fin, numbered, random_inputs, random_state
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces
 from verification.references.rigid_vehicle import compared, places
@@ -26,7 +26,7 @@ from verification.references.rigid_vehicle import compared, places
 ROV = load_vehicle(THRUST_EFFECTS)
 _AFT = (-0.5, 0.05, 0.1)
 FINNED = numbered(
-    replace(SIX.layout, fins=(Fin("rudder", (0.0, 0.6, 0.8), _AFT, True), Fin("plane", (0.0, 0.0, 1.0), _AFT))),
+    replace(SIX.layout, fins=(fin("rudder", (0.0, 0.6, 0.8), _AFT, True), fin("plane", (0.0, 0.0, 1.0), _AFT))),
     lift_rudder=9.0,
     drag_rudder=4.0,
     angle_max_rudder=0.4,

@@ -113,7 +113,9 @@ def test_the_names_of_groups_differ_whatever_the_names_of_curves_and_thrusters_a
     renamed = replace(
         layout,
         curves=(replace(first, name="external"), second),
-        thrusters=tuple(replace(t, curve={first.name: "external"}.get(t.curve, t.curve)) for t in layout.thrusters),
+        thrusters=tuple(
+            t.model_copy(update={"curve": {first.name: "external"}.get(t.curve, t.curve)}) for t in layout.thrusters
+        ),
     )
     found = [group.get("name") for group in groups_of(renamed)]
     assert len({*found}) == len(found)

@@ -12,14 +12,14 @@ from scipy.stats import t
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.interface.tune_command import source
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.recordings import AXES
-from tests.vehicles import pulsed
+from tests.vehicles import pulsed, thruster
 
 HEAVE_AT_30 = ["--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "--tau", "2.209"]
 
@@ -194,9 +194,9 @@ BUOYANT = Vehicle(
         (VehicleAxis(SWAY), VehicleAxis(HEAVE, ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0"))),
         (Curve("prop", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")),),
         (
-            Thruster("port", "prop", (0.0, 0.0, 1.0), (0.0, -0.2, 0.0)),
-            Thruster("starboard", "prop", (0.0, 0.0, 1.0), (0.0, 0.2, 0.0)),
-            Thruster("aside", "prop", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
+            thruster("port", "prop", (0.0, 0.0, 1.0), (0.0, -0.2, 0.0)),
+            thruster("starboard", "prop", (0.0, 0.0, 1.0), (0.0, 0.2, 0.0)),
+            thruster("aside", "prop", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
         ),
     ),
     {"m_rov": 11.0, "m_a_w": 14.0, "a_d_v": 60.0, "b_d_v": 2.0, "alpha_v": 0.9, "beta_v": 0.8}

@@ -14,7 +14,6 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, Axis
-from rov_fmu.equation.layout import Thruster
 from rov_fmu.fmu.archive import web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.csv_table import DataFileError
@@ -28,7 +27,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.report.conftest import Visit
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes, pulsed
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes, pulsed, thruster
 from verification.references.fmpy_slave import fmpy_slave
 
 pytestmark = pytest.mark.interop
@@ -548,7 +547,7 @@ _FOUR = (
 def four_thrusters(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The address of the page of a vehicle whose thrusters have long labels and are close together."""
     vehicle = load_vehicle(SHIPPED["videoray"])
-    layout = replace(vehicle.layout, thrusters=tuple(Thruster(*one) for one in _FOUR))
+    layout = replace(vehicle.layout, thrusters=tuple(thruster(*one) for one in _FOUR))
     rov = Vehicle(layout, {name: vehicle.coefficients[name] for name in layout.coefficients})
     target = tmp_path_factory.mktemp("four") / "four.html"
     target.write_text(fly_page([Flown(a_vehicle(rov), web_module(rov.layout))]), encoding="utf-8")
@@ -612,10 +611,10 @@ def test_each_thruster_has_its_label_and_throws_its_jet_against_its_force(
     page = flying(quiet, pages("heavy"), width=1440).page
     labels = page.locator("#live-picture .craft:not(.ghostly) text").all_text_contents()
     # The file describes the thrusters by their corners too, in the words of the sea.
-    for label, thruster in zip(labels, heavy.layout.thrusters, strict=True):
+    for label, one in zip(labels, heavy.layout.thrusters, strict=True):
         words = label.replace("left", "port").replace("right", "starboard").split()
-        assert all(word in thruster.description for word in words), (label, thruster.description)
-        assert ("vertical" in words) == ("vertical" in thruster.description)
+        assert all(word in one.description for word in words), (label, one.description)
+        assert ("vertical" in words) == ("vertical" in one.description)
     tubes, jets, forces = page.evaluate("""() => {
         live.pause(true);
         live.look();
@@ -637,9 +636,9 @@ def test_each_thruster_has_its_label_and_throws_its_jet_against_its_force(
     inner = sorted((at for at in tubes if at[0] > middle), key=lambda at: at[0])[:2]
     front, rear = sorted(inner, key=lambda at: at[1])
     (front_jet, rear_jet) = jets
-    assert heavy.layout.thrusters[0].direction[0] < 0.0 < heavy.layout.thrusters[2].direction[0]
+    assert heavy.layout.thrusters[0].direction.value[0] < 0.0 < heavy.layout.thrusters[2].direction.value[0]
     for jet, tube, n, force in ((front_jet, front, 0, forces[0]), (rear_jet, rear, 2, forces[1])):
-        ahead, aside, _ = heavy.layout.thrusters[n].direction
+        ahead, aside, _ = heavy.layout.thrusters[n].direction.value
         assert (tube[1] - jet[1]) * force * ahead < 0.0
         assert (jet[0] - tube[0]) * force * aside < 0.0
 

@@ -195,7 +195,9 @@ def test_every_thruster_is_within_the_icon(kind: str) -> None:
     points += [end for arrow in arrows for end in (arrow.xy, arrow.xyann)]
     assert points
     assert all(left < x < right and high < y < low for x, y in points)
-    horizontal = {(t.direction, t.position, t.arm) for t in VEHICLES[kind].layout.thrusters if t.direction[2] == 0.0}
+    horizontal = {
+        (t.direction.value, t.position, t.arm) for t in VEHICLES[kind].layout.thrusters if t.direction.value[2] == 0.0
+    }
     assert len(arrows) == len(horizontal)
 
 
@@ -208,11 +210,11 @@ def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehi
     names = {text.get_text() for text in ax.texts}
     for thruster in heavy.layout.thrusters:
         assert f"$F_{{{thruster.name}}}$" in names
-        x, y, _ = thruster.position or (0.0, 0.0, 0.0)
-        if thruster.direction[2] == 0.0:
+        x, y, _ = thruster.place
+        if thruster.direction.value[2] == 0.0:
             ((start, tip),) = [(a, b) for a, b in arrows.items() if hypot(a[0] - x, a[1] - y) < 0.03]
             along = tip[0] - start[0], tip[1] - start[1]
-            expected = atan2(thruster.direction[1], thruster.direction[0])
+            expected = atan2(thruster.direction.value[1], thruster.direction.value[0])
             assert atan2(along[1], along[0]) == pytest.approx(expected, abs=0.2)
     assert ax.yaxis_inverted()
 

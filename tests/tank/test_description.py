@@ -36,20 +36,21 @@ from tests.folders import (
     rows_of,
 )
 from tests.recordings import clean, write_log
+from tests.vehicles import sources_of
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def sources_of(vehicle: Vehicle) -> dict[str, dict[str, str]]:
+def sources_by_name(vehicle: Vehicle) -> dict[str, dict[str, str]]:
     """The sources of the direction and the position of each thruster."""
-    return {thruster.name: {**thruster.sources} for thruster in vehicle.layout.thrusters}
+    return {thruster.name: sources_of(thruster) for thruster in vehicle.layout.thrusters}
 
 
 def read_again(found: Identification, path: Path) -> None:
     """Check that the vehicle can be written to a file and read again."""
     write_vehicle(found.vehicle, path)
     assert load_vehicle(path).layout == found.vehicle.layout
-    assert sources_of(load_vehicle(path)) == sources_of(found.vehicle)
+    assert sources_by_name(load_vehicle(path)) == sources_by_name(found.vehicle)
 
 
 # ---- A vehicle to begin from -----------------------------------------------------------------------------------------
@@ -76,7 +77,7 @@ def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
     assert {name: found.vehicle.sources[name] for name in same} == {name: base.sources[name] for name in same}
     for name in curve:  # thrust and drag have a common scale, which velocities do not tell
         assert found.vehicle[name] == pytest.approx(base[name], rel=0.03)
-    assert sources_of(found.vehicle) == sources_of(base)
+    assert sources_by_name(found.vehicle) == sources_by_name(base)
     assert not by_heading(found.findings)["Warnings"], (
         "untested axes are as they were, which is no shortcoming of the data"
     )
@@ -153,7 +154,7 @@ def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     for name, value in (known | drag | {"beta_u": 1.0, "beta_v": 1.0, "beta_r": 1.0}).items():
         assert found.vehicle[name] == pytest.approx(value, rel=0.02), name
     assert found.vehicle.sources["m_a_v"] == "a strip"
-    assert sources_of(found.vehicle)["3"] == {"direction": "drawn: 3", "position": "drawn too"}
+    assert sources_by_name(found.vehicle)["3"] == {"direction": "drawn: 3", "position": "drawn too"}
     assert found.vehicle.layout.signs(SWAY) == {"u_1": 1.0, "u_2": -1.0, "u_3": 1.0, "u_4": -1.0}
     read_again(found, tmp_path / "mine.toml")
 

@@ -312,6 +312,6 @@ def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int,
         assert {"surge", "yaw"} <= layout.kinds.keys()
         assert given.vehicle.coefficients.keys() == layout.coefficients.keys() >= given.known.keys()
         assert all(isfinite(value) for value in given.vehicle.coefficients.values())
-        assert all("direction" in thruster.sources for thruster in layout.thrusters)
+        assert all(thruster.direction.source for thruster in layout.thrusters)
 
     fuzz(check, examples)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.records import recorded
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import PAPER
 from tests.tank.logs import Read, commanded, measured, read_log, used
+from tests.vehicles import thruster
 
 N = 40
 STEP = [0.3 * (n >= 10) for n in range(N)]
@@ -22,8 +23,8 @@ MIXED = Layout(
     axes=(VehicleAxis(SURGE), VehicleAxis(YAW)),
     curves=(Curve("rear"),),
     thrusters=(
-        Thruster("l", "rear", (1.0, 0.0, 0.0), (-0.2, -0.1, 0.0)),
-        Thruster("r", "rear", (1.0, 0.0, 0.0), (-0.2, 0.1, 0.0)),
+        thruster("l", "rear", (1.0, 0.0, 0.0), (-0.2, -0.1, 0.0)),
+        thruster("r", "rear", (1.0, 0.0, 0.0), (-0.2, 0.1, 0.0)),
     ),
     mix={"ahead": {"l": 1.0, "r": 1.0}, "turn": {"l": 0.5, "r": -0.5}},
 )

@@ -25,7 +25,7 @@ from rov_fmu.equation.catalogue import (
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS
+from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS, sources_of
 
 EFFECTS = THRUST_EFFECTS.read_text(encoding="utf-8")
 TEXT, SIX = (path.read_text(encoding="utf-8") for path in (EVERYTHING, SIX_AXES))
@@ -77,14 +77,16 @@ def test_every_key_is_read(everything: Vehicle) -> None:
     assert set(rov.coefficients) == set(layout.coefficients) == set(everything.sources)
     assert list(layout.mix) == ["surge", "sway", "yaw", "heave", "boost"]
     assert everything.intervals == {"m_rov": (13.0, 14.0)}
-    assert everything.layout.thrusters[0].sources == {"direction": "A", "position": "A"}
+    assert sources_of(everything.layout.thrusters[0]) == {"direction": "A", "position": "A"}
 
 
 def test_a_direction_of_any_length_is_a_unit_vector(everything: Vehicle) -> None:
     first, left = everything.layout.thrusters[0], everything.layout.thrusters[-2]
-    assert all(isclose(part, exact) for part, exact in zip(first.direction, (sqrt(0.5), -sqrt(0.5), 0.0), strict=True))
-    assert left.direction == (1.0, 0.0, 0.0)
-    assert (left.arm, left.position) == (1, None)
+    assert all(
+        isclose(part, exact) for part, exact in zip(first.direction.value, (sqrt(0.5), -sqrt(0.5), 0.0), strict=True)
+    )
+    assert left.direction.value == (1.0, 0.0, 0.0)
+    assert (left.arm, left.position) == ("port", None)
 
 
 def test_a_vectored_thruster_turns_by_its_lever(everything: Vehicle) -> None:

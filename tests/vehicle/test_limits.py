@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration
-from rov_fmu.equation.layout import CurrentTable, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import CurrentTable, Curve, Layout, Thruster, VehicleAxis, _near, _unit_vector
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.description import _identifier
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_mass, check_thruster_places, doubts
 from rov_fmu.vehicle.published import Cell
 from rov_fmu.vehicle.quantity import derivative_hint, within
-from rov_fmu.vehicle.schema import Estimated, _near, _not_zero, _pulses, _rising, _unit_vector
+from rov_fmu.vehicle.schema import Estimated, _pulses, _rising
 from rov_fmu.vehicle.thrust_table import read_thrust, thrust_table
 from rov_fmu.vehicle.uncertainty import (
     Uncertainty,
@@ -31,7 +31,7 @@ from rov_fmu.vehicle.uncertainty import (
 )
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.vehicles import SIX, numbered
+from tests.vehicles import SIX, numbered, thruster
 
 MASS = 13.5
 
@@ -56,8 +56,6 @@ def lines(of: Any) -> list[str]:
         (_pulses, [1100, 1500, 1900], [1100, 1500, 1900, 2000]),
         (_pulses, [1100, 1500, 1900], (1100, 1500, 1900)),
         (_near, (100.0, -100.0, 0.0), (0.0, 0.0, -100.1)),
-        (_not_zero, (1e-6, 0.0, 0.0), (0.9e-6, 0.0, 0.0)),
-        (_not_zero, (0.0, -1e6, 0.0), (0.0, -1.1e6, 0.0)),
         (_identifier, "a" * 100, "a" * 101),
         (_identifier, "COM10", "COM9"),
         (_identifier, "_1", "1_"),
@@ -95,6 +93,11 @@ def test_a_direction_becomes_a_unit_vector_unless_it_is_one() -> None:
     nearly = (sqrt(0.5), sqrt(0.5), 1e-7)
     assert _unit_vector(nearly) == nearly
     assert _unit_vector((1.0 + 2e-12, 0.0, 0.0)) == (1.0, 0.0, 0.0)
+    assert _unit_vector((1e-6, 0.0, 0.0)) == (1.0, 0.0, 0.0)
+    assert _unit_vector((0.0, -1e6, 0.0)) == (0.0, -1.0, 0.0)
+    for beyond in ((0.9e-6, 0.0, 0.0), (0.0, -1.1e6, 0.0)):
+        with pytest.raises(ValueError, match="must have a length"):
+            _unit_vector(beyond)
 
 
 @pytest.mark.parametrize(
@@ -130,8 +133,8 @@ def _driven(*thrusters: Thruster, mix: dict[str, dict[str, float]] | None = None
 
 @pytest.mark.parametrize(("angle", "independent"), [(2e-6, True), (0.9e-6, False), (-2e-6, True), (0.0, False)])
 def test_two_axes_are_driven_apart_when_their_effects_differ_by_a_millionth(angle: float, independent: bool) -> None:
-    one = Thruster("a", "c", (sqrt(0.5), sqrt(0.5), 0.0))
-    other = Thruster("b", "c", (sqrt(0.5) * (cos(angle) - sin(angle)), sqrt(0.5) * (cos(angle) + sin(angle)), 0.0))
+    one = thruster("a", "c", (sqrt(0.5), sqrt(0.5), 0.0))
+    other = thruster("b", "c", (sqrt(0.5) * (cos(angle) - sin(angle)), sqrt(0.5) * (cos(angle) + sin(angle)), 0.0))
     found = lines(check_axes(_driven(one, other)))
     assert (found == []) == independent
     assert all("axes.sway: the thrusters cancel: they drive it only together with surge" in line for line in found)
@@ -139,9 +142,9 @@ def test_two_axes_are_driven_apart_when_their_effects_differ_by_a_millionth(angl
 
 def test_inputs_whose_gains_cancel_are_named() -> None:
     pair = (
-        Thruster("a", "c", (1.0, 0.0, 0.0)),
-        Thruster("b", "c", (0.0, 1.0, 0.0)),
-        Thruster("d", "c", (1.0, 0.0, 0.0)),
+        thruster("a", "c", (1.0, 0.0, 0.0)),
+        thruster("b", "c", (0.0, 1.0, 0.0)),
+        thruster("d", "c", (1.0, 0.0, 0.0)),
     )
     idle = _driven(*pair, mix={"x": {"a": 1.0, "d": -1.0}, "y": {"b": 1.0}})
     assert lines(check_inputs(idle)) == ["inputs.x: drives no axis of the vehicle: its gains cancel"]
@@ -153,13 +156,15 @@ def test_a_thruster_needs_a_place_where_the_vehicle_turns() -> None:
         layout = replace(_driven(thruster, keys=keys), axes=(VehicleAxis(HEAVE), VehicleAxis(axis)))
         return lines(check_thruster_places(layout))
 
-    assert places(Thruster("a", "c", (0.0, 0.0, 1.0))) == []
-    assert places(Thruster("a", "c", (0.0, 0.9e-6, 1.0))) == []
-    assert "and the vehicle has yaw" in places(Thruster("a", "c", (0.0, 2e-6, 1.0)))[0]
-    assert places(Thruster("a", "c", (1.0, 0.0, 0.0)), SURGE) == []
-    assert "pushes ahead" in places(Thruster("a", "c", (0.0, 1.0, 0.0), arm=1))[0]
-    assert places(Thruster("a", "c", (1.0, 0.0, 0.0), arm=1)) == []
-    assert "d of the curve c needs a place" in places(Thruster("a", "c", (1.0, 0.0, 0.0), arm=1), YAW, "a_t b_t d")[0]
+    assert places(thruster("a", "c", (0.0, 0.0, 1.0))) == []
+    assert places(thruster("a", "c", (0.0, 0.9e-6, 1.0))) == []
+    assert "and the vehicle has yaw" in places(thruster("a", "c", (0.0, 2e-6, 1.0)))[0]
+    assert places(thruster("a", "c", (1.0, 0.0, 0.0)), SURGE) == []
+    assert "pushes ahead" in places(thruster("a", "c", (0.0, 1.0, 0.0), arm="port"))[0]
+    assert places(thruster("a", "c", (1.0, 0.0, 0.0), arm="port")) == []
+    assert (
+        "d of the curve c needs a place" in places(thruster("a", "c", (1.0, 0.0, 0.0), arm="port"), YAW, "a_t b_t d")[0]
+    )
 
 
 @pytest.mark.parametrize(

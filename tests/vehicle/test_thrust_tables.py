@@ -16,7 +16,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.vehicle.test_checks import GONE, changed, quantity
 from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, THRUST_EFFECTS, carried
+from tests.vehicles import EVERYTHING, THRUST_EFFECTS, carried, sources_of
 
 TEXT = THRUST_EFFECTS.read_text(encoding="utf-8")
 _FILES = ("thrust_12_v.csv", "thrust_16_v.csv")
@@ -179,7 +179,9 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     assert carried(written) == carried(load_vehicle(here))
     files = [[table.path.name for table in curve.tables if table.path] for curve in written.layout.curves]
     assert files == [["thrust_12_v.csv", "thrust_16_v.csv"], ["thrust_16_v.csv"], []]
-    assert [fin.sources.keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(written.layout.fins)
+    assert [sources_of(fin).keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(
+        written.layout.fins
+    )
     assert written.layout.voltage_source == "a battery of four cells"
     assert {name: tuned[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
         "lift_rudder": 10.0,

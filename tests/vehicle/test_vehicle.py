@@ -3,6 +3,7 @@
 import re
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
+from tests.vehicles import sources_of
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 WITH_SHIPPED_FOLDERS = re.sub(r'^(data|pictures) = "', r'\1 = "videoray/', TEXT, flags=re.MULTILINE)
@@ -44,10 +46,13 @@ TABLE_9 = {
 
 def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
     assert vehicle.coefficients == TABLE_9
-    assert vehicle.layout == PAPER
+    assert replace(vehicle.layout, thrusters=PAPER.thrusters) == PAPER
+    for one, other in zip(vehicle.layout.thrusters, PAPER.thrusters, strict=True):  # only their sources differ
+        assert one.model_copy(update={"direction": other.direction}) == other
+        assert one.direction.value == other.direction.value
     assert set(vehicle.sources) == set(TABLE_9)
     assert all("Table 9" in source for source in vehicle.sources.values())
-    assert {one.name: [*one.sources] for one in vehicle.layout.thrusters} == {n: ["direction"] for n in "lrt"}
+    assert {one.name: [*sources_of(one)] for one in vehicle.layout.thrusters} == {n: ["direction"] for n in "lrt"}
     assert [a.values for a in vehicle.alternatives.values()] == [{"a_t_rear": 100.3, "b_t_rear": -27.09}]
     assert vehicle.command_range == (0.2, 0.7)
 

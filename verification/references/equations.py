@@ -157,13 +157,13 @@ def effect(rov: Vehicle, thruster: Thruster, velocity: str) -> Number:
     The torque is x Y - y X for a thruster with a position, and R sin γ for one with an arm (4).
     """
     if velocity != "r":
-        return mp.mpf(thruster.direction[PLACES[velocity]])
+        return mp.mpf(thruster.direction.value[PLACES[velocity]])
     if thruster.position is not None:
-        x, y, _ = map(mp.mpf, thruster.position)
-        return x * mp.mpf(thruster.direction[1]) - y * mp.mpf(thruster.direction[0])
+        x, y, _ = map(mp.mpf, thruster.position.value)
+        return x * mp.mpf(thruster.direction.value[1]) - y * mp.mpf(thruster.direction.value[0])
     if not thruster.arm:
         return mp.zero
-    return thruster.arm * mp.mpf(rov.coefficients["R"]) * mp.sin(mp.mpf(rov.coefficients["gamma"]))
+    return thruster.side * mp.mpf(rov.coefficients["R"]) * mp.sin(mp.mpf(rov.coefficients["gamma"]))
 
 
 def equations(rov: Vehicle, inputs: Mapping[str, Number]) -> Equations:

@@ -257,11 +257,11 @@ def _rotation(phi: float, theta: float, psi: float) -> tuple[Vector, Vector, Vec
 def _arm(k: Vehicle, thruster: Thruster, velocity: str) -> float:
     """Return the force along an axis, or the yaw torque, by 1 N of a thruster."""
     if velocity in _ALONG:
-        return thruster.direction[_ALONG[velocity]]
+        return thruster.direction.value[_ALONG[velocity]]
     if thruster.position is None:
-        return thruster.arm * k["R"] * sin(k["gamma"]) if thruster.arm else 0.0
-    x, y, _ = thruster.position
-    return x * thruster.direction[1] - y * thruster.direction[0]
+        return thruster.side * k["R"] * sin(k["gamma"]) if thruster.arm else 0.0
+    x, y, _ = thruster.position.value
+    return x * thruster.direction.value[1] - y * thruster.direction.value[0]
 
 
 def _force(k: Vehicle, thruster: Thruster, command: float) -> float:

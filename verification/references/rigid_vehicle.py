@@ -96,7 +96,7 @@ def _propellers(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]
         thruster = next(t for t in rov.layout.thrusters if t.name == name)
         assert thruster.position
         position, direction = (
-            [number(mp.mpf(x)) for x in vector] for vector in (thruster.position, thruster.direction)
+            [number(mp.mpf(x)) for x in vector] for vector in (thruster.place, thruster.direction.value)
         )
         reverse = "_reverse" if command < 0 and "d_reverse" in curve.keys else ""
         loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
@@ -113,9 +113,9 @@ def _fins(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> d
         command = min(mp.one, max(-mp.one, mp.mpf(inputs[f"u_{fin.name}"])))
         k = {key: mp.mpf(rov.coefficients.get(f"{key}_{fin.name}", 0.0)) for key in ("lift", "drag", "angle_max")}
         angle = k["angle_max"] * command
-        force = [k["lift"] * angle * mp.mpf(x) for x in fin.direction]
+        force = [k["lift"] * angle * mp.mpf(x) for x in fin.direction.value]
         force[0] -= k["drag"] * angle**2
-        moment = cross([mp.mpf(x) for x in fin.position], force)
+        moment = cross([mp.mpf(x) for x in fin.place], force)
         for axis, value in zip(VELOCITIES, [*force, *moment], strict=True):
             found[axis, "u"] = found.get((axis, "u"), number(mp.zero)) + number(value)
     return found
@@ -191,7 +191,7 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     forces = {name: values.get(f"F_{name}", force) for name, force in steady_forces(k, values).items()}
     found |= {f"F_{name}": mp.mpf(F) for name, F in forces.items()}
     for curve in layout.turning_curves:
-        arms = {t.name: cross(t.position or (), t.direction)[2] for t in layout.thrusters if t.curve == curve.name}
+        arms = {t.name: cross(t.place, t.direction.value)[2] for t in layout.thrusters if t.curve == curve.name}
         turning = (arm * forces[name] for name, arm in arms.items())
         found[f"tau_{curve.name}"] = mp.fsum(turning)
     return found | dict(zip(("phi", "theta", "psi"), euler_angles(rotation(y[6:10])), strict=True))

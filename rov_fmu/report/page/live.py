@@ -146,7 +146,7 @@ def _data(flown: Flown) -> dict[str, Any]:
             _thruster(vehicle, thruster, label)
             for thruster, label in zip(layout.thrusters, _labels(vehicle), strict=True)
         ],
-        "fins": [{"at": fin.position, "along": fin.direction} for fin in layout.fins],
+        "fins": [{"at": fin.place, "along": fin.direction.value} for fin in layout.fins],
         "tests": list(_tests(vehicle)),
         "size": size_of(vehicle),
     }
@@ -237,7 +237,7 @@ def _thruster(vehicle: Vehicle, thruster: Thruster, label: str) -> dict[str, Any
         "force": f"F_{thruster.name}",
         "label": label,
         "at": place(vehicle, thruster),
-        "along": thruster.direction,
+        "along": thruster.direction.value,
         "most": most or 1.0,
     }
 
@@ -264,7 +264,7 @@ def _label(vehicle: Vehicle, thruster: Thruster) -> str:
     words = [
         "left" if y < -least else "right" if y > least else "",
         "rear" if x < -least else "front" if x > least else "",
-        "vertical" if abs(thruster.direction[2]) > _VERTICAL else "",
+        "vertical" if abs(thruster.direction.value[2]) > _VERTICAL else "",
     ]
     return " ".join(word for word in words if word)
 

@@ -41,12 +41,10 @@ def place(vehicle: Vehicle, thruster: Thruster) -> Point:
     A thruster on an arm is at the distance R and the angle γ behind the centre of mass; one without a known position is
     drawn at the centre of mass.
     """
-    if thruster.position is not None:
-        return thruster.position
-    if not thruster.arm or not vehicle.layout.has_arm:
-        return 0.0, 0.0, 0.0
+    if thruster.position or not thruster.arm or not vehicle.layout.has_arm:
+        return thruster.place
     R, gamma = vehicle["R"], vehicle["gamma"]
-    return -R * cos(gamma), -thruster.arm * R * sin(gamma), 0.0
+    return -R * cos(gamma), -thruster.side * R * sin(gamma), 0.0
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def marks_of(vehicle: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator
     """Yield the marks of a view, which is one of VIEWS."""
     seen: dict[tuple[float, ...], list[str]] = {}
     for thruster in vehicle.layout.thrusters:
-        at, d = place(vehicle, thruster), thruster.direction
+        at, d = place(vehicle, thruster), thruster.direction.value
         along = d[0], d[_INDEX[down]]
         hidden = toward * d[_INDEX[sight]] if hypot(*along) < 0.1 else 0.0
         key = tuple(round(part, 3) + 0.0 for part in (at[0], at[_INDEX[down]], *along, hidden))

@@ -11,12 +11,12 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 from typing_extensions import Self
 
+from rov_fmu.io.field_types import Finite, Name, not_blank
 from rov_fmu.io.file_kinds import PLAN, check_suffix
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import Strict, as_tuple, folder_of, key_line, read_checked
 from rov_fmu.study.plan.figures import read_expression
-from rov_fmu.vehicle.quantity import Finite, Name, not_blank
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000

@@ -21,11 +21,11 @@ from rov_fmu.equation.catalogue import (
     cross_name,
     cross_of,
 )
-from rov_fmu.equation.layout import Curve, Fin, Layout, Thruster, ThrustTable, VehicleAxis, arm, effect_along
+from rov_fmu.equation.layout import Curve, Layout, Thruster, ThrustTable, VehicleAxis, arm, effect_along
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.vehicles import SIX
+from tests.vehicles import SIX, fin, thruster
 
 WORDS = {
     "videoray": {
@@ -151,11 +151,11 @@ def test_a_force_acts_along_its_parts_and_about_the_axes_beside_it() -> None:
     expected = dict.fromkeys(AXES.values(), 0.0) | {SURGE: 2.0, SWAY: 3.0, HEAVE: 5.0}
     expected |= {ROLL: 11.0 * 5.0 - 13.0 * 3.0, PITCH: 13.0 * 2.0 - 7.0 * 5.0, YAW: 7.0 * 3.0 - 11.0 * 2.0}
     assert {axis: effect_along(axis, force, place) for axis in AXES.values()} == expected
-    placed = Thruster("a", "c", (1.0, 0.0, 0.0), (0.0, -0.25, 0.5))
+    placed = thruster("a", "c", (1.0, 0.0, 0.0), (0.0, -0.25, 0.5))
     assert [placed.effect(axis) for axis in AXES.values()] == [1.0, 0.0, 0.0, 0.0, 0.5, 0.25]
-    with_arm = Thruster("a", "c", (1.0, 0.0, 0.0), arm=-1)
+    with_arm = thruster("a", "c", (1.0, 0.0, 0.0), arm="starboard")
     assert [with_arm.effect(axis) for axis in AXES.values()] == [1.0, 0.0, 0.0, 0.0, 0.0, -1.0]
-    faint = Fin("f", (1e-9, 1.0, 2e-9), (0.0, 0.0, 0.0))
+    faint = fin("f", (1e-9, 1.0, 2e-9), (0.0, 0.0, 0.0))
     assert [faint.effect(axis) for axis in (SURGE, SWAY, HEAVE, YAW)] == [0.0, 1.0, 2e-9, 0.0]
     assert arm(2.0, 0.5) == 2.0 * sin(0.5)
 
@@ -164,7 +164,7 @@ def _layout(*thrusters: Thruster, mix: dict[str, dict[str, float]] | None = None
     return Layout((VehicleAxis(SURGE), VehicleAxis(YAW)), (Curve("c"),), thrusters, mix or {})
 
 
-PAIR = (Thruster("l", "c", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)), Thruster("r", "c", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)))
+PAIR = (thruster("l", "c", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)), thruster("r", "c", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)))
 
 
 def test_commands_that_drive_an_axis_have_the_sign_of_their_effect() -> None:
@@ -193,7 +193,7 @@ def test_a_pulse_width_stands_for_a_fraction_on_each_side_of_neutral(pulse: floa
 
 @pytest.mark.parametrize(("together", "share"), [(1, ""), (2, ", half of the pair's"), (4, ", 1/4 of their curve")])
 def test_the_thrust_of_a_thruster_is_described_as_its_share_of_the_curve(together: int, share: str) -> None:
-    thrusters = (Thruster("a", "c", (-0.6, 0.8, 1e-9)),)
+    thrusters = (thruster("a", "c", (-0.6, 0.8, 1e-9)),)
     layout = replace(_layout(*thrusters), curves=(Curve("c", ("a_t", "b_t", "d"), together),))
     words = f"Thrust F_a: thruster a{share}, in water at rest, positive astern and to starboard"
     assert layout.calculated["F_a"].description == words
