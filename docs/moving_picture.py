@@ -19,9 +19,9 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 WIDTH, HEIGHT = 1000, 596
-FRAME = 0.3
+FRAME = 0.4
 """The simulated seconds between two frames."""
-PLAYED = 100
+PLAYED = 130
 """The milliseconds that a frame is shown: the flight is played about three times as fast as it is."""
 LAST = 1500
 """The milliseconds that the last frame is shown."""

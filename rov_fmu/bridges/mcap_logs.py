@@ -1,8 +1,9 @@
 """An identification as an MCAP file: what each log measured, what the model predicts, and what it cannot explain."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import isnan, nan
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -27,7 +28,7 @@ class _Series:
     time: Array
     """n: s."""
     columns: Mapping[str, Array]
-    """The n values of each number."""
+    """The n values of each number; NaN where there is none."""
     numbers: Mapping[str, Number]
 
 
@@ -35,9 +36,9 @@ def identification_mcap(identification: Identification) -> bytes:
     """Return the logs of an identification as the content of an MCAP file.
 
     Each log begins at time 0, and its topics begin with its name: `commands`, by thruster, whenever one changes; each
-    measured quantity, with its prediction by a fit without this log and the 95 % band; `unknown_force`, the slow force
-    along each axis that the model does not explain, with its 95 % interval; and `pose`, with Foxglove's schema, the
-    measured attitude and depth, if the log has a heading. All values are in SI units.
+    measured quantity, with its prediction by a fit without it and the 95 % band where there is one; `unknown_force`,
+    the slow force along each axis that the model does not explain, with its 95 % interval; and `pose`, with Foxglove's
+    schema, the measured attitude and depth, if the log has a heading. All values are in SI units.
 
     Raises InputError where foxglove-sdk is not installed.
     """
@@ -50,10 +51,11 @@ def identification_mcap(identification: Identification) -> bytes:
             write = recording.topic(f"/{topic_name(log.file)}/{one.topic}", one.numbers)
             rows = np.column_stack([*one.columns.values()]).tolist()
             for stamp, row in zip(nanoseconds(one.time - begin), rows, strict=True):
-                messages.append((stamp, partial(write, stamp, dict(zip(one.columns, row, strict=True)))))
-        time, values = _pose(log)
+                values = {name: value for name, value in zip(one.columns, row, strict=True) if not isnan(value)}
+                messages.append((stamp, partial(write, stamp, values)))
+        time, pose = _pose(log)
         if len(time):
-            write_pose = recording.poses(f"/{topic_name(log.file)}/pose", values)
+            write_pose = recording.poses(f"/{topic_name(log.file)}/pose", pose)
             stamps = nanoseconds(time - begin)
             messages += [(stamp, partial(write_pose, n, stamp)) for n, stamp in enumerate(stamps)]
     for _, write_it in sorted(messages, key=lambda message: message[0]):
@@ -84,10 +86,12 @@ def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:
     """Yield all that is known about a log, each over its own times."""
     if log.commands:
         yield _commands(log.commands)
-    own = [p for axis in identification.axes for p in axis.predictions if p.file == log.file and p.is_judged]
-    yield from map(_prediction, own)
-    predicted = {p.quantity for p in own}
-    yield from (_measured(c) for c in log.channels if not c.unused and c.quantity.name not in predicted and c.count)
+    own: dict[str, list[Prediction]] = {}
+    for p in (p for axis in identification.axes for p in axis.predictions if p.file == log.file and p.is_judged):
+        own.setdefault(p.quantity, []).append(p)
+    rest = {c.quantity.name: c for c in log.channels if not c.unused and c.count}
+    yield from (_prediction(parts, rest.pop(quantity, None)) for quantity, parts in own.items())
+    yield from map(_measured, rest.values())
     yield from (_unknown(force) for force in identification.unknown_forces if force.file == log.file)
 
 
@@ -103,16 +107,26 @@ def _measured(channel: Channel) -> _Series:
     return _Series(topic_name(name), time, {"measured": values}, numbers)
 
 
-def _prediction(prediction: Prediction) -> _Series:
-    name, unit = prediction.quantity, prediction.unit
-    band = _band(prediction.predicted, prediction.deviation)
-    columns = {"measured": prediction.measured, "predicted": prediction.predicted, **band}
+def _prediction(parts: Sequence[Prediction], channel: Channel | None) -> _Series:
+    """Return what was measured of a quantity, and its predictions, each of a part of the log."""
+    name, unit = parts[0].quantity, parts[0].unit
+    time, measured = (np.concatenate([getattr(part, key) for part in parts]) for key in ("time", "measured"))
+    predicted = np.concatenate([part.predicted for part in parts])
+    if channel:
+        left = np.all([(channel.time < p.time[0]) | (channel.time > p.time[-1]) for p in parts], axis=0) & channel.there
+        time = np.append(time, channel.time[left])
+        measured = np.append(measured, (unwrapped(channel) if channel.quantity.wraps else channel.values)[left])
+    ends = _band(predicted, np.concatenate([part.deviation for part in parts]))
+    none, order = np.full(len(time) - len(predicted), nan), np.argsort(time, kind="stable")
+    columns = {"measured": measured} | {
+        key: np.append(values, none) for key, values in ({"predicted": predicted} | ends).items()
+    }
     numbers = {
         "measured": Number(unit, f"Measured {name}"),
-        "predicted": Number(unit, f"The prediction of the {name} by {prediction.by}"),
+        "predicted": Number(unit, f"The prediction of the {name} by {parts[0].by}"),
         **_edges(unit, f"95 % band of the measured {name}"),
     }
-    return _Series(topic_name(name), prediction.time, columns, numbers)
+    return _Series(topic_name(name), time[order], {key: values[order] for key, values in columns.items()}, numbers)
 
 
 def _unknown(unknown: UnknownForce) -> _Series:

@@ -145,7 +145,9 @@ def _add_identified(
         raise DataFileError(f"{path}: has nothing about {log.file}; `rov-fmu identify --mcap` writes such a file")
 
     def band(fields: Mapping[str, Array], times: Array) -> dict[str, list[float]]:
-        return {"times": _rounded(times + begin), "values": _rounded(0.5 * (fields["high"] - fields["low"]))}
+        half = 0.5 * (fields["high"] - fields["low"])
+        there = np.isfinite(half)  # what was measured may begin before what is predicted
+        return {"times": _rounded(times[there] + begin), "values": _rounded(half[there])}
 
     for signal in signals:
         topic = topics.get(topic_name(signal["quantity"]))

@@ -159,7 +159,8 @@ def test_the_bands_and_the_unknown_force_of_the_identification_are_charts(
     depth = written.topic(f"/{name}/depth", dict.fromkeys(("measured", "predicted", "low", "high"), number))
     force = written.topic(f"/{name}/unknown_force/heave", dict.fromkeys(("force", "low", "high"), number))
     for n in range(200):
-        depth(n * 100_000_000, {"measured": 0.0, "predicted": 1.0, "low": 1.0 - 0.01 * n, "high": 1.0 + 0.01 * n})
+        band = {"predicted": 1.0, "low": 1.0 - 0.01 * n, "high": 1.0 + 0.01 * n} if n >= 50 else {}
+        depth(n * 100_000_000, {"measured": 0.0} | band)
         force(n * 100_000_000, {"force": 0.02 * n, "low": 0.02 * n - 0.5, "high": 0.02 * n + 0.5})
     identified = tmp_path / "logs.mcap"
     identified.write_bytes(written.content())
