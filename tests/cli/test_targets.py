@@ -134,22 +134,6 @@ def test_a_full_disk_leaves_the_old_files(tmp_path: Path) -> None:
         subprocess.run(["umount", *disk], check=True)
 
 
-@_posix
-@pytest.mark.long
-def test_a_limit_on_the_size_of_files_leaves_the_old_files(tmp_path: Path) -> None:
-    target, temporary = full_folder(tmp_path)
-
-    def limited() -> None:
-        import resource
-        import signal
-
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
-
-    ends = run_elsewhere([(c, target / c.name) for c in COMMANDS.values()], temporary, preexec_fn=limited)
-    check_refusals(ends, "File too large", target, temporary)
-
-
 # ---- Several files ---------------------------------------------------------------------------------------------------
 
 
@@ -264,19 +248,6 @@ def test_no_command_writes_over_a_table_of_the_vehicle(
         _refused(["sitl", str(rov), "--log", table], tmp_path, capsys)
         _refused(["tune", str(rov), "--axis", "surge", "--command", "1", "--v-ss", "1", "-o", table], tmp_path, capsys)
         _refused(["build", str(rov), "-o", table], tmp_path, capsys)
-
-
-@pytest.mark.parametrize("there", [True, False])
-def test_a_link_is_replaced_and_what_it_leads_to_stays(there: bool, tmp_path: Path) -> None:
-    target, other = tmp_path / "target", tmp_path / "other"
-    if there:
-        other.write_bytes(OLD)
-    target.symlink_to(other)
-    assert COMMANDS["the tuned vehicle"].run(target) == 0
-    assert not target.is_symlink()
-    assert target.stat().st_size > 1000
-    assert other.exists() == there
-    assert not there or other.read_bytes() == OLD
 
 
 def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys: Capsys) -> None:

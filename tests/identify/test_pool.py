@@ -111,17 +111,6 @@ def test_a_tether_holds_the_vehicle_where_it_pulls_as_the_thrusters_push() -> No
     assert motion["u"][-1] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_tether_holds_the_heavy_in_a_current() -> None:
-    """It pulls north, against the drift, although the vehicle turns."""
-    turning = Commands(np.zeros(1), {"1": np.array([0.2]), "4": np.array([0.2])})
-    motion = rigid_pool.motion(
-        HEAVY, turning, np.array([0.0, 4.0]), Conditions(current=(-0.2, 0.0), tether=(80.0, 80.0, 80.0))
-    )
-    assert abs(motion["psi"][-1]) > 0.5
-    assert -0.25 < motion["x"][-1] < 0.0
-    assert abs(motion["y"][-1]) < 0.2 * abs(motion["x"][-1])
-
-
 def test_a_tilted_vehicle_turns_about_its_own_axis_and_moves_along_its_own_axes() -> None:
     """Pose and velocities fit together by differences of the attitude and of the place."""
     tilt, h = Tilt(radians(10.0)), 1e-4

@@ -22,7 +22,6 @@ from tests.fmi import (
     STEP,
     AnyInstance,
     Fmu,
-    integers,
     reals,
     room,
 )
@@ -230,15 +229,6 @@ def test_the_numbers_of_seeds_and_sensitivities_must_match_the_variables(fmu3: f
 # ---- The model structure ----
 
 
-def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu) -> None:
-    variables = fmu.variables.values()
-    assert fmu.outputs == [v.name for v in variables if v.causality == "output"]
-    assert fmu.derivatives == [v.name for v in variables if v.derivative is not None]
-    initial = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
-    assert initial == [v.name for v in variables if v.initial == "calculated"]
-    assert fmu.derivatives == [f"der({name})" for name in fmu.states]
-
-
 # ---- Derivatives by time ----
 
 
@@ -267,18 +257,6 @@ def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, n
             assert instance.rates(fmu.outputs) == pytest.approx(expected, rel=1e-11, abs=1e-13 * size), motion
             instance.expect("Terminate")
             assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
-
-
-@pytest.mark.parametrize("order", [-1, 0, 2, 19])
-def test_output_derivatives_of_other_orders_are_refused(fmu: Fmu, order: int) -> None:
-    """Only order 1 is declared; no value is written if any order of a call is refused."""
-    assert fmu.description.coSimulation.maxOutputDerivativeOrder == 1
-    values = room(2)
-    with fmu.instance() as rov:
-        rov.start({"u": 0.5})
-        assert rov.rates_by(fmu.references(["w", "u"]), integers(1, order), values) == ERROR
-        assert list(values) == list(room(2))
-        assert rov.log[-1].text.endswith(f"order {order} of u is not available, only 1.")
 
 
 @pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])

@@ -6,31 +6,22 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import fmpy
-import numpy as np
 import pytest
 from fmpy import read_model_description
-from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_model_description
 
-from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import python_content
-from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.osp import osp_model_description
-from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi2
 from tests.conftest import Made, unzipped
 from tests.equation.test_thrust_effects import immediate
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, Message
-from tests.fmi2 import recording_callbacks
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.vehicles import THRUST_EFFECTS, pulsed
-from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 
 PULSE = (1100.0, 1480.0, 1900.0)
 DELAYED = load_vehicle(THRUST_EFFECTS)
@@ -96,14 +87,6 @@ def test_the_description_declares_the_pulse_widths(fmus: Pair) -> None:
         assert "pulse width, 1480 is neutral, saturates at 1100 and 1900" in variable.description
     assert b'unit="us"' in osp_model_description(PULSES.layout)
     assert terminals(PULSES.layout)[0].description == "Commands to the thrusters and fins, pulse widths"
-
-
-def test_without_a_command_nothing_moves(fmus: Pair) -> None:
-    with fmus[0].instance() as rov:
-        rov.start()
-        assert rov.get(COMMANDS) == [PULSE[1]] * len(COMMANDS)
-        assert rov.step(0.0, 1.0) == OK
-        assert rov.get(fmus[0].outputs) == [0.0] * len(fmus[0].outputs)
 
 
 def test_steps_are_those_of_the_fractions_bit_for_bit(fmus: Pair) -> None:
@@ -173,18 +156,6 @@ def test_a_warning_names_the_end_of_the_range_and_the_thrust_curve(made_once: Ma
             assert say(rov) == BEYOND
 
 
-def test_the_python_flavour_gives_the_same_warnings(tmp_path: Path) -> None:
-    log: list[Message] = []
-    slave, place = python_slave(RANGES, tmp_path, recording_callbacks(log))
-    for values in (
-        {**dict.fromkeys(COMMANDS, 0.0), "u_r": 2500.0, "voltage": 16.0},
-        *({"u_l": 500.0}, {"voltage": 13.0}, {"u_r": 0.0, "voltage": 8.0}, {"voltage": 25.0}),
-    ):
-        slave.setReal([place[name] for name in values], [*values.values()])
-    slave.freeInstance()
-    assert [text.replace(".0 ", " ") for text in warnings_of(log)] == BEYOND
-
-
 @pytest.mark.long
 def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -204,47 +175,3 @@ def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
         assert rov.get(delayed) == [PULSE[1]] * len(COMMANDS)
         assert rov.step(0.0, 0.09) == rov.step(0.09, 0.02) == OK
         assert rov.get(delayed) == [1900.0, *[PULSE[1]] * (len(COMMANDS) - 1)]
-
-
-def python_slave(vehicle: Vehicle, folder: Path, callbacks: Any = None) -> tuple[FMU2Slave, dict[str, int]]:
-    """Return an instance of a vehicle's Python flavour, and its value references."""
-    for name, data in python_content(vehicle).files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(data)
-    keep_loaded(folder)
-    place = {v.name: v.valueReference for v in read_model_description(str(folder)).modelVariables}
-    return fmpy_slave(folder, callbacks), place
-
-
-def test_the_python_flavour_waits_at_neutral_for_the_dead_time(tmp_path: Path) -> None:
-    vehicle = replace(pulsed(DELAYED, PULSE), identifier="delayed_pulses")
-    slave, place = python_slave(vehicle, tmp_path)
-    acting, states = [place[f"delayed_{name}"] for name in COMMANDS], [place[name] for name in STATES]
-    commands, times = commands_of(random.Random(3)), 0.04 * np.arange(31)
-    rows = [next(commands)[0] for _ in times]
-    tables = {name: np.array([row[name] for row in rows]) for name in COMMANDS}
-    names = [*STATES, *(f"delayed_{name}" for name in COMMANDS)]
-    in_c = simulate(vehicle, times, tables, names, workers=1).values[:, 0].T
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
-    for t, row, expected in zip(times.tolist(), rows, in_c.tolist(), strict=True):
-        assert slave.getReal(states + acting) == pytest.approx(expected, rel=1e-12, abs=1e-13)
-        slave.setReal([place[name] for name in row], [*row.values()])
-        slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.04)
-    assert in_c[0].tolist() == [0.0] * len(STATES) + [PULSE[1]] * len(COMMANDS)
-    assert np.abs(in_c[-1, : len(STATES)]).max() > 0.1
-    slave.terminate()
-    slave.freeInstance()
-
-
-def test_the_reference_results_are_those_of_the_fractions() -> None:
-    found, expected = reference_results(PULSES), reference_results(FRACTIONS)
-    assert found.keys() == expected.keys()
-    results = [path for path in found if path.endswith("_expected.csv")]
-    assert results
-    for path in results:
-        assert found[path] == expected[path], path
-    stimuli = found[f"{FOLDER}/surge_100.csv"].decode().splitlines()
-    assert stimuli[0] == f"time,{','.join(COMMANDS)}"
-    assert stimuli[1] == "0,1900,1900,1480,1480,1480"
