@@ -139,18 +139,6 @@ def test_the_heading_counts_turns_while_the_nose_is_not_up_or_down() -> None:
         assert coarse == pytest.approx(psi[::step], abs=1e-11)
 
 
-@pytest.mark.parametrize("rate", [1.0, -1.0])
-def test_roll_and_heading_jump_by_half_a_turn_where_the_nose_passes_the_vertical(rate: float) -> None:
-    rov = frictionless(with_axes("q"))
-    times = [0.0, 1.57, 1.58, 4.71, 4.72]
-    record = ["phi", "theta", "psi"]
-    phi, theta, psi = simulate(rov, times, {"q": rate, "psi_0": 10.0}, record).values[:, 0]
-    assert theta == pytest.approx(rate * np.arcsin(np.sin(times)), abs=1e-13)
-    assert np.abs(phi) == pytest.approx([0.0, 0.0, pi, pi, 0.0], abs=1e-13)
-    assert psi[:2] == pytest.approx([10.0, 10.0], abs=1e-13)
-    assert psi[2:] - 10.0 == pytest.approx([pi, pi, 0.0], abs=1e-13)  # to starboard, and back
-
-
 def _starts() -> list[Values]:
     """Return attitudes and velocities at the start.
 

@@ -81,24 +81,6 @@ def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
     assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
 
 
-def test_the_voltage_scales_thrust_and_stays_within_its_tables() -> None:
-    def forces(voltage: float, command: float = 0.6) -> dict[str, float]:
-        inputs = NOW.layout.usual_inputs | dict.fromkeys(("u_l", "u_bow", "u_top"), command) | {"voltage": voltage}
-        return NOW.commanded(inputs)
-
-    assert NOW.layout.usual_inputs["voltage"] == 14.8
-    assert (
-        forces(8.0)["l"]
-        == forces(12.0)["l"]
-        < forces(14.0)["l"]
-        == pytest.approx(0.5 * (forces(12.0)["l"] + forces(16.0)["l"]))
-    )
-    assert forces(18.0)["l"] == forces(16.0)["l"]
-    assert forces(12.0)["bow"] == pytest.approx(forces(16.0)["bow"] * 0.75**1.3, rel=1e-15)
-    assert forces(14.8)["top"] == pytest.approx(10.0 * 0.55**2 + 5.0 * 0.55, rel=1e-15)
-    assert forces(0.0)["bow"] == forces(-5.0)["bow"] == 0.0
-
-
 def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> None:
     def effect(u: float, command: float) -> dict[str, float]:
         state = at_rest(NOW) | {"u": u}

@@ -176,24 +176,6 @@ def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
 # ---- Adjoint derivatives ----
 
 
-@pytest.mark.parametrize(
-    "number", [1, pytest.param(6, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)]
-)
-@pytest.mark.parametrize("kind", MODES)
-def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kind: int, number: int) -> None:
-    """The unknowns are all outputs and derivatives; the knowns are all inputs, states and coefficients."""
-    unknowns = fmu3.outputs + fmu3.derivatives
-    for point in points(fmu3, number, seed=1):
-        columns = [slopes(rov_of(fmu3), point, known) for known in point]
-        size = [max(1.0, *map(abs, column.values())) for column in columns]
-        with fmu3.instance(kind) as instance:
-            bring(instance, INITIALIZATION, point)
-            for name in unknowns:
-                row = instance.adjoint([name], list(point), [1.0])
-                for known, d, column, scale in zip(point, row, columns, size, strict=True):
-                    assert d == pytest.approx(column[name], rel=1e-12, abs=1e-14 * scale), (name, known, point)
-
-
 @pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
 def test_adjoint_derivatives_agree_with_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
     """(v J) u = v (J u) for the knowns of the mode."""
