@@ -140,6 +140,29 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     assert not any(output.parent.iterdir())
 
 
+_INTERRUPTING = "os.kill(os.getpid(), signal.SIGINT); time.sleep({})"
+
+
+ACTIONS = {
+    "text": f"exec({_INTERRUPTING.format(600.0)!r})",
+    "finalizer": f"type('Ended', (), {{'__del__': lambda _: exec({_INTERRUPTING.format(0.0)!r})}})()",
+    "caught": f"""
+    try:
+        {_INTERRUPTING.format(0.1)}
+    except BaseException:
+        pass""",
+}
+
+
+@pytest.mark.parametrize("action", ACTIONS.values(), ids=ACTIONS)
+def test_no_code_can_make_something_else_of_an_interrupt(action: str, tmp_path: Path) -> None:
+    ran = _interrupted(f"def action():\n    {action}\n    time.sleep(600.0)", tmp_path)
+    assert (ran.returncode, without_progress(ran.stderr)) == (130, "rov-fmu: interrupted, no file is half-written\n")
+
+
+"""Code in which a KeyboardInterrupt would be lost or turned into something else."""
+
+
 def _interrupted(action: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a function `action` as the process of a command."""
     (folder / "interrupted.py").write_text(

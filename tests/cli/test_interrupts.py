@@ -219,6 +219,30 @@ def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_pat
     assert output.read_bytes() == b"the old one"
 
 
+_SLOW_END = """
+import os, sys, time
+from rov_fmu.process import run_process
+class Slow:
+    def __del__(self, write=os.write, sleep=time.sleep):
+        write(1, b"done")
+        sleep(0.3)
+slow = Slow()
+sys.exit(run_process("rov-fmu", lambda: 1))
+"""
+
+
+def test_a_signal_after_the_end_of_a_command_keeps_its_exit_code() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with subprocess.Popen([sys.executable, "-c", _SLOW_END], cwd=ROOT, stdout=subprocess.PIPE) as process:
+            assert process.stdout
+            assert process.stdout.read(4) == b"done"
+            process.send_signal(number)
+            assert process.wait(PATIENCE) == 1
+
+
+"""A command whose modules take time to free after it is done."""
+
+
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(f"import pathlib, time\npathlib.Path({str(begun)!r}).touch()\ntime.sleep(600)\n")

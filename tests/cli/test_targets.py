@@ -250,6 +250,19 @@ def test_no_command_writes_over_a_table_of_the_vehicle(
         _refused(["build", str(rov), "-o", table], tmp_path, capsys)
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_a_link_is_replaced_and_what_it_leads_to_stays(there: bool, tmp_path: Path) -> None:
+    target, other = tmp_path / "target", tmp_path / "other"
+    if there:
+        other.write_bytes(OLD)
+    target.symlink_to(other)
+    assert COMMANDS["the tuned vehicle"].run(target) == 0
+    assert not target.is_symlink()
+    assert target.stat().st_size > 1000
+    assert other.exists() == there
+    assert not there or other.read_bytes() == OLD
+
+
 def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys: Capsys) -> None:
     for name in ("Röv [bold] 4 [", "\udcff", "a\nb", "n" * 250):
         folder = tmp_path / name[:200]

@@ -5,6 +5,7 @@ import random
 import re
 from dataclasses import replace
 from itertools import pairwise
+from math import isfinite
 
 import numpy as np
 import pytest
@@ -270,3 +271,14 @@ def test_too_many_changes_are_refused() -> None:
     with pytest.raises(ValueError, match=f"more than {MOST_WAITING} changes of commands wait for the dead time"):
         line.step(ROV, usual | {"u_l": 0.5}, state, 1e-5 * MOST_WAITING, 1e-5)
     assert len(line.waiting) == MOST_WAITING
+
+
+def test_a_step_that_overflows_leaves_the_changes_on_their_way() -> None:
+    line, usual, state = ROV.delay_line(), ROV.layout.usual_inputs, at_rest(ROV)
+    state = line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 0.06)
+    before = (line.acting, [*line.waiting])
+    after = line.step(ROV, usual | {"u_l": -1.0}, state | {"u": 1e200}, 0.06, 1.0)
+    assert not all(map(isfinite, after.values()))
+    assert (line.acting, line.waiting) == before
+    state = line.step(ROV, usual | {"u_l": 1.0}, state, 0.06, 0.05)
+    assert (line.waiting, line.delayed["delayed_u_l"]) == ([], 1.0)

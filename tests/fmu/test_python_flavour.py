@@ -17,8 +17,10 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
 from rov_fmu.cli import main
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.fmu.archive import python_content
 from rov_fmu.fmu.python_flavour import python_sources
+from rov_fmu.fmu.slave import Rov
 from rov_fmu.fmu.variables import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
@@ -162,6 +164,49 @@ def test_both_flavours_tilt_the_same_way(tmp_path: Path, six_dir: Path) -> None:
         slave.freeInstance()
 
 
+def test_what_is_set_again_is_harmless_and_the_angles_replace_the_quaternion(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, text in python_sources(a_vehicle(SIX), variables(SIX)).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    slave = Rov(instance_name="rov", resources=str(tmp_path))
+    place = {v.name: v.value_reference for v in variables(SIX)}
+
+    def put(**values: float) -> list[str]:
+        """Set variables, and return what is logged."""
+        slave.log_queue.clear()
+        slave.set_real([place[name] for name in values], list(values.values()))
+        return [message.msg for message in slave.log_queue]
+
+    def get(*names: str) -> list[float]:
+        return slave.get_real([place[name] for name in names])
+
+    assert put(psi_0=0.5) == []
+    expected = get(*QUATERNION)
+    (warning,) = put(eta=0.0, epsilon_1=0.0, epsilon_2=0.0, epsilon_3=0.0)
+    assert "eta = 0.0 is replaced by" in warning
+    assert get(*QUATERNION) == expected
+    slave.exit_initialization_mode()
+    slave.set_real([place["N_ext"]], [20.0])
+    assert slave.do_step(0.0, 1.0)
+    turned = get(*QUATERNION)
+    (warning,) = put(psi_0=0.5, m_rov=SIX["m_rov"])  # GEMSEO-FMU sets parameters again
+    assert "psi_0 must not be set after the initialization, but it has this value already" in warning
+    assert get(*QUATERNION) == turned != expected
+    (error,) = put(N_ext=0.0, psi_0=0.6)
+    assert error == "psi_0 must not be set after the initialization; it was not."
+    assert put(eta=1.0) == ["eta must not be set after the initialization; it was not."]
+    assert get("N_ext", "psi_0", *QUATERNION) == [20.0, 0.5, *turned]
+    assert put(alpha_r=0.5, N_ext=1.0) == []
+    before = get("m_rov", "z_G", "der(q)")
+    (refused,) = put(m_rov=2.0 * SIX["m_rov"], z_G=50.0)
+    assert refused.startswith("the mass matrix of these parameters is not positive definite")
+    assert get("m_rov", "z_G", "der(q)") == before
+    assert put(m_rov=1.2 * SIX["m_rov"]) == []
+
+
 # start time, stop time, t and h of a step, and True if the step is accepted
 STOPS = [
     (0.0, 1.0, 0.9, 0.1 + 1.0e-9, True),
@@ -253,6 +298,28 @@ def _imported(importer: Path, folder: Path, **environment: str) -> Ended:
     library = folder / "binaries" / "linux64" / "videoray.so"
     resources = (folder / "resources").as_uri()
     return run_program(importer, library, description.guid, resources, env=os.environ | environment)
+
+
+FLY = """
+import sys, fmpy
+commands = {"u_l": 0.3, "u_r": 0.3}
+for folder in sys.argv[1:]:
+    result = fmpy.simulate_fmu(folder, start_values=commands, stop_time=1.0, output_interval=1.0, validate=False)
+    print(f"{result['u'][-1]:.6f}")
+"""
+
+
+@pytest.mark.long
+def test_every_path_of_the_resources_is_found(tmp_path: Path, python_dir: Path) -> None:
+    """A process of its own flies all of them, because PythonFMU's library crashes where it finds nothing."""
+    folders = [tmp_path / name for name in ("plain", "u ml\u00e4ut", "plus+x", "hash#x", "pct%20x", "quo'te", "p%te")]
+    for folder in folders:
+        shutil.copytree(python_dir, folder)
+    done = subprocess.run([sys.executable, "-c", FLY, *map(str, folders)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    first, *others = done.stdout.split()
+    assert float(first) > 0.1
+    assert others == [first] * 6
 
 
 @pytest.mark.long

@@ -107,6 +107,22 @@ def test_both_versions_declare_the_same(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ROVS)
+def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
+    """OMSimulator takes the references in ModelStructure for positions in ModelVariables, from 1.
+
+    It ends with "bad dependency on variable with index 0" where there is no such position, and else takes the variable
+    at that position for the one that is meant.
+    """
+    two, three = (described(ROVS[kind], fmi) for fmi in (2, 3))
+    of_two, of_three = ([int(v.get("valueReference")) for v in root.find("ModelVariables")] for root in (two, three))
+    assert of_two == [*range(len(of_two))]
+    assert of_three == [*range(1, len(of_two) + 2)]  # FMI 3.0 also has the time
+    entries = list(three.find("ModelStructure"))
+    meant = {int(n) for entry in entries for n in (entry.get("valueReference"), *entry.get("dependencies").split())}
+    assert set() < meant <= {*of_three}
+
+
+@pytest.mark.parametrize("kind", ROVS)
 def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> None:
     """FMI Library loses the unit of a variable that has bounds; fmi-sim refuses a unit on a variable."""
     root = described(ROVS[kind], 3)

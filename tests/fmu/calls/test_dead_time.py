@@ -14,6 +14,7 @@ from fmpy.validation import validate_model_description
 from lxml import etree
 
 from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.model_description import DEAD_TIME_NOTE
 from tests.equation.test_thrust_effects import ROV
 from tests.fmi import CONTINUOUS, ERROR, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, reals
@@ -122,6 +123,22 @@ def test_a_saved_state_continues_bit_for_bit_with_the_changes_that_wait(fmu: Fmu
         damaged = bytearray(serialized)
         damaged[-20] ^= 1
         assert other.load(bytes(damaged)) == ERROR
+
+
+def test_too_many_changes_are_refused_and_change_nothing(fmu: Fmu) -> None:
+    h = 0.5 * T_d / MOST_WAITING
+    with fmu.instance() as rov:
+        rov.start()
+        for n in range(MOST_WAITING):
+            assert rov.set({"u_l": float(1 - n % 2)}) == OK
+            assert rov.step(n * h, h) == OK
+        assert rov.set({"u_l": 0.5}) == OK
+        before = rov.save()
+        assert rov.step(MOST_WAITING * h, h) == ERROR
+        assert "too many changes of commands wait for the dead time" in rov.log[-1].text
+        assert rov.save() == before
+        assert rov.set({"u_l": 0.0}) == OK  # the last command that was sent
+        assert rov.step(MOST_WAITING * h, T_d) == OK
 
 
 def test_changes_arrive_as_time_events_in_model_exchange(fmu: Fmu) -> None:
