@@ -229,6 +229,13 @@ def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
     assert commanded(log, "3") == pytest.approx(0.3 * (np.arange(N) >= 10))
 
 
+@pytest.mark.parametrize("cut", [1, 40, 500])
+def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layout, tmp_path: Path) -> None:
+    path = dataflash(tmp_path / "a.bin", turn())
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert N - 6 <= len(measured(read_log(path, bluerov2).log, "heading")) <= N
+
+
 # ---- Neither ---------------------------------------------------------------------------------------------------------
 
 
