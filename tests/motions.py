@@ -1,7 +1,7 @@
 """Random motions of one axis over the whole range of doubles, and bounds of their rounding errors."""
 
 from collections.abc import Callable, Sequence
-from math import copysign, inf
+from math import copysign
 from typing import Any
 
 from hypothesis import HealthCheck, example, given, settings
@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from rov_fmu.c.stepper import Stepper
 from tests.vehicles import VEHICLES, still
-from verification.references.closed_form import Axis, advance, time_to_rest
+from verification.references import reference
+from verification.references.reference import time_to_rest
 
 Case = tuple[float, float, float, float, float]
 """The coefficients A, B, C of an axis, the initial velocity v0, and the step size h."""
@@ -93,15 +94,6 @@ def coinciding(draw: st.DrawFn) -> Case:
 
 
 @st.composite
-def at_the_fractions(draw: st.DrawFn) -> Case:
-    """Draw motions at and near q = -0.8, 0.8 and 3.2, where the closed form changes its continued fraction."""
-    A, B, _, v0, h = draw(similar())
-    A = A or 1.0 / h
-    q = draw(st.sampled_from((0.8, -0.8, 3.2))) * (1.0 + draw(OFFSET))
-    return A, B, (q - (0.5 * B * h) ** 2) / (A * h * h), v0, h
-
-
-@st.composite
 def turning(draw: st.DrawFn) -> Case:
     """Draw motions against the force that last until the reversal, or multiples of that, or slightly less or more."""
     A, B, C, v0, h = draw(similar())
@@ -110,13 +102,10 @@ def turning(draw: st.DrawFn) -> Case:
     return A, B, C, v0, h
 
 
-CASES: st.SearchStrategy[Case] = st.one_of(similar(), faint(), WIDE, coinciding(), at_the_fractions(), turning())
+CASES: st.SearchStrategy[Case] = st.one_of(similar(), faint(), WIDE, coinciding(), turning())
 BOUNDARIES: list[Case] = [
     (1.0, 2.0, -1.0, 1.0, 1.0),  # D^2 = 0, and reverses at half the time
     (0.0, 0.0, -1.0, 1.0, 2.0),  # no drag, and reverses at half the time
-    (1.0, 0.0, 0.8, 0.0, 1.0),  # q = 0.8
-    (1.0, 0.0, -0.8, 1.0, 1.0),  # q = -0.8
-    (1.0, 0.0, 3.2, 0.0, 1.0),  # q = 3.2
     (0.3, 1.7, 0.0, 0.0, 1.0),
     (0.3, 1.7, 0.0, 2.0, 1e9),
     (0.3, 1.7, -2.0, 0.0, 1.0),
@@ -144,15 +133,7 @@ def step_alone(A: float, B: float, C: float, v0: float, h: float) -> tuple[float
 
 def path(A: float, B: float, C: float, v0: float, h: float) -> float:
     """Return the length of the path, on which the motion may reverse."""
-    against = C < 0.0 < v0 or v0 < 0.0 < C
-    rest = time_to_rest(A, B, -abs(C), abs(v0)) if against else inf
-    forth = advance(A, B, C, v0, rest)[1] if rest < h else 0.0
-    return abs(forth) + abs(advance(A, B, C, v0, h)[1] - forth)
-
-
-def path_of(axis: Axis, v0: float, h: float) -> float:
-    """Return the length of the path of one axis of a vehicle."""
-    return path(axis.A, axis.B, axis.C, v0, h)
+    return float(reference.axis(A, B, C, v0, h).path)
 
 
 def rounding_of_velocity(*velocities: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
-from verification.references.closed_form import axis_of
+from verification.references.reference import Motion
 
 NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
 """The standard deviations of depth (m), heading (rad) and the velocity of a camera (m/s)."""
@@ -88,14 +88,17 @@ def write_log(folder: Path, name: str, recording: Measured) -> Path:
 
 
 def clean(k: Vehicle, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
-    """Run a plan from rest, one exact step per sample."""
+    """Run a plan from rest, one exact motion per command."""
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
     v, s = 0.0, 0.0
-    velocity, position = [], []
-    axes = {c: axis_of(k.held(axis, c)) for c, _ in plan}
-    for c in command.tolist():
-        velocity.append(v)
-        position.append(s)
-        v, covered = axes[c].advance(v, 1.0 / rate)
-        s += covered
-    return Clean(axis, np.arange(len(command)) / rate, command, np.array(velocity), np.array(position))
+    points: list[tuple[float, float]] = []
+    for c, hold in plan:
+        held = k.held(axis, c)
+        motion = Motion(held.A, held.B, held.C, v, hold, held.reverse)
+        *part, (v, end) = (
+            (float(v), s + float(d)) for v, d in map(motion.at, np.arange(round(hold * rate) + 1) / rate)
+        )
+        points += part
+        s = end
+    velocity, position = np.array(points).T
+    return Clean(axis, np.arange(len(command)) / rate, command, velocity, position)

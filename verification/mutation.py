@@ -48,15 +48,13 @@ from verification.new_tests import copy_checkout, environment
 ROOT = Path(__file__).parents[1]
 LEAST = 0.85
 """The share of the mutants that the tests must kill."""
-_LONGEST = 120
-"""The longest time (s) of one test; one that takes longer has noticed its mutant."""
 FILES = ("rov_fmu/**/*.py", "fmu_src/c/*.c")
 KEPT = ROOT / "verification" / "mutants.csv"
 _COLUMNS = ("file", "line", "above", "before", "below", "after", "verdict", "seconds", "test")
 """The columns of the kept mutants: a file, a line of it with its neighbours, and the line in its place. Then follow the
 verdict (killed, survived, or empty), the seconds until then, and the test that failed."""
 _LIMIT = 150
-"""The longest time (s) for the tests of a kept mutant. One that no test has noticed by then has survived."""
+"""The longest time (s) for the tests of a mutant. One that no test has noticed by then has survived."""
 TESTS = {
     "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/calls",
     "fmu_src/c/s*.c": "equation/test_c_step.py fmu/calls/test_values.py fmu/calls equation/test_exactness.py c",
@@ -242,60 +240,7 @@ def draw(seed: int) -> Iterator[Mutant]:
                     yield Mutant(file, line, old, new, after)
 
 
-# ---- Tests -----------------------------------------------------------------------------------------------------------
-
-
-def _pass(tests: Sequence[str], folder: Path, processes: int = 0, longest: float | None = None) -> bool:
-    """Return True when the tests pass in a copy of the checkout, each in _LONGEST and all in `longest` seconds."""
-    limit = ["-o", f"faulthandler_timeout={_LONGEST}", "-o", "faulthandler_exit_on_timeout=true"]
-    command = [sys.executable, "-m", "pytest", "-n", str(processes), "-x", "-p", "no:cacheprovider", *limit, *tests]
-    process = subprocess.Popen(
-        command,
-        cwd=folder,
-        env=environment(folder),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    try:
-        return process.wait(longest) == 0
-    except subprocess.TimeoutExpired:  # a mutant may also hang when it is imported
-        return False
-    finally:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)  # with what the tests have started
-
-
-def survivors(mutants: Sequence[Mutant], jobs: int) -> list[Mutant]:
-    """Run the tests of every mutant in copies of the checkout; return the mutants that no test has noticed."""
-    with tempfile.TemporaryDirectory(prefix="mutation-") as temporary, ThreadPoolExecutor(jobs) as pool:
-        copies: SimpleQueue[Path] = SimpleQueue()
-        for n in range(jobs):
-            copies.put(copy_checkout(Path(temporary, str(n))))
-        tests, began = sorted({test for mutant in mutants for test in tests_of(mutant.file)}), time.monotonic()
-        if not _pass(tests, Path(temporary, "0"), jobs):
-            raise click.ClickException(f"the tests fail without a mutant: pytest {' '.join(tests)}")
-        took = time.monotonic() - began
-        click.echo(f"the tests pass without a mutant, in {took:.0f} s")
-        longest = _LONGEST + jobs * took
-
-        def survives(mutant: Mutant) -> tuple[bool, float]:
-            folder, began = copies.get(), time.monotonic()
-            (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
-            passed = _pass(tests_of(mutant.file), folder, longest=longest)
-            shutil.copy2(ROOT / mutant.file, folder / mutant.file)
-            copies.put(folder)
-            return passed, time.monotonic() - began
-
-        left = []
-        for n, (mutant, (survived, took)) in enumerate(zip(mutants, pool.map(survives, mutants), strict=True), 1):
-            verdict = "survived" if survived else "killed"
-            click.echo(f"{n}/{len(mutants)} {verdict} after {took:.0f} s: {mutant.file}:{mutant.line}")
-            left += [mutant] if survived else []
-        return left
-
-
-# ---- The kept mutants ------------------------------------------------------------------------------------------------
+# ---- Verdicts --------------------------------------------------------------------------------------------------------
 
 Row = dict[str, str]
 
@@ -419,29 +364,40 @@ def _verdict(mutant: Mutant, folder: Path, seconds: Mapping[str, float]) -> tupl
     return "killed", begun[-1][0] if begun else "the import"
 
 
+def run(rows: Sequence[Row], jobs: int, save: Callable[[], None] = lambda: None) -> None:
+    """Give every mutant without a verdict its verdict, in copies of the checkout; `save` is called after each."""
+    left = [row for row in rows if not row["verdict"]]
+    mutants = [applied(row) for row in left]
+    tests = sorted({test for mutant in mutants if mutant for test in tests_of(mutant.file)})
+    with tempfile.TemporaryDirectory(prefix="mutation-") as temporary, ThreadPoolExecutor(jobs) as pool:
+        copies: SimpleQueue[Path] = SimpleQueue()
+        for n in range(jobs):
+            copies.put(copy_checkout(Path(temporary, str(n))))
+        seconds = _baseline(tests, Path(temporary, "0"), jobs) if tests else {}
+
+        def found(mutant: Mutant | None) -> Row:
+            if mutant is None:
+                return {"verdict": "no longer applies"}
+            folder, began = copies.get(), time.monotonic()
+            (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
+            verdict, test = _verdict(mutant, folder, seconds)
+            shutil.copy2(ROOT / mutant.file, folder / mutant.file)
+            copies.put(folder)
+            return {"verdict": verdict, "test": test, "seconds": f"{time.monotonic() - began:.0f}"}
+
+        for n, (row, result) in enumerate(zip(left, pool.map(found, mutants), strict=True), 1):
+            row.update(result)
+            save()
+            click.echo(
+                f"{n}/{len(left)} {row['verdict']} {row['seconds']} s: {row['file']}:{row['line']} {row['test']}"
+            )
+
+
 def run_kept(results: Path, reference: Sequence[Row], jobs: int = 1) -> list[Row]:
     """Give every kept mutant without a verdict its verdict in a file of results, and return all rows."""
     new = [row | dict.fromkeys(("verdict", "seconds", "test"), "") for row in reference]
     rows = read_rows(results) if results.exists() else new
-    left = [row for row in rows if not row["verdict"]]
-    mutants = {id(row): applied(row) for row in left}
-    with tempfile.TemporaryDirectory(prefix="mutation-") as temporary:
-        folder = copy_checkout(Path(temporary, "copy"))
-        tests = sorted({test for mutant in mutants.values() if mutant for test in tests_of(mutant.file)})
-        seconds = _baseline(tests, folder, jobs) if tests else {}
-        for n, row in enumerate(left, 1):
-            began, mutant = time.monotonic(), mutants[id(row)]
-            if mutant is None:
-                row["verdict"] = "no longer applies"
-            else:
-                (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
-                row["verdict"], row["test"] = _verdict(mutant, folder, seconds)
-                shutil.copy2(ROOT / mutant.file, folder / mutant.file)
-                row["seconds"] = f"{time.monotonic() - began:.0f}"
-            _write_rows(results, rows)
-            click.echo(
-                f"{n}/{len(left)} {row['verdict']} {row['seconds']} s: {row['file']}:{row['line']} {row['test']}"
-            )
+    run(rows, jobs, lambda: _write_rows(results, rows))
     return rows
 
 
@@ -470,7 +426,7 @@ _LOST = ("killed", "survived")
 def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, results: Path) -> None:
     """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants.
 
-    With --kept, exit with 1 when a mutant survives that was killed before. The mutants run one at a time.
+    With --kept, exit with 1 when a mutant survives that was killed before.
     """
     if is_kept:
         reference = read_rows(KEPT)
@@ -478,14 +434,15 @@ def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, re
     year, week, _ = datetime.now(timezone.utc).isocalendar()
     seed = 100 * year + week if seed is None else seed
     click.echo(f"{sample} mutants with seed {seed}")
-    mutants = list(islice(draw(seed), sample))
+    rows = sorted(map(kept, islice(draw(seed), sample)), key=lambda row: (row["file"], int(row["line"])))
     if keep:
-        _write_rows(KEPT, sorted((kept(mutant) for mutant in mutants), key=lambda row: (row["file"], int(row["line"]))))
+        _write_rows(KEPT, rows)
         return
-    left = survivors(mutants, jobs)
-    for mutant in left:
-        click.echo(f"{mutant.file}:{mutant.line}\n    - {mutant.before.strip()}\n    + {mutant.after.strip()}")
-    killed = 1.0 - len(left) / len(mutants)
+    run(rows, jobs)
+    left = [row for row in rows if row["verdict"] == "survived"]
+    for row in left:
+        click.echo(f"{row['file']}:{row['line']}\n    - {row['before'].strip()}\n    + {row['after'].strip()}")
+    killed = 1.0 - len(left) / len(rows)
     click.echo(f"{100.0 * killed:.0f} % of the mutants are killed; at least {100.0 * LEAST:.0f} % must be")
     sys.exit(0 if killed >= LEAST else 1)
 

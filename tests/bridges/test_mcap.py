@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lxml import etree
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 import rov_fmu
-from rov_fmu.bridges.mcap import motion_mcap, poses
 from rov_fmu.bridges.mcap_logs import identification_mcap
 from rov_fmu.bridges.sitl import Flight, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
@@ -31,8 +29,6 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.log import Channel, Source
 from tests.folders import small_folder
 from tests.report.results import example
-
-LAYOUTS = Path(__file__).parents[2] / "examples" / "mcap"
 
 
 def recorded(vehicle: VehicleModel, seconds: float, inputs: Mapping[str, Any], **start: float) -> Result:
@@ -127,14 +123,6 @@ def test_transform_is_the_pose(heavy: VehicleModel) -> None:
         assert str(transform.translation) == str(pose.pose.position)
 
 
-def test_heading_without_attitude() -> None:
-    """A vehicle that neither rolls nor pitches has its pose from x, y, z and psi."""
-    position, orientation = poses({"x": np.array([4.0]), "y": np.array([5.0]), "psi": np.array([pi / 2])})
-    np.testing.assert_array_equal(position, [[5.0, 4.0, 0.0]])
-    np.testing.assert_allclose(orientation.apply([1.0, 0.0, 0.0]), [[1.0, 0.0, 0.0]], atol=1e-15)  # it heads east
-    np.testing.assert_allclose(orientation.apply([0.0, 0.0, 1.0]), [[0.0, 0.0, 1.0]], atol=1e-15)
-
-
 def test_jets_leave_against_the_force() -> None:
     """Each thruster that pushes has an arrow at its place, whose x axis points where the water goes."""
     vehicle = rov_fmu.load("videoray")
@@ -158,19 +146,6 @@ def test_jets_leave_against_the_force() -> None:
     assert lengths[0] == pytest.approx(lengths[1])
     left = next(a for t, a in zip(pushing, entity.arrows, strict=True) if t.name == "l")
     assert left.pose.position.y > 0.0  # port
-
-
-def test_same_bytes(heavy: VehicleModel) -> None:
-    """The same simulation gives the same bytes."""
-    result = recorded(heavy, 1.0, {"u_1": 0.3})
-    assert motion_mcap(heavy, result.time, result) == motion_mcap(heavy, result.time, result)
-
-
-def test_many_vehicles_are_refused(heavy: VehicleModel) -> None:
-    """A file holds one vehicle."""
-    result = heavy.simulate_many([0.0, 1.0], {"u_1": np.array([[0.1], [0.2]])})
-    with pytest.raises(InputError, match="result: must be the simulation of one vehicle"):
-        heavy.to_mcap(result)
 
 
 def test_without_the_library(heavy: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -264,18 +239,3 @@ def test_a_flight_with_ardusub_is_a_motion(heavy: VehicleModel, tmp_path: Path) 
     for name in ("u", "r", "F_1"):
         values = [row[name] for _, row in found["/outputs"]]
         assert values == pytest.approx(expected[name][1:], abs=1e-9)
-
-
-def test_layouts(heavy: VehicleModel) -> None:
-    """The layouts of the examples name topics and variables that the file has."""
-    found = messages(heavy.to_mcap(recorded(heavy, 0.1, {})))
-    names = {f"/outputs.{name}" for name in found["/outputs"][0][1]}
-    foxglove = json.loads((LAYOUTS / "foxglove.json").read_text(encoding="utf-8"))
-    panels = foxglove["configById"]
-    assert {path["value"] for panel in panels.values() for path in panel.get("paths", ())} <= names
-    assert panels["3D!vehicle"]["topics"].keys() <= found.keys()
-    shown = json.dumps(foxglove["layout"])
-    assert all(panel in shown for panel in panels)
-    curves = etree.parse(LAYOUTS / "plotjuggler.xml").xpath("//curve/@name")
-    assert curves
-    assert {name.replace("/outputs/", "/outputs.") for name in curves} <= names

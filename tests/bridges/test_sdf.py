@@ -23,7 +23,6 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
 from rov_fmu.equation.alone import RISE
-from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -452,17 +451,6 @@ def test_the_link_has_the_mass_and_the_moments_of_the_file(name: str) -> None:
     assert -found.gravity[2] * np.array([weight, buoyancy]) == pytest.approx([vehicle["W"], vehicle["B"]])
 
 
-def test_the_page_has_the_ratios_of_the_vehicles_that_ship() -> None:
-    page = (ROOT / "docs" / "gazebo.md").read_text(encoding="utf-8")
-    for name in SHIPPED:
-        found = Gazebo(gazebo_model(LOADED[name], in_world=True, explicit=True).text)
-        cells = []
-        for axis, ratio in zip(AXES, -np.diag(found.explicit) / np.diag(found.rigid), strict=True):
-            text = f"{ratio + 0.0:.2f}" if axis in LOADED[name].layout.kinds else "–"
-            cells.append(f"**{text}**" if ratio >= 1.0 else text)
-        assert f"| {name} | {' | '.join(cells)} |\n" in page
-
-
 def test_the_plugin_has_the_same_mass_as_the_link() -> None:
     for name in SHIPPED:
         implicit, explicit = (
@@ -503,26 +491,6 @@ def test_the_notes_say_what_is_otherwise_in_the_file_too(case: str) -> None:
     assert note in comment.text
 
 
-def test_a_vehicle_has_only_its_own_notes() -> None:
-    notes = " ".join(gazebo_model(LOADED["bluerov2_heavy"]).notes)
-    for word in ("alpha", "beta", "fins", "has no", "F_0", "voltage", "pulse", "dead time", "videoray"):
-        assert word not in notes
-
-
-def test_texts_cannot_leave_the_comment() -> None:
-    vehicle = replace(LOADED["bare"], name="A --> <model/> & --- B-")
-    root = root_of(gazebo_model(vehicle).text)
-    check(root)
-    (comment, *_) = root.xpath("/comment()")
-    assert "A - -> <model/> & - - - B-, " in comment.text
-
-
-def test_a_thruster_that_no_place_can_stand_for_is_told() -> None:
-    note = "left out: the moment about its own direction of each of the thrusters 1, 2, 3, 4"
-    assert note not in gazebo_model(tuned("bluerov2_heavy", alpha_r=2.0)).notes, "yaw is square to their forces"
-    assert note in gazebo_model(tuned("bluerov2_heavy", alpha_p=2.0)).notes
-
-
 @pytest.mark.parametrize(
     ("name", "changes", "line"),
     [
@@ -555,15 +523,3 @@ def test_the_command_writes_the_file_and_lists_the_notes(
     out, err = capsys.readouterr()
     assert err == f"rov-fmu: warning: {wanted.warnings[0]}\n"
     assert out.endswith("\nWrote 'my rov.sdf'. Next: gz sim -r 'my rov.sdf'\n")
-
-
-def test_a_thruster_with_the_name_of_a_joint_is_refused() -> None:
-    """SDFormat allows each name once in a model: the joint of the thruster 1 is thruster_1_joint."""
-    vehicle = load_vehicle(SHIPPED["bluerov2"])
-    first, second, *others = vehicle.layout.thrusters
-    renamed = (first, replace(second, name=f"{first.name}_joint"), *others)
-    layout = replace(vehicle.layout, thrusters=renamed, mix={})
-    changed = replace(vehicle, layout=layout)
-    with pytest.raises(InputError, match=rf"thruster\.{first.name}_joint: choose another name for Gazebo"):
-        gazebo_model(changed)
-    assert f"thruster_{first.name}_joint" in gazebo_model(vehicle).text

@@ -13,7 +13,6 @@ from math import atan2, cos, pi, sin
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, socket
 from threading import Thread
-from time import process_time
 
 import numpy as np
 import pytest
@@ -217,36 +216,6 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
     assert [hint.partition(",")[0] for hint in hints] == ["packets of other senders", "a run has 20 logs with 1"]
 
 
-def test_the_duration_counts_from_the_start_and_waiting_gives_a_hint() -> None:
-    hints: list[str] = []
-    with socket(AF_INET, SOCK_DGRAM) as server:
-        server.bind(("127.0.0.1", 0))
-        connection = Connection(setup_of(), hints.append)
-        connection.serve(server, 0.2)
-        assert connection.traffic.frames == 0
-        (hint,) = hints
-        assert hint.startswith(f"waiting for packets of ArduSub to UDP port {server.getsockname()[1]}")
-    now = [0.0]
-    connection = Connection(setup_of(), clock=lambda: now[0])
-    for sender in (HERE, THERE):
-        for count in range(50):
-            connection.answer(packet(50, count, NEUTRAL), sender)
-        now[0] += 7.0
-    assert connection._time() == pytest.approx(1.0 + 7.0 + 1.0 + 7.0)
-
-
-def test_an_existing_log_is_replaced_only_with_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log = tmp_path / "dive.csv"
-    log.write_text("kept", encoding="utf-8")
-    command = ["sitl", "videoray", "--port", "0", "--duration", "0.05", "--log", str(log)]
-    assert main(command) == 2
-    expected = f"rov-fmu: --log {log}: the file exists; choose another name, or replace it with --force\n"
-    assert capsys.readouterr().err == expected
-    assert main([*command, "--force"]) == 0
-    assert log.read_text(encoding="utf-8") == "kept", "there was no row to write"
-    assert "No log was written" in capsys.readouterr().out
-
-
 # ---- Motion ----------------------------------------------------------------------------------------------------------
 
 
@@ -314,50 +283,6 @@ def test_holds_its_place_in_a_current(offset: float) -> None:
     turned = [(at["attitude"][2] - heading + pi) % (2.0 * pi) - pi for at in held]
     assert np.degrees(np.max(np.abs(turned))) < 2.0
     assert max(np.hypot(at["position"][0], at["position"][1]) for at in held) < 0.3
-
-
-def test_the_dead_band_makes_the_heading_swing_when_adrift() -> None:
-    """ArduSub's default gains do not reach 2 degrees without a stick: they reach the dead band at an error of 4.6."""
-    with served(setup_of(V_N=0.2, V_E=0.1, z=1.0, psi_0=0.2)) as (_, port):
-        autopilot = ArduSub(port, rate=100)
-        autopilot.fly(60.0)
-        autopilot.close()
-    held = [at for at in autopilot.history if at["timestamp"][0] > 30.0]
-    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
-    turned = np.degrees([at["attitude"][2] for at in held])
-    assert turned.max() == pytest.approx(4.7, abs=0.3)
-    assert turned.min() == pytest.approx(-4.7, abs=0.3)
-
-
-@pytest.mark.long
-def test_lost_and_repeated_packets_do_not_move_the_time() -> None:
-    chance = random.Random(3)
-    with served(setup_of(z=1.0)) as (connection, port):
-        autopilot = ArduSub(
-            port,
-            timeout=0.01,
-            loses=lambda: chance.random() < 0.05,
-            repeats=lambda: chance.random() < 0.01,
-        )
-        autopilot.fly(3.0)
-        autopilot.close()
-    assert autopilot.resent > 50
-    assert connection.traffic.repeated > 30
-    assert connection.flight.time == pytest.approx(connection.traffic.frames / 400, abs=1e-9)
-    assert autopilot.time == pytest.approx(connection.flight.time, abs=1.5 / 400)
-    assert abs(parsed(connection._answer)["position"][2] - 1.0) < 0.3
-
-
-def test_own_time_is_a_twentieth_of_real_time() -> None:
-    connection = Connection(setup_of(V_N=0.2, z=1.0))
-    packets = [packet(400, n, [1500 + n * 37 * k % 150 for k in range(8)] + [0] * 8) for n in range(1500)]
-    times = []
-    for first in range(0, 1500, 250):
-        begin = process_time()
-        for data in packets[first : first + 250]:
-            connection.answer(data, HERE)
-        times.append((process_time() - begin) / 250)
-    assert min(times) < 1 / 400 / 20
 
 
 # ---- Frames and servos -----------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.c import compile as module
-from rov_fmu.c.compile import OTHER_NAMES, PLATFORMS, engine_flags, host_platform
+from rov_fmu.c.compile import PLATFORMS, engine_flags, host_platform
 
 LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
 EXPECTED = {
@@ -59,24 +59,6 @@ def test_the_platform_of_a_machine_is_the_one_that_importers_look_for(
         assert tuple(flags[flags.index("engine.c") + 1 :]) == EXPECTED[in_fmi_3][3]
 
 
-def test_other_names_of_platforms_are_known() -> None:
-    assert {name: OTHER_NAMES[name] for name in ("x86_64-darwin", "linux", "arm64-linux", "win", "osx")} == {
-        "x86_64-darwin": "darwin64",
-        "linux": "linux64",
-        "arm64-linux": "aarch64-linux",
-        "win": "win64",
-        "osx": "darwin64 or aarch64-darwin",
-    }
-
-
-def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(module.BuildError, match="the C compiler is missing: pip install ziglang"):
-        module.compiler()
-    with pytest.raises(module.BuildError, match="the package fmpy, which has the FMI headers, is not installed"):
-        module.fmi_headers()
-
-
 @pytest.fixture
 def compiled_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A script that replaces the compiler, with a cache folder that nobody can make."""
@@ -90,16 +72,6 @@ def compiled_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
 def _write(script: Path, text: str) -> None:
     script.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
     script.chmod(script.stat().st_mode | stat.S_IXUSR)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")
-def test_without_a_place_for_its_cache_the_compiler_gets_a_temporary_one(compiled_by: Path) -> None:
-    _write(compiled_by, 'test -w "$ZIG_GLOBAL_CACHE_DIR" && echo "$ZIG_GLOBAL_CACHE_DIR" > module.wasm')
-    with pytest.warns(UserWarning, match=r"^/proc/x/zig: the compiler's cache cannot be written there: .* can name"):
-        cache = module.compile_module({}).decode().strip()
-    assert Path(cache).is_dir()
-    with pytest.warns(UserWarning, match="/proc/x/zig"):
-        assert module.compile_module({}).decode().strip() == cache, "one for the whole process"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")

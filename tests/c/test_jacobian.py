@@ -64,16 +64,3 @@ def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
         assert np.allclose(
             np.hstack((found.states, found.inputs, found.coefficients)), derivatives, rtol=1e-6, atol=1e-6
         )
-
-
-def test_an_unknown_coefficient_is_refused() -> None:
-    rov = VEHICLES["VideoRay"]
-    with pytest.raises(ValueError, match=r"^coefficients: the vehicle has no 'a_d_v'.*"):
-        step_jacobian(rov, rov.layout.usual_inputs, rov.layout.at_rest, H, ["a_d_v"])
-
-
-def test_a_motion_that_overflows_is_refused() -> None:
-    rov = VEHICLES["VideoRay"]
-    state = {**rov.layout.at_rest, "u": 1e200}
-    with pytest.raises(ValueError, match=r"^the derivatives of the step cannot be computed"):
-        step_jacobian(rov, rov.layout.usual_inputs, state, H)

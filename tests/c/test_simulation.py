@@ -129,12 +129,6 @@ def test_calculated_variables_agree_with_python() -> None:
             assert actual == pytest.approx(expected, rel=1e-12, abs=1e-13)
 
 
-def test_inputs_are_recorded_as_they_are_held() -> None:
-    values = {"u_l": np.linspace(0.1, 0.9, 5), "u_r": 0.4, "X_ext": -1.0}
-    found = simulate(VIDEORAY, np.linspace(0.0, 2.0, 5), values, [*values]).values[:, 0, 3]
-    assert found.tolist() == pytest.approx([0.7, 0.4, -1.0], rel=1e-15)
-
-
 def test_a_motion_that_cannot_be_computed_ends_with_nan_and_affects_no_other() -> None:
     times = np.array([0.0, 1.0, 2.0])
     found = simulate(VIDEORAY, times, {"u": 1.0, "r": [[0.1], [1e300], [0.1]]}, ["u", "psi"], vehicles=3)
@@ -176,22 +170,3 @@ def test_ctrl_c_ends_it() -> None:
         word, ended = process.stdout.read().split()
     assert (process.returncode, word) == (0, "interrupted")
     assert float(ended) - sent < 5.0
-
-
-@pytest.mark.long
-def test_threads_cost_no_processor_time() -> None:
-    """Two cores are therefore nearly twice as fast as one. Wall time would also depend on other programs.
-
-    Threads that waited actively or repeated each other's work would need twice the time. Cores that share their caches
-    with other programs have needed 12 % more.
-    """
-    times, vehicles = np.arange(1001.0) / 10.0, 200
-    values = {"u_l": 0.5, "u_r": 0.3, "a_d_u": np.linspace(5.0, 20.0, vehicles)[:, np.newaxis]}
-
-    def seconds(workers: int) -> float:
-        start = time.process_time()
-        simulate(VIDEORAY, times, values, vehicles=vehicles, workers=workers)
-        return time.process_time() - start
-
-    one, two = (min(seconds(workers) for _ in range(20)) for workers in (1, 2))
-    assert two < 1.4 * one

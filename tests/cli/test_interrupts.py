@@ -173,41 +173,6 @@ def test_a_study_ends_with_one_line(
     assert not [*results.glob("*/.*")]
 
 
-_SLOW_RESTARTS = """
-import os, sys, time
-from multiprocessing import util
-from rov_fmu import process
-from rov_fmu.__main__ import run
-class Slow:
-    def __getattr__(self, name):
-        return end if name == "_exit" else getattr(os, name)
-def end(code):
-    time.sleep(0.5)
-    os._exit(code)
-def start(*arguments, start=util.spawnv_passfds):
-    pid = start(*arguments)
-    if interrupted:
-        time.sleep(3.0)
-    return pid
-def kill(kill=process._kill_children):
-    interrupted.append(True)
-    kill()
-interrupted, slow = [], Slow()
-process.os, process._kill_children, util.spawnv_passfds = slow, kill, start
-sys.exit(run())
-"""
-"""The command, but a worker that is restarted after the interrupt waits for its data until the process has ended."""
-
-
-@pytest.mark.long
-def test_a_worker_that_dask_restarts_prints_nothing(videoray_fmu: Path, tmp_path: Path) -> None:
-    plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
-    arguments = ["-c", _SLOW_RESTARTS, "study", str(plan), "-o", str(results), "--workers", "2"]
-    with command(arguments, tmp_path, is_controlled=False) as study:
-        study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
-        assert study.terminate() == LINE_OF_A_STUDY
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["fly", "build"])
 def test_a_compiler_ends_with_its_command(name: str, tmp_path: Path) -> None:
@@ -264,7 +229,6 @@ class Slow:
 slow = Slow()
 sys.exit(run_process("rov-fmu", lambda: 1))
 """
-"""A command whose modules take time to free after it is done."""
 
 
 def test_a_signal_after_the_end_of_a_command_keeps_its_exit_code() -> None:
@@ -274,6 +238,9 @@ def test_a_signal_after_the_end_of_a_command_keeps_its_exit_code() -> None:
             assert process.stdout.read(4) == b"done"
             process.send_signal(number)
             assert process.wait(PATIENCE) == 1
+
+
+"""A command whose modules take time to free after it is done."""
 
 
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from rov_fmu.build import chosen_platforms
 from rov_fmu.c.compile import OptionError
 from rov_fmu.cli import main
-from rov_fmu.io.messages import did_you_mean, only, similar
+from rov_fmu.io.messages import only
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import ALONE, BARE, TESTS
 
@@ -29,20 +29,6 @@ def refusal(arguments: list[str], capsys: Capsys) -> str:
 
 
 # ---- One way to guess what was meant ---------------------------------------------------------------------------------
-
-
-def test_names_are_similar_whatever_their_case() -> None:
-    assert similar("BlueROV2", SHIPPED) == ["bluerov2"]
-    assert similar("a_tt", ["b_t", "a_t", "T"]) == ["a_t"]
-    assert similar("unlike", ["a_t"]) == []
-    assert similar("name", ["NAME", "Name", "other"], 3) == ["NAME", "Name"]
-
-
-def test_other_words_stand_for_names() -> None:
-    also = {"macos": "darwin64 or aarch64-darwin"}
-    assert did_you_mean("MacOS", ["win64"], also=also) == "; did you mean darwin64 or aarch64-darwin?"
-    assert did_you_mean("win65", ["win64"], also=also) == "; did you mean win64?"
-    assert did_you_mean("amiga", ["win64"], also=also) == ""
 
 
 def test_a_single_name_is_said_once() -> None:
@@ -410,20 +396,6 @@ def _identified(folder: Path, files: Mapping[str, str], capsys: Capsys) -> str:
 def test_a_wrong_table_is_one_line(case: str, tmp_path: Path, capsys: Capsys) -> None:
     name, text, expected = TABLES[case]
     assert expected in _identified(tmp_path, {name: text}, capsys)
-
-
-def test_wrong_inputs_of_a_plan_are_one_line(here: Path, videoray_fmu: Path, capsys: Capsys) -> None:
-    pytest.importorskip("dask")
-    shutil.copy(videoray_fmu, here / "rov.fmu")
-    plan = FILES["plan.toml"].replace('vehicle = "videoray"', 'fmu = "rov.fmu"')
-    plan = plan.replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
-    (here / "plan.toml").write_text(plan, encoding="utf-8")
-    for text, expected in (
-        ("", "the file is empty"),
-        ("0,1\n1,2\n", "the first line must be a header that names the columns: the time, and then var"),
-    ):
-        (here / "in.csv").write_text(text, encoding="utf-8")
-        assert f"in.csv: {expected}" in refusal(["study", "plan.toml", "-o", "r"], capsys)
 
 
 # ---- Tuning ----------------------------------------------------------------------------------------------------------

@@ -118,14 +118,6 @@ def test_force_is_no_leave_to_overwrite_an_input(tmp_path: Path, capsys: Capsys)
     assert (tests / "rov.toml").read_bytes() == before
 
 
-def test_a_vehicle_that_was_tuned_is_not_replaced(tank_tests: Path, folder: Path, capsys: Capsys) -> None:
-    rov = str(folder / "rov.toml")
-    assert main(["tune", rov, "--axis", "heave", "--command", "0.3", "--v-ss", "0.2", "-o", rov]) == 0
-    capsys.readouterr()
-    assert _identify(tank_tests, folder) == 2
-    assert "rov.toml: cannot be written: the file there has changed since identify wrote it" in capsys.readouterr().err
-
-
 def _check(paths: Sequence[Path]) -> list[str]:
     return check_replaced(paths, force=False)
 

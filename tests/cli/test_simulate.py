@@ -5,9 +5,7 @@ import sys
 import webbrowser
 from pathlib import Path
 
-import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import rov_fmu
 from rov_fmu.cli import main
@@ -123,24 +121,11 @@ def test_the_commands_of_an_autopilot_drive_a_simulation(here: Path) -> None:
     assert float(last["z"]) == pytest.approx(result["z"][-1], rel=1e-3)
 
 
-def test_results_have_round_times_and_the_end_is_one_of_them(here: Path) -> None:
-    assert main(["simulate", str(BARE), "--stop", "0.75", "--step", "0.1", "-o", "result.parquet"]) == 0
-    frame = pd.read_parquet(here / "result.parquet")
-    assert frame["time"].tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75]
-    assert frame.columns.tolist()[:3] == ["time", "w", "z"]
-
-
 @pytest.mark.parametrize(("name", "begins"), [("plot.png", b"\x89PNG"), ("plot.svg", b"<?xml"), ("plot.pdf", b"%PDF")])
 def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys) -> None:
     assert main(["simulate", str(BARE), "--plot", name]) == 0
     assert capsys.readouterr() == (f"Wrote {name}. Next: open the plot\n", "")
     assert (here / name).read_bytes().startswith(begins)
-
-
-@pytest.mark.usefixtures("here")
-def test_a_table_alone_is_followed_by_a_plot(capsys: Capsys) -> None:
-    assert main(["simulate", str(BARE), "-o", "a.csv"]) == 0
-    assert capsys.readouterr().out == "Wrote a.csv. Next: add --plot to see the curves\n"
 
 
 @pytest.mark.parametrize(
@@ -154,36 +139,6 @@ def test_a_simulation_without_commands_says_how_to_set_one(options: list[str], s
     assert ("No command" in out) == says_so
 
 
-def test_a_table_in_a_pipe_has_every_unit_and_no_trailing_spaces(capsys: Capsys) -> None:
-    assert main(["simulate", "bluerov2_heavy", "--stop", "1"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines == [line.rstrip() for line in lines]
-    assert {"eta 1 1", "theta 0 rad"} <= {" ".join(line.split()) for line in lines}
-
-
-@pytest.mark.usefixtures("here")
-def test_a_plot_has_a_title_and_hides_no_curve(monkeypatch: pytest.MonkeyPatch) -> None:
-    figures: list[Figure] = []
-    kept = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **how: figures.append(self) or kept(self, *a, **how))  # type: ignore[func-returns-value]
-    options = ["--set", "u_l=0.3", "--set", "u_r = 0.3", "--set", "u_t=0.9", "--plot", "a.svg"]
-    assert main(["simulate", "videoray", *options]) == 0
-    assert main(["simulate", "videoray", "--input", "commands.csv", "--plot", "a.svg"]) == 0
-    constant, changing = figures
-    assert constant.get_suptitle() == "VideoRay Pro 4: u_l=0.3, u_r = 0.3, u_t=0.9"
-    assert changing.get_suptitle() == "VideoRay Pro 4: commands of commands.csv"
-    (forces,) = (ax for ax in constant.axes if ax.get_title(loc="left") == "Thrust (N)")
-    assert [line.get_linestyle() for line in forces.lines] == ["-", "--", "-"], "F_r is that of F_l"
-    assert {line.get_linestyle() for ax in changing.axes for line in ax.lines} == {"-"}
-    assert [ax.get_title(loc="left") for ax in constant.axes][-1] == "Commands (%)"
-
-
-def test_a_constant_has_an_axis_from_zero() -> None:
-    result = rov_fmu.load("videoray").simulate([0.0, 1.0], {"u_t": 0.2}, record=["F_t"])
-    panel, _commands = result.plot(figure=Figure()).axes
-    assert panel.get_ylim() == pytest.approx((0.0, 1.1 * result["F_t"][0]))
-
-
 def test_a_plot_opens_in_a_browser(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", lambda uri: opened.append(uri) or True)  # type: ignore[func-returns-value]
@@ -192,13 +147,6 @@ def test_a_plot_opens_in_a_browser(here: Path, monkeypatch: pytest.MonkeyPatch, 
     path = Path(capsys.readouterr().out.strip())
     assert opened == [path.as_uri()]
     assert path.read_bytes().startswith(b"<?xml")
-
-
-def test_without_a_browser_a_plot_has_another_way(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
-    monkeypatch.setattr(webbrowser, "open", lambda _: False)
-    monkeypatch.setattr("tempfile.tempdir", str(here))
-    assert main(["simulate", str(BARE), "--plot"]) == 0
-    assert capsys.readouterr().err.endswith(" Use --plot FILE.svg to write it to another place\n")
 
 
 def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:

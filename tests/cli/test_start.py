@@ -1,6 +1,5 @@
 """How the command starts: by name, quickly, with shell completion, with progress on a terminal, and not installed."""
 
-import asyncio
 import os
 import shutil
 import signal
@@ -8,22 +7,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from functools import partialmethod
-from io import StringIO
 from pathlib import Path
-from typing import Any
 
 import pytest
 from fmpy import read_model_description
-from rich.progress import Progress
 
-from rov_fmu.build import build
 from rov_fmu.c.compile import PLATFORMS
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.io.messages import FileError
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
@@ -155,88 +147,7 @@ def test_the_shell_completes_commands_vehicles_platforms_and_axes(complete: Comp
     assert complete("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_for_a_shell_is_there(
-    shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if shell == "bash" and not shutil.which("bash"):
-        pytest.skip("click asks bash for its version")
-    monkeypatch.setenv("_ROV_FMU_COMPLETE", f"{shell}_source")
-    with pytest.raises(SystemExit, match=r"^0$"):
-        main([])
-    assert f"_ROV_FMU_COMPLETE={shell}_complete" in capsys.readouterr().out
-
-
 # ---- Progress --------------------------------------------------------------------------------------------------------
-
-
-class Terminal(StringIO):
-    """A text that the commands take for a terminal."""
-
-    def isatty(self) -> bool:
-        """Return True."""
-        return True
-
-
-def _terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
-    """Return a terminal that is stdout and stderr during a test."""
-    both = Terminal()
-    monkeypatch.setattr(sys, "stdout", both)
-    monkeypatch.setattr(sys, "stderr", both)
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("NO_COLOR", "1")
-    return both
-
-
-def test_a_build_shows_its_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    terminal = _terminal(monkeypatch)
-    assert main(["build", str(BARE), "--platform=host", "-o", str(tmp_path / "x.fmu")]) == 0
-    shown = terminal.getvalue()
-    assert "compiling " in shown
-    assert shown.index("compiling ") < shown.index("built in")
-    assert "\x1b[2K" in shown, "the lines of the progress are cleared"
-
-
-def test_a_pipe_gets_no_progress_even_if_colour_is_forced(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Jupyter and many CI systems set FORCE_COLOR."""
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    assert main(["build", str(BARE), "--platform=host", "-o", str(tmp_path / "x.fmu")]) == 0
-    assert "compiling" not in "".join(capsys.readouterr())
-
-
-@pytest.mark.long
-def test_an_identification_shows_its_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = _terminal(monkeypatch)
-    every_step_is_drawn = partialmethod(Progress.update, refresh=True)  # Rich draws ten times a second
-    monkeypatch.setattr(Progress, "update", every_step_is_drawn)
-    assert main(["identify", str(TESTS)]) == 0
-    shown = terminal.getvalue()
-    before = shown[: shown.index("VideoRay Pro 4, refitted. ")]  # the first words of the results
-    assert "%" in before
-    assert "heave" in before
-    assert "\x1b[2K" in shown, "the bar is cleared"
-
-
-def test_a_warning_is_printed_above_the_bar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The warning is not appended to the line of the bar: that line is cleared before."""
-    pytest.importorskip("dask")
-    terminal = _terminal(monkeypatch)
-
-    def warns(*arguments: Any) -> None:
-        warn = arguments[-1]
-        warn("the plan is odd")
-        raise FileError("that is all")
-
-    monkeypatch.setattr("rov_fmu.study.run.run_study.run_study", warns)
-    assert main(["study", "plan.toml", "-o", str(tmp_path / "results")]) == 2
-    bar, warning, after = terminal.getvalue().partition("rov-fmu: warning: the plan is odd\n")
-    assert warning
-    assert "starting the workers" in bar
-    assert "starting the workers" in after
-    assert bar.endswith("\r\x1b[2K")
-    assert after.endswith("rov-fmu: that is all\n")
 
 
 # ---- Not installed ---------------------------------------------------------------------------------------------------
@@ -299,17 +210,6 @@ def test_a_dependency_that_is_not_there_is_named(missing: str, tmp_path: Path) -
 
 
 # ---- In a notebook ---------------------------------------------------------------------------------------------------
-
-
-def test_a_build_runs_inside_a_running_loop(tmp_path: Path) -> None:
-    async def cell() -> list[str]:
-        done: list[str] = []
-        built = build(load_vehicle(BARE), tmp_path / "x.fmu", platforms=["host"], on_compiled=done.append)
-        assert list(built.binaries) == list(built.seconds) == done
-        return done
-
-    assert len(asyncio.run(cell())) == 1
-    assert (tmp_path / "x.fmu").is_file()
 
 
 _CELL = """

@@ -134,22 +134,6 @@ def test_a_full_disk_leaves_the_old_files(tmp_path: Path) -> None:
         subprocess.run(["umount", *disk], check=True)
 
 
-@_posix
-@pytest.mark.long
-def test_a_limit_on_the_size_of_files_leaves_the_old_files(tmp_path: Path) -> None:
-    target, temporary = full_folder(tmp_path)
-
-    def limited() -> None:
-        import resource
-        import signal
-
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
-
-    ends = run_elsewhere([(c, target / c.name) for c in COMMANDS.values()], temporary, preexec_fn=limited)
-    check_refusals(ends, "File too large", target, temporary)
-
-
 # ---- Several files ---------------------------------------------------------------------------------------------------
 
 

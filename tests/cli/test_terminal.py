@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import _commands
-from tests.commands import BARE, ROOT, start
+from tests.commands import BARE, ROOT
 from tests.folders import small_folder
 
 if sys.platform == "win32":
@@ -179,28 +179,6 @@ def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Pat
     running = [moment[-1] for moment in progress]
     assert any(re.search(r" \d+% 0:0\d:\d\d \d:\d\d:\d\d$", line) for line in running), running
     assert len(shown.lines) <= 30
-
-
-@pytest.mark.long
-def test_colours_are_left_out_where_they_are_not_wanted(folder: Path) -> None:
-    """The words are the same with and without them."""
-    arguments = ["build", "bare.toml", "--platform", "host"]
-    colour = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9[0-7])[\d;]*m")
-    assert colour.search(on_a_terminal(arguments, 80, folder).raw)
-    without = on_a_terminal(arguments, 80, folder, {"NO_COLOR": "1"})
-    assert not colour.search(without.raw)
-    assert without.lines[-1] == "Wrote bare.fmu. Next: rov-fmu prove bare.fmu"
-
-
-@pytest.mark.long
-def test_a_pipe_gets_a_plain_line_for_each_part_but_the_last(folder: Path) -> None:
-    with start(["identify", str(folder / "tests"), "--report", str(folder / "found.html")], stdout=-1) as process:
-        out, err = process.communicate(timeout=300)
-    assert process.returncode == 0
-    names = "reading the folder", "identifying the vehicle"
-    ended = [line for line in err.splitlines() if not line.endswith("s so far)")]
-    assert re.fullmatch("\n".join(rf"rov-fmu: {name}: done in \d+\.\d s" for name in names), "\n".join(ended))
-    assert out.splitlines()[-1].startswith(f"Wrote {folder / 'found.html'}. Next: rov-fmu identify ")
 
 
 def test_a_narrow_terminal_gets_several_tables_that_lose_no_digit(folder: Path) -> None:

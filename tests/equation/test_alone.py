@@ -1,18 +1,17 @@
-"""The motion of one axis agrees with 50 digits: the step in Python, the closed form of the tests, V_ss and Tau."""
+"""The motion of one axis agrees with 50 digits: the step in C, V_ss and Tau."""
 
 import random
 from collections.abc import Iterable
 from itertools import islice, product
-from math import e, inf, nextafter, pi
+from math import e, inf, nextafter
 
 import pytest
 from mpmath import mp
 from scipy.optimize import brentq
 
 from rov_fmu.equation.alone import RISE, AxisAlone, steady_velocity, time_constant
-from tests.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case, step_alone
-from verification.references.closed_form import advance, time_to_rest
-from verification.references.reference import axis
+from tests.motions import DISTANCE, SMALLEST, VELOCITY, Case, step_alone
+from verification.references.reference import axis, time_to_rest
 
 
 @pytest.fixture(params=[29, pytest.param(1, marks=pytest.mark.long)], ids=["every 29th case", "every case"])
@@ -23,11 +22,9 @@ def stride(request: pytest.FixtureRequest) -> int:
 
 def check(cases: Iterable[Case], stride: int = 1) -> None:
     for case in islice(cases, 0, None, stride):
-        exact = axis(*case)
-        for method, (velocity, distance) in (("closed form", advance(*case)), ("step", step_alone(*case))):
-            room, least = (2.0, 1e-310) if method == "step" else (1.0, TINY)  # a step has many operations
-            assert abs(velocity - exact.velocity) <= room * VELOCITY * exact.scale + least, (method, case)
-            assert abs(distance - exact.distance) <= room * DISTANCE * exact.path + least, (method, case)
+        exact, (velocity, distance) = axis(*case), step_alone(*case)
+        assert abs(velocity - exact.velocity) <= 2.0 * VELOCITY * exact.scale + 1e-310, case
+        assert abs(distance - exact.distance) <= 2.0 * DISTANCE * exact.path + 1e-310, case
 
 
 def random_case(rng: random.Random) -> Case:
@@ -72,17 +69,6 @@ def test_exact_at_and_around_the_reversal(stride: int) -> None:
     check(cases, stride)
 
 
-def test_exact_without_drag_force_or_motion() -> None:
-    check(product((0.0, 0.3), (0.0, 1.7), (-2.5, 0.0, 2.5), (-1.2, 0.0, 1.2), (1e-5, 1e-2, 1.0, 1e3)))
-
-
-def test_exact_on_both_sides_of_the_fractions(stride: int) -> None:
-    """The continued fractions of the closed form end at these q = (B h/2)^2 + A C h^2."""
-    motions = product((1e-3, 0.3, 50.0), (0.0, 1e-3, 1.0), (0.0, 0.1, 20.0), (-1e-3, -1e-15, 0.0, 1e-15, 1e-3))
-    cases = product(motions, (0.8, -0.8, 3.2))
-    check(((A, B, (q * (1.0 + by) - 0.25 * B * B) / A, v0, 1.0) for (A, B, v0, by), q in cases), min(stride, 4))
-
-
 def test_the_steady_velocity_stays(stride: int) -> None:
     cases: list[Case] = []
     for A, B, C in product((0.0, 1e-4, 0.3, 1e3), (1e-4, 1.7, 1e3), (1e-4, 0.1, 1e4)):
@@ -93,17 +79,6 @@ def test_the_steady_velocity_stays(stride: int) -> None:
 
 
 # ---- Far outside what an ROV does ----
-
-
-def test_huge_steps_are_exact(stride: int) -> None:
-    drags = (0.0, 1e-4, 0.3, 1e3), (0.0, 1e-4, 1.7, 1e3)
-    check(product(*drags, (-1e4, -0.1, 0.0, 0.1), (0.0, 0.01, 30.0), (1e6, 1e9, 1e15)), stride)
-
-
-def test_huge_coefficients_are_exact(stride: int) -> None:
-    """The coefficients go up to the bounds of a vehicle file."""
-    drag = 0.0, 1.0, 1e6, 1e15
-    check(product(drag, drag, (-1e18, -1.0, 0.0, 1e9, 1e18), (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3)), stride)
 
 
 def test_tiny_and_subnormal_numbers_are_exact_to_the_last_subnormal_digit(stride: int) -> None:
@@ -158,9 +133,3 @@ def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -
     assert astern.time_constant() == time_constant(0.5, 1.0, -1.5)
     assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
     assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE
-
-
-def test_a_stop_from_any_velocity_takes_less_than_a_bounded_time() -> None:
-    """With quadratic drag alone, the time to rest is atan(v sqrt(A/F))/sqrt(A F)."""
-    assert time_to_rest(4.0, 0.0, -1.0, 1e300) == pytest.approx(pi / 4.0, rel=1e-15)
-    assert time_to_rest(0.0, 0.0, -2.0, 3.0) == 1.5

@@ -1,11 +1,10 @@
 """Steps in Python and in C are exact: compared with 50 digits, SciPy's integration of the equations, and themselves."""
 
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from itertools import islice, product
-from math import copysign, cos, hypot, isfinite, sin
-from pathlib import Path
+from math import copysign, cos, sin
 from time import process_time
 from typing import Any
 
@@ -13,11 +12,11 @@ import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
 
+from rov_fmu.equation.alone import AxisAlone as Axis
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, errors, in_fmu, in_python
 from tests.fmi import ERROR
 from tests.fmi2 import Fmu
-from tests.motions import path_of
 from tests.vehicles import (
     EVERYTHING,
     HEAVY,
@@ -32,19 +31,12 @@ from tests.vehicles import (
     still,
 )
 from verification.references import reference
-from verification.references.closed_form import Axis, axes
 
 VELOCITY, PATH = 2e-14, 1e-13
 """The allowed errors, relative to the largest velocity and to the length of the path."""
 LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
 EVERY = pytest.mark.parametrize("stride", [4, pytest.param(1, marks=LONG)])
 """The distance between the cases of a list that are tested."""
-
-
-@pytest.fixture
-def heavy_steps(heavy_dir: Path) -> list[Step]:
-    """The step of the Heavy in C."""
-    return [partial(in_fmu, Fmu(heavy_dir))]
 
 
 def hold(steps: Iterable[Step], cases: Iterable[Case], velocity: float = VELOCITY, path: float = PATH) -> None:
@@ -79,7 +71,7 @@ def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> Non
 
 
 @pytest.mark.parametrize(
-    ("number", "longest"), [(5, 0.3), pytest.param(8, 2.0, marks=LONG), pytest.param(30, 2.0, marks=WEEKLY)]
+    ("number", "longest"), [(2, 0.3), pytest.param(8, 2.0, marks=LONG), pytest.param(30, 2.0, marks=WEEKLY)]
 )
 @pytest.mark.parametrize(("name", "rov"), [("heavy", HEAVY), ("everything", load_vehicle(EVERYTHING))])
 def test_a_step_with_coupling_and_lag_is_exact_in_c(
@@ -105,7 +97,7 @@ def test_extreme_vehicles_are_exact(steps: list[Step], stride: int) -> None:
     cases = product(drags, drags, loads, (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3))
     for a_d, b_d, Z_ext, w, h in islice(cases, 0, None, stride):
         rov, inputs = light.replaced({"a_d_w": a_d, "b_d_w": b_d}), {**still(light), "Z_ext": Z_ext}
-        heave = axes(rov, inputs)[1]
+        heave = rov.motions(inputs)[1]
         exact = reference.axis(heave.A, heave.B, heave.C, w, h)
         for step in steps:
             found = step(rov, inputs, {**at_rest(rov), "w": w}, h)
@@ -135,7 +127,8 @@ def of_axes(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> Case:
 @pytest.mark.parametrize("stride", [13, pytest.param(1, marks=LONG)])
 def test_a_reversal_while_spinning_is_exact(steps: list[Step], stride: int) -> None:
     for after, (surge, yaw, u, r) in islice(product((1.0, 1.3, 0.9, 2.5), REVERSALS), 0, None, stride):
-        hold(steps, [of_axes(surge, yaw, u, r, after * surge.reversal_time(u))], 3e-14, 3e-13)  # of many pieces
+        rest = reference.time_to_rest(surge.A, surge.B, -abs(surge.C), abs(u))
+        hold(steps, [of_axes(surge, yaw, u, r, after * rest)], 3e-14, 3e-13)  # of many pieces
 
 
 @pytest.mark.parametrize("stride", [7, pytest.param(1, marks=LONG)])
@@ -168,42 +161,7 @@ def test_a_turn_that_begins_at_rest_is_exact(steps: list[Step], stride: int) -> 
         hold(steps, [of_axes(Axis(0.1, 0.2, 0.0), Axis(0.0, B, C), 0.5, share * C * h, h)])
 
 
-@pytest.mark.parametrize("turn", [0.12, *(pytest.param(turn, marks=LONG) for turn in (0.05, 2.0))])
-def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy_steps: list[Step], turn: float) -> None:
-    """The turn begins by a load, or by thrust that fades."""
-    inputs, before, h = still(HEAVY), {**at_rest(HEAVY), "u": 0.5, "v": -0.2}, 0.01
-    load = spin_up(turn, h) * (HEAVY["I_r"] + HEAVY["m_a_r"])
-    thrust = {name: load for name in before if name.startswith("F_")}
-    hold(heavy_steps, [(HEAVY, {**inputs, "N_ext": load}, before, h), (HEAVY, inputs, {**before, **thrust}, h)])
-
-
 # Axes of surge and yaw, u, r and h. Some numbers are huge, others next to nothing.
-FAR = {
-    "a steady turn longer than the age of the universe": (
-        Axis(0.5, 1.4, 0.27),
-        Axis(0.14, 0.12, 5.2),
-        0.0,
-        1e9,
-        1e24,
-    ),
-    "no surge but the smallest number": (Axis(0.5, 1.4, 0.0), Axis(0.14, 0.12, 1e-3), -5e-324, 0.0, 1e9),
-    "a subnormal force": (Axis(0.5, 15.0, -1e-311), Axis(0.14, 0.12, -1e-12), 0.0, 0.0, 500.0),
-}
-
-
-@pytest.mark.parametrize("name", FAR)
-def test_no_turn_goes_too_far(steps: list[Step], name: str) -> None:
-    rov, inputs, before, h = case = of_axes(*FAR[name])
-    surge, _, yaw = axes(rov, inputs)
-    expected = [surge.advance(before["u"], h)[0], yaw.advance(before["r"], h)[0]]
-    distance = path_of(surge, before["u"], h)
-    for found in (step(*case) for step in steps):
-        assert all(map(isfinite, found.values()))
-        # subnormal forces do not move it
-        assert [found["u"], found["r"]] == pytest.approx(expected, rel=1e-14, abs=1e-300)
-        assert hypot(found["x"], found["y"]) <= distance * (1.0 + 1e-14) + 1e-320
-
-
 CALM = Axis(0.5, 1.4, 0.27)
 OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e308 m
     "turn": of_axes(CALM, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
@@ -213,7 +171,7 @@ OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e3
 }
 
 
-@pytest.mark.parametrize("name", OVERFLOWING)
+@pytest.mark.parametrize("name", ["turn", *(pytest.param(name, marks=LONG) for name in ("spin", "distance", "both"))])
 def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: Fmu, name: str) -> None:
     rov, inputs, before, h = OVERFLOWING[name]
     start = process_time()
@@ -289,15 +247,6 @@ def test_a_step_solves_the_equations_of_the_paper(steps: list[Step], h: float) -
 
 
 @EVERY
-def test_one_step_of_ten_seconds_is_a_thousand_of_ten_milliseconds(fmu: Fmu, stride: int) -> None:
-    for name in islice(MANOEUVRES, 0, None, stride):
-        inputs, before = manoeuvre(name)
-        once, often = (in_fmu(fmu, VIDEORAY, inputs, before, 10.0, steps) for steps in (1, 1000))
-        assert [often[v] for v in "uwr"] == pytest.approx([once[v] for v in "uwr"], rel=1e-13, abs=1e-15)
-        assert often == pytest.approx(once, rel=1e-12, abs=1e-12)
-
-
-@EVERY
 def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(steps: list[Step], stride: int) -> None:
     for name in islice(MANOEUVRES, stride - 1, None, stride):
         inputs, before = manoeuvre(name)
@@ -318,19 +267,3 @@ def test_a_heading_far_from_zero_is_as_good_as_one_near_it(steps: list[Step], ps
         c, d, x, y = cos(psi), sin(psi), near["x"], near["y"]
         assert (far["x"], far["y"]) == pytest.approx((x * c - y * d, x * d + y * c), rel=1e-13, abs=1e-15)
         assert far["psi"] == pytest.approx(psi + near["psi"], rel=1e-15)
-
-
-@pytest.mark.parametrize("number", [1, 1000])
-def test_a_steady_turn_stays_on_its_circle(fmu: Fmu, number: int) -> None:
-    inputs, h = {**still(VIDEORAY), "u_l": 0.6, "u_r": 0.3}, 1e6
-    of_both: list[Callable[..., State]] = [partial(in_fmu, fmu), in_python]
-    for step in of_both[: 2 if number == 1 else 1]:
-        start = step(VIDEORAY, inputs, at_rest(VIDEORAY), 100.0)
-        end = step(VIDEORAY, inputs, start, h, number)
-        assert (end["u"], end["r"]) == pytest.approx((start["u"], start["r"]), rel=1e-15)
-        assert end["psi"] - start["psi"] == pytest.approx(start["r"] * h, rel=1e-13)
-        radius = start["u"] / start["r"]
-        centres = [(s["x"] - radius * sin(s["psi"]), s["y"] + radius * cos(s["psi"])) for s in (start, end)]
-        # psi of 1e6 rad has 1e-10 rad of rounding; in Python, each whole turn has some of its own
-        room = (1e-8 if step is in_python else 1e-9) * radius
-        assert centres[1] == pytest.approx(centres[0], abs=room)

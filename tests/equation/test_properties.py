@@ -12,20 +12,15 @@ from rov_fmu.equation.alone import steady_velocity, time_constant
 from tests.motions import (
     BOUNDARIES,
     CASES,
-    SMALLEST,
     TINY,
     Case,
     hold,
     memory,
     path,
-    power,
     rounding_of_distance,
     rounding_of_velocity,
-    signed,
-    similar,
     step_alone,
 )
-from verification.references.closed_form import time_to_rest
 
 
 def for_every(
@@ -47,22 +42,6 @@ def for_every(
 
 
 # ---- Symmetry and semigroup ----
-
-
-@for_every(CASES, at=[(case,) for case in BOUNDARIES])
-def test_left_and_right_are_mirror_images_to_the_last_bit(case: Case) -> None:
-    A, B, C, v0, h = case
-    velocity, distance = step_alone(*case)
-    assert step_alone(A, B, -C, -v0, h) == (-velocity, -distance)
-
-
-@for_every(similar(), st.integers(-20, 20), st.integers(-20, 20), at=[(case, 3, -5) for case in BOUNDARIES[:8]])
-def test_units_of_powers_of_two_change_no_bit(case: Case, metres: int, seconds: int) -> None:
-    A, B, C, v0, h = case
-    m, s = 2.0**metres, 2.0**seconds
-    velocity, distance = step_alone(*case)
-    assume(abs(velocity) > 1e-290 or C == v0 == 0.0)  # a subnormal velocity has fewer digits
-    assert step_alone(A / m, B / s, C * m / s / s, v0 * m / s, h * s) == (velocity * m / s, distance * m)
 
 
 @for_every(CASES, st.just(0.5) | st.floats(0.5, 1.0), st.booleans(), at=[(case, 0.5, True) for case in BOUNDARIES])
@@ -108,11 +87,6 @@ def test_without_force_no_motion_gains_one_bit_of_speed_or_turns(case: Case) -> 
     assert distance * v0 >= 0.0
 
 
-@for_every(signed(-323.0, 18.0), power(-9.0, 9.0))
-def test_without_force_and_drag_no_bit_of_the_velocity_changes(v0: float, h: float) -> None:
-    assert step_alone(0.0, 0.0, 0.0, v0, h) == (v0, v0 * h)
-
-
 @for_every(CASES, at=[(case,) for case in [*BOUNDARIES, (0.0, 1e-280, 1e-280, 0.0, 1.0)]])
 def test_after_the_time_constant_a_start_from_rest_has_63_percent_of_the_steady_velocity(case: Case) -> None:
     """The rounding error of Tau is multiplied by the acceleration, which is at most C, and C Tau is at most V_ss."""
@@ -123,20 +97,6 @@ def test_after_the_time_constant_a_start_from_rest_has_63_percent_of_the_steady_
     assume(abs(V) * Tau < inf)  # the distance does not overflow: such a step is refused
     velocity = step_alone(A, B, C, 0.0, Tau)[0]
     assert abs(velocity - (1.0 - 1.0 / e) * V) <= 2.0 * rounding_of_velocity(V)
-
-
-@for_every(CASES, at=[((0.0, 1e-170, -1e-300, 1.0, 1.0),), ((1e-200, 0.0, -1e-200, 1.0, 1.0),)])
-def test_a_motion_against_the_force_is_at_rest_after_the_time_to_rest(case: Case) -> None:
-    """The rounding error of the time is multiplied by |C|, and |C| times the time is at most |v0| because drag brakes.
-
-    A subnormal acceleration has an error of its last digit all that time.
-    """
-    A, B, C, v0, _ = case
-    assume(C != 0.0 != v0)
-    C, v0 = -abs(C), abs(v0)
-    rest = time_to_rest(A, B, C, v0)
-    assume(0.0 < rest < inf and v0 * rest < inf)
-    assert abs(step_alone(A, B, C, v0, rest)[0]) <= 2.0 * rounding_of_velocity(v0) + SMALLEST * (rest - C)
 
 
 # ---- Energy ----

@@ -7,7 +7,6 @@ import pytest
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.equation.dependencies import dependencies_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, at_rest, pulsed, random_inputs, random_state
 
@@ -52,16 +51,6 @@ def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
         state = {name: found[name] for name in state}
 
 
-def test_the_engine_steps_as_with_fractions_bit_for_bit(rov: Vehicle) -> None:
-    rng, times = random.Random(2), np.cumsum([0.0, *[0.04, 0.1, 0.27] * 8])
-    rows = [pulses_of(rng, rov) for _ in times]
-    pulses, fractions = ({name: np.array([row[k][name] for row in rows]) for name in rov.layout.inputs} for k in (0, 1))
-    found = simulate(pulsed(rov, PULSE), times, pulses, workers=1).values
-    assert np.isfinite(found).all()
-    assert np.abs(found).max() > 0.1
-    assert found.tolist() == simulate(rov, times, fractions, workers=1).values.tolist()
-
-
 def test_neutral_gives_no_thrust_and_is_the_start_value(rov: Vehicle) -> None:
     of_pulses = pulsed(rov, PULSE)
     usual = of_pulses.layout.usual_inputs
@@ -97,11 +86,6 @@ def test_v_ss_and_the_commands_of_an_axis_are_those_of_the_fractions(rov: Vehicl
     heave = AXES["heave"]
     held = pulsed(SIX, PULSE).held_inputs(heave, 1.0)
     assert {held[name] for name in SIX.layout.signs(heave)} <= {PULSE[0], PULSE[2]}
-
-
-def test_what_depends_on_a_command_still_does(rov: Vehicle) -> None:
-    found, expected = dependencies_of(pulsed(rov, PULSE).layout), dependencies_of(rov.layout)
-    assert {name: [*known] for name, known in found.items()} == {name: [*known] for name, known in expected.items()}
 
 
 def test_a_command_acts_after_the_dead_time_and_neutral_before() -> None:

@@ -16,7 +16,6 @@ from tests.vehicles import (
     Values,
     at_rest,
     random_case,
-    random_inputs,
     random_vehicle,
     still,
 )
@@ -139,17 +138,6 @@ def test_the_signs_are_those_of_the_body_and_earth_frames(k: Vehicle, inputs: Va
     assert {name: copysign(1, value) for name, value in after.items() if value != 0.0} == signs
 
 
-def test_north_is_ahead_at_heading_zero_and_east_at_a_quarter_turn(k: Vehicle) -> None:
-    ahead = held(k, u_l=0.5, u_r=0.5)
-    distance = k.step(ahead, at_rest(k), 2.0)["x"]
-    for psi in (0.0, 0.5 * pi, pi, -0.5 * pi, 2.0):
-        after = k.step(ahead, {**at_rest(k), "psi": psi}, 2.0)
-        assert (after["x"], after["y"]) == pytest.approx(
-            (distance * cos(psi), distance * sin(psi)), rel=1e-15, abs=1e-15
-        )
-        assert after["psi"] == psi
-
-
 def test_a_current_displaces_and_does_nothing_else(k: Vehicle) -> None:
     calm = held(k, u_l=0.5, u_r=0.2, u_t=-0.4)
     before = {**at_rest(k), "u": 0.3, "w": 0.1, "r": -1.0, "psi": 0.7}
@@ -178,13 +166,6 @@ def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
         assert found == pytest.approx(list(expected.values()), rel=3e-7, abs=3e-7)
 
 
-def test_a_step_does_not_change_its_arguments() -> None:
-    inputs, before = random_inputs(random.Random(8), HEAVY), at_rest(HEAVY)
-    copies = dict(inputs), dict(before)
-    assert HEAVY.step(inputs, before, 0.1).keys() == before.keys()
-    assert (inputs, before) == copies
-
-
 # ---- One axis alone ----
 
 
@@ -203,15 +184,6 @@ def test_an_axis_alone_has_the_numbers_of_18() -> None:
     assert rov.motions(held(rov, X_ext=2.0))[0] == motion
     thrust = rov.force(SURGE, 0.5)
     assert pytest.approx(gain * (0.5 * thrust + 0.1)) == rov.held(SURGE, 0.5).C
-
-
-def test_the_net_weight_is_a_load_in_heave_alone() -> None:
-    still = SIX.motions(held(SIX))
-    loads = {form.axis.name: x.C * SIX.effective_inertia(form) for form, x in zip(SIX.layout.axes, still, strict=True)}
-    assert loads == pytest.approx(
-        {"surge": 0.1, "sway": 0.3, "heave": -1.5 + 132.6 - 131.6, "roll": 0.02, "pitch": -0.03, "yaw": 0.01}
-    )
-    assert VEHICLES["VideoRay"].held(HEAVE, 0.0).C == 0.0
 
 
 def _loss(rov: Vehicle, axis: Axis, inputs: dict[str, float]) -> float:
@@ -233,15 +205,6 @@ def test_the_loss_of_thrust_is_that_of_the_thrusters_parts_along_the_axis() -> N
     }
     assert {axis: _loss(SIX, axis, inputs) for axis in expected} == pytest.approx(expected, rel=1e-12)
     assert _loss(HEAVY, SURGE, held(HEAVY, u_1=1.0)) == 0
-
-
-def test_an_arm_turns_the_force_of_a_thruster_by_4(k: Vehicle) -> None:
-    assert [k.effect(t, YAW) for t in k.layout.thrusters] == pytest.approx([0.22 * sin(0.423), -0.22 * sin(0.423), 0.0])
-    assert [k.effect(t, SURGE) for t in k.layout.thrusters] == [1.0, 1.0, 0.0]
-    both = 0.22 * sin(0.423) * (42.9 * 0.25 + 2.711 * 0.5)
-    assert (k.force(YAW, 0.5), k.strongest(YAW)) == pytest.approx((both, 0.22 * sin(0.423) * (42.9 + 2.711)))
-    assert pytest.approx(k["alpha_r"] * k["beta_r"] / k["I_r"] * both) == k.held(YAW, 0.5).C
-    assert k.response(YAW, -0.5) == (-k.response(YAW, 0.5)[0], k.response(YAW, 0.5)[1])
 
 
 @pytest.mark.parametrize("turns", [0.0, 1.0, -3.0])

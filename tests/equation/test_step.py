@@ -9,14 +9,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from scipy.integrate import DOP853
 
 from rov_fmu.equation import step as module
-from rov_fmu.equation.catalogue import RESTORING
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_python, worst
-from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
+from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
 
 COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
 FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
@@ -200,13 +198,6 @@ def test_a_step_that_overflows_is_not_finite_and_takes_no_time(
     assert process_time() - start < 2.0
 
 
-def test_a_step_of_too_many_substeps_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
-    rov, inputs, state = case(COUPLED, {}, {"u": 1.0, "v": 0.2, "r": 3.0})
-    assert all(map(isfinite, rov.step(inputs, state, 5.0).values()))
-    monkeypatch.setattr(module, "MOST_SUBSTEPS", 3)
-    assert not all(map(isfinite, rov.step(inputs, state, 5.0).values()))
-
-
 @pytest.mark.parametrize("h", [1e3, 1e6, 1e30])
 def test_once_all_has_settled_a_step_of_any_length_takes_no_longer(h: float) -> None:
     rov, inputs, state = case(HEAVY, AHEAD, {})
@@ -238,24 +229,3 @@ def test_a_vehicle_that_coasts_to_rest_stays_there(h: float) -> None:
     found = VIDEORAY.step(still(VIDEORAY), {**at_rest(VIDEORAY), "u": 1.5}, h)
     assert found["x"] == pytest.approx(m / a * log1p(a * 1.5 / b), rel=1e-12)
     assert (found["u"], found["y"], found["psi"]) == (0.0, 0.0, 0.0)
-
-
-def test_whole_turns_of_an_attitude_are_counted() -> None:
-    """A neutral vehicle turns about its vertical axis, and its quaternion changes its sign with every turn."""
-    forces = [name for name in SIX.layout.coefficients if name.startswith(("a_d", "b_d", "F_0", "m_a", "Y_"))]
-    forces += [name for name in SIX.layout.coefficients if name in RESTORING]
-    free = SIX.replaced(dict.fromkeys(forces, 0.0))
-    for turns in (0.25, 7.25, 1000.25):
-        found = free.step(still(free), {**at_rest(free), "r": 2.0 * pi}, turns)
-        assert found["psi"] == pytest.approx(2.0 * pi * turns, rel=1e-12)
-        half = pi * turns
-        assert [found["eta"], found["epsilon_3"]] == pytest.approx([cos(half), sin(half)], abs=1e-11)
-
-
-def test_the_method_has_the_coefficients_of_dop853() -> None:
-    """SciPy has them from Hairer's code."""
-    rows = [*(row for _, row in module._STAGES), module._END, module._FIFTH, module._THIRD]
-    expected = [*DOP853.A[1:12], DOP853.B, DOP853.E5, DOP853.E3]
-    assert [node for node, _ in module._STAGES] == DOP853.C[1:12].tolist()
-    for row, of_scipy in zip(rows, expected, strict=True):
-        assert [row.get(n, 0.0) for n in range(len(of_scipy))] == pytest.approx(of_scipy.tolist(), rel=1e-15)

@@ -18,7 +18,7 @@ from rov_fmu.equation.layout import Curve, ThrustTable
 from rov_fmu.equation.step import MOST_WAITING, Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import SIX, THRUST_EFFECTS, Values, at_rest, fin, numbered, random_inputs, random_state
+from tests.vehicles import SIX, THRUST_EFFECTS, at_rest, fin, numbered, random_inputs, random_state
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces
 from verification.references.rigid_vehicle import compared, places
@@ -80,24 +80,6 @@ def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
     assert forces == pytest.approx(PchipInterpolator(*zip(*points, strict=True))(commands), rel=1e-13, abs=1e-13)
     assert (np.diff(forces) >= 0.0).all()
     assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
-
-
-def test_the_voltage_scales_thrust_and_stays_within_its_tables() -> None:
-    def forces(voltage: float, command: float = 0.6) -> dict[str, float]:
-        inputs = NOW.layout.usual_inputs | dict.fromkeys(("u_l", "u_bow", "u_top"), command) | {"voltage": voltage}
-        return NOW.commanded(inputs)
-
-    assert NOW.layout.usual_inputs["voltage"] == 14.8
-    assert (
-        forces(8.0)["l"]
-        == forces(12.0)["l"]
-        < forces(14.0)["l"]
-        == pytest.approx(0.5 * (forces(12.0)["l"] + forces(16.0)["l"]))
-    )
-    assert forces(18.0)["l"] == forces(16.0)["l"]
-    assert forces(12.0)["bow"] == pytest.approx(forces(16.0)["bow"] * 0.75**1.3, rel=1e-15)
-    assert forces(14.8)["top"] == pytest.approx(10.0 * 0.55**2 + 5.0 * 0.55, rel=1e-15)
-    assert forces(0.0)["bow"] == forces(-5.0)["bow"] == 0.0
 
 
 def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> None:
@@ -246,27 +228,6 @@ def test_commands_act_exactly_after_the_dead_time() -> None:
     in_c = simulate(ROV, np.array(times), tables, workers=1).values[:, 0, -1]
     assert delayed == pytest.approx(state, rel=1e-12, abs=1e-13)
     assert in_c.tolist() == pytest.approx([delayed[name] for name in ROV.layout.state], rel=1e-13, abs=1e-14)
-
-
-def test_nothing_acts_before_the_dead_time_and_nothing_changes_the_loads() -> None:
-    inputs: Values = ROV.layout.usual_inputs | {"u_l": 1.0, "u_r": 1.0, "Y_ext": 3.0}
-    line = ROV.delay_line()
-    state = line.step(ROV, inputs, at_rest(ROV), 0.0, 0.099)
-    assert state["u"] == state["F_l"] == 0.0 < state["v"]
-    (change,) = line.waiting
-    assert change.remaining == pytest.approx(0.001, rel=1e-12)
-    assert change.commands == {name: inputs[name] for name in ROV.layout.commands}
-    state = line.step(ROV, inputs, state, 0.099, 0.001)
-    assert (state["u"], line.waiting, line.delayed["delayed_u_l"]) == (0.0, [], 1.0)
-    assert line.step(ROV, inputs, state, 0.1, 0.01)["u"] > 0.0
-
-
-def test_a_change_back_at_the_same_time_replaces_the_first_one() -> None:
-    line, state = ROV.delay_line(), at_rest(ROV)
-    usual = ROV.layout.usual_inputs
-    line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 1e-20)
-    line.step(ROV, usual | {"u_l": 0.5}, state, 0.0, 1e-20)
-    assert [change.commands["u_l"] for change in line.waiting] == [0.5]
 
 
 @pytest.mark.parametrize(("units", "waits"), [(-1, False), (0, False), (8, False), (9, True)])

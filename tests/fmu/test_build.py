@@ -8,9 +8,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
-from lxml import etree
 
-from rov_fmu.build import build
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
@@ -98,19 +96,6 @@ def test_the_description_says_what_the_interface_declares(videoray_dir: Path, ve
     assert description.coSimulation.maxOutputDerivativeOrder == 1
 
 
-def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> None:
-    """FMI++ stops when these attributes are missing."""
-    description = etree.parse(videoray_dir / "modelDescription.xml")
-    once = "canBeInstantiatedOnlyOncePerProcess"
-    for interface, flags in {
-        "CoSimulation": (once, "canInterpolateInputs", "canRunAsynchronuously"),
-        "ModelExchange": (once,),
-    }.items():
-        element = description.find(interface)
-        assert element is not None
-        assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
-
-
 @pytest.mark.parametrize(
     ("before", "said"),
     [
@@ -159,9 +144,3 @@ def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Veh
         guids.append(native_content(load_vehicle(path)).guid)
     assert guids[0] == guids[1] != guids[2]
     assert vehicle["m_rov"] == 6.57
-
-
-def test_build_raises_an_error_about_an_unknown_platform(vehicle: Vehicle, tmp_path: Path) -> None:
-    with pytest.raises(fmu_compile.OptionError, match="there is no platform linux, only host, linux64"):
-        build(vehicle, tmp_path / "rov.fmu", platforms=["linux"])
-    assert list(tmp_path.iterdir()) == []

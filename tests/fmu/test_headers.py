@@ -302,23 +302,3 @@ def test_the_sources_compile_like_with_microsofts_compiler(
         check=False,
     )
     assert (result.returncode, result.stderr) == (0, "")
-
-
-def test_the_headers_differ_like_their_releases(headers: dict[str, Path], tmp_path: Path) -> None:
-    """An assignment of const members is refused, and a prefix is added where the release knows it."""
-    program = tmp_path / "p.c"
-    program.write_text(
-        '#define FMI2_FUNCTION_PREFIX pre_\n#include "fmi2Functions.h"\n'
-        "void *prefixed(void) { return (void *)pre_fmi2Reset; }\n"
-        "#ifdef ASSIGN\nvoid f(fmi2CallbackFunctions *a, const fmi2CallbackFunctions *b) { *a = *b; }\n#endif\n",
-        encoding="utf-8",
-    )
-
-    def takes(release: str, *flags: str) -> bool:
-        command = [*compiler(), *flags, "-I", str(headers[release]), "-c", str(program), "-o", str(tmp_path / "p.o")]
-        return subprocess.run(command, capture_output=True, check=False).returncode == 0
-
-    override = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"
-    assert [takes(r) for r in _OF_FMI2] == [True, True, True, False]
-    assert [takes(r, override) for r in _OF_FMI2] == [True, True, False, False]
-    assert [takes(r, "-DASSIGN") for r in _OF_FMI2] == [False, True, True, False]

@@ -69,12 +69,6 @@ def test_every_input_and_output_is_in_one_group(rov: Vehicle) -> None:
         assert len(set(axes)) == len(axes)
 
 
-def test_groups_come_in_the_order_of_the_schema(groups: list[etree._Element]) -> None:
-    elements = [group.tag.removeprefix(NAMESPACE) for group in groups]
-    assert elements == sorted(elements, key=list(SEQUENCE).index)
-    assert set(elements) == set(SEQUENCE)
-
-
 @pytest.mark.parametrize(
     ("name", "element", "members"),
     [
@@ -98,14 +92,6 @@ def test_what_systems_connect_by(
     assert {variable.get("ref"): variable.get("axis") for variable in group} == members
 
 
-def test_moments_and_rotations_have_three_axes() -> None:
-    found = {group.get("name"): {v.get("ref"): v.get("axis") for v in group} for group in groups_of(SIX.layout)}
-    assert found["external_torque"] == {"K_ext": "x", "M_ext": "y", "N_ext": "z"}
-    assert found["current"] == {"V_N": "x", "V_E": "y", "V_D": "z"}
-    assert found["angular_velocity"] == {"p": "x", "q": "y", "r": "z"}
-    assert found["attitude"] == {"phi": "x", "theta": "y", "psi": "z"}
-
-
 def test_the_names_of_groups_differ_whatever_the_names_of_curves_and_thrusters_are() -> None:
     """The torque of a curve `external` is in another group than the torque from outside."""
     layout = VEHICLES["VideoRay"].layout
@@ -120,11 +106,6 @@ def test_the_names_of_groups_differ_whatever_the_names_of_curves_and_thrusters_a
     found = [group.get("name") for group in groups_of(renamed)]
     assert len({*found}) == len(found)
     assert {"external_torque_N_ext", "external_torque_tau_external"} <= {*found}
-
-
-def test_an_oblique_force_has_no_axis(heavy: Vehicle) -> None:
-    axes = {v.get("ref"): v.get("axis") for group in groups_of(heavy.layout) for v in group}
-    assert (axes["F_1"], axes["F_5"]) == (None, "z")
 
 
 # ---- rov-fmu build --osp -------------------------------------------------------------------------------------------
@@ -143,30 +124,3 @@ def test_the_option_writes_it_to_the_folder_of_the_fmu(tmp_path: Path) -> None:
     assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]
     assert osp_path(tmp_path / "rov.fmu", vehicle.identifier) == path
     assert path.read_bytes() == osp_model_description(vehicle.layout)
-
-
-def test_a_folder_in_its_place_stops_the_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "bare_OspModelDescription.xml").mkdir()
-    assert _build(tmp_path / "rov.fmu") == 2
-    assert "bare_OspModelDescription.xml: cannot be written: is a folder" in capsys.readouterr().err
-    assert not (tmp_path / "rov.fmu").exists()
-
-
-@pytest.mark.usefixtures("without_page")
-def test_written_whole_or_not_at_all(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "bare_OspModelDescription.xml"
-    path.write_text("as it was")
-    replace = Path.replace
-
-    def full(self: Path, target: Path) -> Path:
-        if target.suffix == ".xml":
-            raise OSError(28, "No space left on device")
-        return replace(self, target)
-
-    monkeypatch.setattr(Path, "replace", full)
-    assert _build(tmp_path / "rov.fmu") == 2
-    assert f"{path}: cannot be written: No space left on device" in capsys.readouterr().err
-    assert path.read_text() == "as it was"
-    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import zipfile
 from contextlib import nullcontext
 from itertools import product
 from pathlib import Path
@@ -64,18 +63,6 @@ def test_it_is_valid_and_says_what_it_can_do(python_fmu: Path, vehicle: Vehicle)
     assert (can.canGetAndSetFMUstate, can.canSerializeFMUstate, can.needsExecutionTool) == (True, True, True)
     assert not can.providesDirectionalDerivative
     assert can.maxOutputDerivativeOrder == 0
-
-
-def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
-    with zipfile.ZipFile(python_fmu) as archive:
-        ours = {n for n in archive.namelist() if n.startswith("resources/") and "/pythonfmu/" not in n}
-    assert ours == {
-        "resources/slavemodule.txt",
-        "resources/variables.json",
-        "resources/videoray_slave.py",
-        "resources/videoray_model/step.py",
-        "resources/videoray_model/equation.py",
-    }
 
 
 def test_its_modules_import_nothing_of_the_package(vehicle: Vehicle) -> None:
@@ -370,10 +357,3 @@ def test_an_importer_that_is_not_a_python_process_preloads_libpython(
     assert preloaded.code == native.code == 0, preloaded.errors + native.errors
     ((u,),), ((expected,),) = preloaded.lines, native.lines
     assert float(u) == pytest.approx(float(expected), rel=1e-12)
-
-
-def test_the_description_and_the_page_mention_ld_preload(python_dir: Path, videoray_dir: Path) -> None:
-    for folder, mentioned in ((python_dir, True), (videoray_dir, False)):
-        description = fmpy.read_model_description(str(folder)).description
-        page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
-        assert ("LD_PRELOAD" in description) == ("LD_PRELOAD" in page) == mentioned

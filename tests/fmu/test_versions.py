@@ -179,17 +179,6 @@ def test_fmi_3_declares_its_capabilities() -> None:
     assert root.find("ScheduledExecution") is None
 
 
-def test_an_integrator_must_complete_its_steps_where_turns_are_counted() -> None:
-    needs = {kind: described(ROVS[kind], 3).find("ModelExchange").get("needsCompletedIntegratorStep") for kind in ROVS}
-    assert {kind for kind, answer in needs.items() if answer == "true"} == {"six axes"}
-
-
-def test_only_inputs_and_outputs_are_available_in_intermediate_update() -> None:
-    root = described(VEHICLES["Heavy"], 3)
-    updated = {v.get("name") for v in root.iter("Float64") if v.get("intermediateUpdate") == "true"}
-    assert updated == {v.name for v in variables(VEHICLES["Heavy"]) if v.causality in ("input", "output")}
-
-
 # ---- rov-fmu build --interface ----
 
 KINDS = {"cs": (CO_SIMULATION, MODEL_EXCHANGE), "me": (MODEL_EXCHANGE, CO_SIMULATION)}

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import inf, pi
 from typing import Any
 
 import numpy as np
@@ -17,12 +16,9 @@ from rov_fmu.identify.findings import (
     findings_of,
     heading,
     next_tests,
-    relative_error,
     repairs,
     sentences,
     told,
-    warnings,
-    with_error,
 )
 from rov_fmu.identify.result import (
     Coefficient,
@@ -410,13 +406,6 @@ def test_a_log_that_disagrees_with_the_others_is_repaired_before_anything_is_mea
     assert repairs(result) == [f"{sentence} Then identify again." for sentence in words]
 
 
-def test_the_error_of_an_answer_is_relative() -> None:
-    assert with_error((0.62, (0.61, 0.63)), "m/s") == "0.620 m/s ±2%"
-    assert with_error((-pi, (-1.1 * pi, -0.9 * pi)), "rad/s") == "-180 deg/s ±10%"
-    assert with_error((0.5, (0.0, 1.25)), "m") == "0.50 m ±>100%"
-    assert with_error((inf, (inf, inf)), "s") == "-"
-
-
 def test_a_prediction_that_is_worse_than_no_change_is_never_silent() -> None:
     """Neither for an axis that is not to be used, nor over a whole log, where bands are not judged. Once is enough."""
     soon, whole = (prediction(HEAVE, "depth", error=0.8, span=span) for span in (10.0, np.inf))
@@ -440,26 +429,6 @@ def test_findings_of_reading_are_told_too() -> None:
     assert "log_1.csv: 3 rows out of order sorted" in facts(example().findings)
     assert heading(Finding("unreadable file")) == "Warnings"
     assert heading(Finding("time of arrival")) == "Doubts"
-
-
-def test_the_vehicle_has_warnings_with_doubts_and_facts() -> None:
-    groups = by_heading(example().findings)
-    assert warnings(example().findings) == groups["Warnings"] + groups["Doubts"]
-    assert facts(example().findings) == groups["Facts"]
-
-
-def test_logs_with_the_same_offset_share_a_sentence() -> None:
-    both = quiet(logging=(LATE, replace(LATE, file="log_2.csv", offset=-0.05)))
-    (sentence,) = said(both, "logging")
-    assert sentence.startswith("log_1.csv and log_2.csv: the commands act 0.05 ... 0.08 s before their rows")
-
-
-def test_relative_errors_are_of_points_that_count_and_are_determined() -> None:
-    points = [replace(p, counts=n != 1) for n, p in enumerate(forces(1.25, 7.0, 1.25))]
-    assert relative_error(points, "model") == pytest.approx(0.2)
-    points[0] = replace(points[0], held_out=np.nan)
-    assert relative_error(points, "held_out") == pytest.approx(0.2)
-    assert np.isnan(relative_error([], "model"))
 
 
 def test_a_coefficient_of_an_axis_without_answers_has_no_substitute() -> None:

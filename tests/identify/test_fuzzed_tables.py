@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import AXES, HEAVE
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.interface.tune_command import read_points
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
@@ -275,31 +274,3 @@ def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
         assert code == 2
         check_line(said.removesuffix("\n"), tests)
         assert "the thrust curve of top gives" in said or "thrust_top*.csv: must give a force above 0" in said
-
-
-def test_names_that_are_no_text_are_one_clear_line(tests: Path, capsys: Capsys) -> None:
-    for name in ("steady_heave_\n.csv", "steady_heave_\x1b[31m.csv", "steady_heave_\udcff.csv"):
-        try:
-            path = Path(shutil.copy(tests / "steady_heave_up.csv", tests / name))
-        except OSError:  # a file system that takes Unicode alone
-            continue
-        assert main(["identify", str(tests)]) == 2
-        said = without_progress(capsys.readouterr().err).removesuffix("\n")
-        check_line(said, tests)
-        assert "neither a log" in said
-        path.unlink()
-
-
-def test_a_message_quotes_a_cell_in_part(tests: Path) -> None:
-    (tests / "steady_heave_up.csv").write_text(
-        "command [%],velocity [m/s]\n20," + "9" * 100_000 + "\n", encoding="utf-8"
-    )
-    with pytest.raises(DataFileError, match=r"line 2, column 'velocity \[m/s\]' = '9+\.\.\.9+': must be a number"):
-        load_tests(tests)
-
-
-def test_bounds_of_points_are_those_of_tests(tmp_path: Path) -> None:
-    path = tmp_path / "points.csv"
-    path.write_text("command [%],velocity [m/s]\n20,10000\n", encoding="utf-8")
-    with pytest.raises(DataFileError, match="must be at most 1000"):
-        read_points(path, load_vehicle(VIDEORAY), HEAVE)

@@ -1,6 +1,5 @@
 """A folder of tests becomes a vehicle: end to end, with logs of one axis, tables, or both, and what is refused."""
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -178,14 +177,6 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
     assert vehicle.command_range == (0.2, 0.8)
 
 
-@pytest.mark.long
-def test_the_vehicle_file_is_built(of_tables: Identification, tmp_path: Path) -> None:
-    write_vehicle(of_tables.vehicle, tmp_path / "made.toml")
-    fmu = tmp_path / "made.fmu"
-    assert main(["build", str(tmp_path / "made.toml"), "--platform", "host", "-o", str(fmu)]) == 0
-    assert fmu.stat().st_size > 10_000
-
-
 def test_axes_that_share_a_curve_are_correlated_in_the_file(tmp_path: Path) -> None:
     """Drag of surge and of yaw inherit the error of the curve's scale, so that V_ss is known much better than drag."""
     random, rows = np.random.default_rng(1), {**FORCES, **responses(TRUTH, SURGE), **responses(TRUTH, YAW)}
@@ -305,48 +296,10 @@ def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
     assert of_axis(of_logs, HEAVE).coverage > 0.9
 
 
-def test_nothing_is_told_of_clean_logs(of_logs: Identification) -> None:
-    about_heave = {kind for kind, of in kinds(of_logs) if of not in ("surge", "yaw", "rear")}
-    assert about_heave == set()
-    made = of_logs.vehicle.provenance
-    assert made
-    assert made.verdicts[0].startswith("heave: good. The 95% bands contain ")
-    assert not any(effect.kept for effect in of_logs.effects)
-    for logging in of_logs.logging:
-        low, high = logging.offset_interval
-        assert low <= 0.0 <= high
-        assert logging.interval == pytest.approx(0.2)
-
-
 def test_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
     (sensor,) = of_logs.sensors
     assert (sensor.axis, sensor.quantity, sensor.unit, sensor.samples) == (HEAVE, "depth", "m", 2 * 300)
     assert np.hypot(sensor.white, sensor.coloured) == pytest.approx(0.005, rel=0.15)
-
-
-def test_a_single_log_is_predicted_by_its_halves(tmp_path: Path) -> None:
-    found = identify(load_tests(with_logs(tmp_path, HEAVE, 1)))
-    (heave,) = found.axes
-    assert {p.by for p in heave.predictions} == {"the first half", "the second half"}
-    check_answers(heave, 0.03)
-
-
-def test_a_heading_that_turns_many_times_is_identified(tmp_path: Path) -> None:
-    """It is logged between 0 and 360 degrees."""
-    found = identify(load_tests(with_logs(tmp_path, YAW, 1)))
-    (yaw,) = found.axes
-    check_answers(yaw, 0.01)
-    assert yaw.verdict.word == "good", yaw.verdict.reasons
-    assert found.agreement < 1.0, "both starts end at the same vehicle"
-
-
-def test_a_velocity_is_identified(tmp_path: Path) -> None:
-    """The plans of surge are ahead alone, so that V_ss astern is not as well known."""
-    found = identify(load_tests(with_logs(tmp_path, SURGE, 1)))
-    (surge,) = found.axes
-    check_answers(surge, 0.05, (0.3, 0.5))
-    widths = {a.command: (a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in surge.answers}
-    assert widths[-0.5] > 5.0 * widths[0.5]
 
 
 Change = Callable[[Measured, np.random.Generator], Measured]
@@ -392,17 +345,6 @@ def test_a_command_that_never_rests_gives_the_vehicle(tmp_path: Path) -> None:
     check_answers(heave, 0.05)
 
 
-@pytest.mark.long
-def test_an_identification_takes_seconds(tmp_path: Path) -> None:
-    """Three logs of 60 s at 20 Hz take the processor at most twice as long as it shall."""
-    path, random = folder_of(tmp_path / "tests", f'base = "videoray"\n{HEAD}', {}), np.random.default_rng(5)
-    for n, plan in enumerate(PLANS["heave"]):
-        write_log(path, str(n), clean(TRUTH, HEAVE, plan, 20.0).noisy(random))
-    began = time.process_time()
-    assert main(["identify", str(path)]) == 0
-    assert time.process_time() - began < 2.0 * 8.0
-
-
 def test_a_table_joins_the_logs_and_contradictions_are_told(tmp_path: Path) -> None:
     doubled = "".join(f"{c},{2.0 * TRUTH.response(HEAVE, c)[0]:.6f}\n" for c in (0.3, 0.5, 0.7))
     tables = {**FORCES, "steady_heave.csv": f"{SPEED}\n{doubled}"}
@@ -413,17 +355,6 @@ def test_a_table_joins_the_logs_and_contradictions_are_told(tmp_path: Path) -> N
 
 
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------
-
-
-def test_exact_thrust_stays_as_it_is(tmp_path: Path) -> None:
-    """With a deviation of 0, the curve of the base is exact: neither its scale nor its shape is a parameter."""
-    rov = f'base = "videoray"\n{HEAD}[priors]\nthrust = 0.0\n'
-    found = identify(load_tests(with_logs(tmp_path, HEAVE, 1, rov, {})))
-    for name in ("a_t_top", "b_t_top"):
-        assert found.vehicle[name] == TRUTH[name]
-    assert not {effect.kind for effect in found.effects} & {"reverse thrust", "dead band"}
-    drag = found.vehicle.intervals["a_d_w"]
-    assert drag[1] - drag[0] < 0.1 * TRUTH["a_d_w"]
 
 
 @pytest.mark.parametrize("key", [key for key in PRIORS if not key.endswith("noise")])
@@ -444,13 +375,6 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
         assert found.vehicle.layout.voltage_source == "Mean voltage of the logs"
     if key.startswith("slow_"):
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
-
-
-@pytest.mark.parametrize("key", ["white_noise", "coloured_noise"])
-def test_the_noise_of_a_sensor_is_never_exact(key: str, tmp_path: Path) -> None:
-    rov = f"{KNOWN}[priors]\n{key} = 0\n"
-    with pytest.raises(VehicleFileError, match=rf"rov\.toml: priors\.{key} = 0: must be above 0"):
-        read(tmp_path, rov, {**FORCES, **responses(TRUTH, HEAVE)})
 
 
 def test_known_coefficients_are_kept(tmp_path: Path) -> None:
@@ -515,11 +439,6 @@ def test_an_axis_without_a_usable_test_goes(tmp_path: Path) -> None:
     assert [result.axis for result in found.axes] == [HEAVE]
     assert not found.vehicle.layout.has(YAW)
     assert {("axis left out", "yaw"), ("unused curve", "rear")} <= kinds(found)
-
-
-def test_tables_remain_where_the_logs_cannot_be_used(tmp_path: Path) -> None:
-    tables = {**FORCES, **responses(TRUTH, HEAVE), "log_heave.csv": STILL}
-    check_answers(identify(read(tmp_path, KNOWN, tables)).axes[0], 1e-3)
 
 
 BACKWARD = f"{FORCE}\n0.2,0.0\n0.5,-0.5\n0.8,-2.0\n"

@@ -75,12 +75,6 @@ def test_the_vehicle_stays_in_the_tank(length: float, fit: Fit) -> None:
     assert plan(within) == plan(free) or covered[0] > length
 
 
-def test_a_turn_needs_no_length(fit: Fit) -> None:
-    one, other = (proposed(fit, YAW, **limits) for limits in ({"tank_length": 0.1}, {}))
-    assert one == other
-    assert proposed(fit, HEAVE, tank_length=0.1) is None
-
-
 @pytest.mark.parametrize("most", [0.25, 0.6])
 def test_no_command_is_above_the_strongest(most: float, fit: Fit) -> None:
     test = proposed(fit, command_max=most)
@@ -90,12 +84,6 @@ def test_no_command_is_above_the_strongest(most: float, fit: Fit) -> None:
 
 def test_nothing_is_proposed_where_no_command_is_allowed(fit: Fit) -> None:
     assert proposed(fit, command_max=0.1) is None
-
-
-@pytest.mark.parametrize("longest", [10.0, 12.0, 30.0])
-def test_a_test_is_no_longer_than_allowed(longest: float, fit: Fit) -> None:
-    test = proposed(fit, duration=longest)
-    assert test is None or sum(seconds for _, seconds in plan(test)) <= longest
 
 
 @pytest.mark.long

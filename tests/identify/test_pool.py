@@ -62,21 +62,6 @@ def flown(k: Vehicle, *, most: float = 0.5) -> Commands:
 
 
 @pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
-def test_commands_may_switch_between_samples(simulate: Simulate, k: Vehicle) -> None:
-    """The exact step goes from each time to the next, be it that of a switch or of a sample."""
-    commands = flown(k)
-    motion = simulate(k, commands, TIME, Conditions(current=(0.1, -0.2)))
-    state, now = at_rest(k), 0.0
-    for at in np.union1d(TIME, SWITCHES)[1:].tolist():
-        held = {f"u_{name}": float(values[0]) for name, values in commands.at(np.array([now])).items()}
-        state, now = k.step(still(k) | {"V_N": 0.1, "V_E": -0.2} | held, state, at - now), at
-        if at in TIME:
-            n = int(np.searchsorted(TIME, at))
-            for symbol in {*k.layout.velocities, "x", "y", "z"}:
-                assert motion[symbol][n] == pytest.approx(state[symbol], rel=1e-7, abs=1e-8), (symbol, at)
-
-
-@pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
 def test_conditions_of_thrust(simulate: Simulate, k: Vehicle) -> None:
     """Thrust at 70 % is that of a weaker curve; saturated commands are smaller ones; a delay moves the switches."""
 
@@ -93,33 +78,12 @@ def test_conditions_of_thrust(simulate: Simulate, k: Vehicle) -> None:
     same(Conditions(delay=0.25), k, Commands(SWITCHES + 0.25, commands.thrusters))
 
 
-def test_thrust_may_change_with_the_time() -> None:
-    """Thrust that ends at 1.2 s is no thrust from then on."""
-    halfway = Commands(np.append(SWITCHES[:-1], 1.2), flown(VIDEORAY).thrusters)
-    ended = Commands(halfway.switches, {n: np.append(v[:-1], 0.0) for n, v in halfway.thrusters.items()})
-    motion = pool.motion(VIDEORAY, halfway, TIME, Conditions(thrust=lambda t: float(t < 1.2)))
-    expected = pool.motion(VIDEORAY, ended, TIME)
-    for name in VIDEORAY.layout.velocities:
-        assert motion[name] == pytest.approx(expected[name], abs=1e-5), name
-
-
 def test_a_tether_holds_the_vehicle_where_it_pulls_as_the_thrusters_push() -> None:
     commands = Commands(np.zeros(1), {"l": np.array([0.3]), "r": np.array([0.3])})
     motion = pool.motion(VIDEORAY, commands, np.array([0.0, 300.0]), Conditions(tether=(0.5, 0.5, 0.5)))
     thrust = VIDEORAY["alpha_u"] * (VIDEORAY["a_t_rear"] * 0.3 + VIDEORAY["b_t_rear"]) * 0.3
     assert motion["x"][-1] == pytest.approx(thrust / 0.5, rel=1e-6)
     assert motion["u"][-1] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_tether_holds_the_heavy_in_a_current() -> None:
-    """It pulls north, against the drift, although the vehicle turns."""
-    turning = Commands(np.zeros(1), {"1": np.array([0.2]), "4": np.array([0.2])})
-    motion = rigid_pool.motion(
-        HEAVY, turning, np.array([0.0, 4.0]), Conditions(current=(-0.2, 0.0), tether=(80.0, 80.0, 80.0))
-    )
-    assert abs(motion["psi"][-1]) > 0.5
-    assert -0.25 < motion["x"][-1] < 0.0
-    assert abs(motion["y"][-1]) < 0.2 * abs(motion["x"][-1])
 
 
 def test_a_tilted_vehicle_turns_about_its_own_axis_and_moves_along_its_own_axes() -> None:
@@ -138,13 +102,3 @@ def test_a_tilted_vehicle_turns_about_its_own_axis_and_moves_along_its_own_axes(
         moved = [(motion[name][n + 1] - motion[name][n - 1]) / (2.0 * h) for name in "xyz"]
         velocity = attitude[n].apply([motion["u"][n], 0.0, motion["w"][n]])
         assert moved == pytest.approx(velocity.tolist(), rel=1e-5, abs=1e-7)
-
-
-def test_the_net_weight_of_a_tilted_vehicle_stays_vertical() -> None:
-    """While it leans to starboard side, only a part of the weight acts along its heave axis."""
-    tilt = Tilt(radians(30.0), roll_period=4e3, pitch_period=1e9)
-    k, still_water = with_more(VIDEORAY, F_0_w=0.5), Commands(np.zeros(1), {})
-    motion = pool.motion(k, still_water, np.array([0.0, 1e3]), Conditions(tilt=tilt))
-    weight = 0.5 * np.cos(radians(30.0))
-    w = motion["w"][-1]
-    assert VIDEORAY["a_d_w"] * w * w + VIDEORAY["b_d_w"] * w == pytest.approx(weight, rel=1e-3)

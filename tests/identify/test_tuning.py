@@ -1,7 +1,6 @@
 """The tuning guide: α and β in closed form or fitted to many points, for different vehicles and directions."""
 
 import re
-from dataclasses import replace
 from math import e, inf, nan
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
-from rov_fmu.interface.tune_command import source
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -46,22 +44,6 @@ def test_the_printout_names_the_inputs_that_are_held(k: Vehicle, capsys: pytest.
     of_pulses = capsys.readouterr().out
     assert "A command of 30% of yaw: u_l = 1620, u_r = 1380\n" in of_pulses
     assert of_pulses.partition("A command")[0] == said.partition("A command")[0]
-
-
-def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
-    k: Vehicle, capsys: pytest.CaptureFixture[str]
-) -> None:
-    tuned = tune(k, HEAVE, [Target("V_ss", 0.3, 0.175)])
-    print_tuning(replace(tuned, points=(Target("V_ss", 0.3, 0.175 * (1.0 + 1e-5)),)))
-    said = capsys.readouterr().out
-    assert "+0.0%" in said
-    assert "-0.0%" not in said
-    assert "lag" not in said
-    curves = tuple(replace(curve, keys=(*curve.keys, "T")) for curve in k.layout.curves)
-    late = Vehicle(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
-    print_tuning(tune(late, HEAVE, [Target("V_ss", 0.3, 0.175), Target("Tau", 0.3, 2.209)]))
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if "lag" in line)
-    assert "curve top, T = 0.2 s" in line
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
@@ -110,12 +92,6 @@ def test_intervals_are_those_of_linear_regression(k: Vehicle) -> None:
     tuning = tune(plain, SURGE, wanted)
     assert tuning.vehicle["alpha_u"] == pytest.approx(alpha, rel=1e-9)
     assert tuning.intervals["alpha_u"] == pytest.approx((alpha / factor, alpha * factor), rel=1e-6)
-
-
-def test_as_many_points_as_coefficients_have_no_intervals(k: Vehicle) -> None:
-    V_ss, Tau = Target("V_ss", 0.3, 0.2), Target("Tau", 0.3, 2.0)
-    assert tune(k, HEAVE, [V_ss, Tau]).intervals == {"alpha_w": None, "beta_w": None}
-    assert tune(k, HEAVE, [V_ss]).intervals == {"alpha_w": None}
 
 
 @pytest.mark.parametrize(
@@ -169,19 +145,6 @@ def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: 
     assert len(of_alpha_alone) == (alpha not in (0.5, 1.0, 2.0)), "beta was not tuned"
 
 
-@pytest.mark.parametrize(("count", "more"), [(2, ""), (3, ", ...")])
-def test_the_source_names_the_first_two_points(count: int, more: str) -> None:
-    points = [Target("V_ss", c, V) for c, V in ((0.3, 0.2), (0.4, 0.25), (0.5, 0.31))]
-    assert source(points[:count]) == f"Tuned to V_ss = 0.2 at 30%, V_ss = 0.25 at 40%{more}"
-
-
-@pytest.mark.parametrize("command", [1.0, -1.0])
-def test_full_command_is_allowed_and_more_is_not(command: float, k: Vehicle) -> None:
-    assert tuned_to(k, HEAVE, command, command * 0.5).response(HEAVE, command)[0] == pytest.approx(command * 0.5)
-    with pytest.raises(TuningError, match="a fraction of the full command"):
-        tuned_to(k, HEAVE, 1.01 * command, command * 0.5)
-
-
 def test_thrust_that_falls_with_the_speed_cannot_be_tuned(k: Vehicle) -> None:
     with pytest.raises(TuningError, match="heave: its thrust decreases with the speed of advance"):
         tuned_to(k.extended({"d_top": 1.0}), HEAVE, 0.3, 0.2)
@@ -230,22 +193,6 @@ def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float
     assert heave_after(100.0 * Tau, command, alpha, beta) == pytest.approx(V_ss, rel=1e-9)
     risen = (1.0 - 1.0 / e) * V_ss
     assert heave_after(Tau, command, alpha, beta) == pytest.approx(risen, rel=1e-9)
-
-
-def test_both_directions_are_tuned_together() -> None:
-    commands = (-0.8, -0.3, 0.3, 0.8)
-    known = BUOYANT.replaced({"alpha_w": 1.3, "beta_w": 0.4})
-    wanted = [Target(q, c, known.response(HEAVE, c)[q == "Tau"]) for q in ("V_ss", "Tau") for c in commands]
-    assert wanted[0].value * wanted[3].value < 0.0
-    tuning = tune(BUOYANT, HEAVE, wanted)
-    assert [tuning.vehicle["alpha_w"], tuning.vehicle["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)
-
-
-def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
-    tuned = tuned_to(BUOYANT, SWAY, 0.6, 0.4)
-    thrust = 22.0 * 0.5**2 + 25.0 * 0.5
-    assert tuned["alpha_v"] == pytest.approx((60.0 * 0.4**2 + 2.0 * 0.4) / thrust, rel=1e-12)
-    assert tuned["beta_v"] == 0.8
 
 
 @pytest.mark.parametrize(

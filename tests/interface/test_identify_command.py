@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.interface.identify_command import identify_folder
-from rov_fmu.io.messages import Progress, part
+from rov_fmu.io.messages import Progress
 from tests.folders import small_folder
 
 
@@ -30,12 +30,3 @@ def test_the_progress_names_what_is_done_and_never_goes_back(with_report: bool, 
     assert steps[:3] == ["reading the logs", "start 1 of 2", "start 2 of 2"]
     assert steps[-2:] == ["predicting what was left out", "what to measure next of heave"]
     assert all(step.startswith("drawing: ") for step, _ in begun.get("drawing the report", ()))
-
-
-def test_the_progress_of_a_part_is_a_share_of_the_whole() -> None:
-    calls: list[tuple[str, float]] = []
-    inner = part(part(lambda *call: calls.append(call), 0.5, 1.0), 0.2, 0.4)
-    for share in (0.0, 0.5, 1.0):
-        inner("fit", share)
-    assert [step for step, _ in calls] == ["fit"] * 3
-    assert [share for _, share in calls] == pytest.approx([0.6, 0.65, 0.7])

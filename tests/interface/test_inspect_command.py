@@ -83,13 +83,6 @@ def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, capsys
         assert measured(log, "voltage") == pytest.approx(motion.VOLTAGE, abs=1e-6)
 
 
-def test_the_folder_of_a_bag_is_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = bag(2, ".mcap")(tmp_path).parent
-    assert main(["identify", "--inspect", str(folder)]) == 0
-    assert (tmp_path / "rov.toml").exists()
-    assert "heave velocity" in capsys.readouterr().out
-
-
 def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -106,21 +99,6 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
     assert "attitude" not in draft, "there is no roll or pitch"
     assert "- Lux: 0 to 9.9" in rows
     assert '# "Lux" = "?"   # 0 to 9.9' in draft.splitlines(), "nothing suggests what it stands for"
-
-
-def test_on_a_terminal_no_line_is_wider_than_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Notes end between words, too: the one about the sources of the depth has more than 200 characters."""
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("COLUMNS", "80")
-    path = bag(2, ".mcap")(tmp_path)
-    monkeypatch.chdir(path.parent)
-    assert main(["identify", "--inspect", path.name]) == 0
-    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
-    notes = lines[lines.index("Notes:") :]
-    assert any(line.startswith("  ") for line in notes)
-    assert max(map(len, lines)) <= 80
 
 
 def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -230,16 +208,6 @@ def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp
         assert all(f'"{title}" = "u_{re.sub("[^0-9]", "", title)} [us]"' in text for title in titles)
 
 
-def test_tables_beside_the_logs_are_no_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    one_file(tmp_path)
-    for name in ("thrust_rear.csv", "steady_surge.csv", "Time_constant_yaw.csv"):
-        (tmp_path / name).write_text("command [%],force [N]\n50,1\n", encoding="utf-8")
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    assert "thrust_rear" not in out
-    assert "steady_surge" not in out
-
-
 OWN: dict[str, str | bytes] = {
     "thrust_main_1.csv": "Command (%),Pull (N)\n50,9\n",
     "thrust_main_2.csv": "Command (%),Pull (N)\n50,8\n",
@@ -327,46 +295,11 @@ def test_tables_alone_are_listed_as_they_will_be_read(
     assert columns == ({"PWM (µs)": "command [µs]", "Force (Kg f)": "force [Kgf]"} if text is MAKER else {})
 
 
-def test_a_table_with_a_mistake_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "thrust_t200.csv").write_text("command [us],force [N]\n1100,-4\n2100,5\n", encoding="utf-8")
-    assert main(["identify", "--inspect", str(tmp_path)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "line 3, column 'command [us]' = 2100: is beyond full thrust" in line
-
-
-def test_a_log_in_a_folder_may_have_the_name_of_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    one_file(tmp_path).rename(tmp_path / "thrust_dive.csv")
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
-    assert "thruster 1" in capsys.readouterr().out
-    assert "[curves" not in (tmp_path / "rov.toml").read_text(encoding="utf-8")
-
-
 @pytest.mark.parametrize(("tables", "curve"), [({"thrust_main.csv": OWN["thrust_main_1.csv"]}, "main"), ({}, "all")])
 def test_thrusters_of_one_kind_have_its_curve(tables: Mapping[str, str | bytes], curve: str, tmp_path: Path) -> None:
     lines = pool_run(tmp_path, tables)
     assert f"[curves.{curve}]   # thrust_{curve}.csv has the forces of one thruster" in lines
     assert lines.count(f'curve = "{curve}"') == 2
-
-
-def test_angles_are_in_degrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    heading: Array = 10.0 + 33.0 * TIME / TIME[-1]
-    log = tmp_path / "log_dive.csv"
-    table(
-        log,
-        "time [s],u_1 [%],heading [deg],roll [deg],r [rad/s]",
-        TIME,
-        np.where(TIME > 1.0, 30.0, 0.0),
-        heading,
-        -DEPTH,
-        DEPTH,
-    )
-    assert main(["identify", "--inspect", str(log)]) == 0
-    rows = {line.split("  ")[0]: line.split() for line in capsys.readouterr().out.splitlines() if line}
-    assert (rows["heading"][1], *rows["heading"][-2:]) == ("deg", "10", "43")
-    assert rows["roll angle"][2] == "deg"
-    assert float(rows["roll angle"][-1]) == pytest.approx(-DEPTH.min(), rel=1e-3)
-    assert rows["yaw velocity"][2] == "deg/s"
-    assert float(rows["yaw velocity"][-1]) == pytest.approx(np.degrees(DEPTH.max()), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.bag", "a.db3", "a.mcap", "a.ulg", "a.tlog", "a.bin", "missing.csv"])

@@ -24,7 +24,7 @@ from rov_fmu.io.messages import FileError, InputError
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
-from tests.commands import BARE, REFIT, ROOT
+from tests.commands import ROOT
 from tests.vehicles import SIX, a_vehicle, pulsed
 
 TIMES = [0.0, 1.0, 2.0]
@@ -68,21 +68,6 @@ def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleM
     assert page.count("<td>set by hand</td>") == 2
     assert videoray["a_d_u"] != 10.0
     assert "set by hand" not in videoray.summary
-
-
-def test_a_coefficient_that_is_set_by_hand_is_no_estimate() -> None:
-    refit = rov_fmu.load(REFIT)
-    name, other = next((n, o) for n, e in refit.estimates.items() for o in e.correlation)
-    changed = refit.with_(**{other: refit[other] * 1.01})
-    assert other in refit.uncertainty.names
-    assert other not in {*changed.intervals, *changed.estimates, *changed.uncertainty.names}
-    assert other not in changed.estimates[name].correlation
-
-
-def test_the_vehicle_builds_itself(tmp_path: Path) -> None:
-    built = rov_fmu.load(BARE).with_(m_rov=12).build(tmp_path / "x.fmu", platforms="host")
-    assert built.path == tmp_path / "x.fmu"
-    assert built.note.startswith("The FMU is valid. In a run, ")
 
 
 # ---- Simulate --------------------------------------------------------------------------------------------------------
@@ -186,19 +171,6 @@ def test_a_vehicle_that_rolls_starts_at_its_angles_or_at_its_quaternion(six: Veh
     assert many["psi"][1].tolist() == first["psi"].tolist()
 
 
-@pytest.mark.parametrize(
-    ("start", "expected"),
-    [
-        ({"eta": 0.5, "theta_0": 0.1, "phi_0": 0.2}, r"start\['phi_0'\]: the attitude is also given as a quaternion"),
-        ({"eta": 0.0}, "start: the quaternion eta, epsilon_1, epsilon_2, epsilon_3 is 0"),
-        ({"psi": 1.0}, r"start\['psi'\]: the vehicle has no such state, .*; did you mean psi_0"),
-    ],
-)
-def test_an_attitude_that_cannot_be_is_one_line(six: VehicleModel, start: dict[str, float], expected: str) -> None:
-    with pytest.raises(InputError, match=f"^{expected}"):
-        six.simulate([0.0, 1.0], start=start)
-
-
 @pytest.mark.parametrize("make", [dict, pd.DataFrame])
 def test_inputs_have_times_of_their_own(videoray: VehicleModel, make: Callable[[Any], Any]) -> None:
     """They change between the output times, and are 0 before the first of their own; the last of equal times counts."""
@@ -221,14 +193,6 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
     with pytest.warns(UserWarning, match=r"^u_l reaches -1\.5, which acts as -1: commands saturate at ±1$") as caught:
         found = videoray.simulate(TIMES, {"u_l": [-1.5, 0.0, 1.2]})
     assert caught[0].filename == __file__
-    assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
-
-
-def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
-    expected = r"^u_l reaches 0\.3: commands are pulse widths, and saturate at 1100 and 1900 us$"
-    with pytest.warns(UserWarning, match=expected):
-        found = pulses.simulate(TIMES, {"u_l": [0.3, 1500.0, 1950.0]})
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
 
 
@@ -379,15 +343,6 @@ def test_a_command_along_an_axis_is_that_of_its_thrusters(videoray: VehicleModel
     assert by_thrusters["w"][-1] > 0.0  # down
 
 
-def test_a_command_along_an_axis_is_a_pulse_width_where_commands_are(tmp_path: Path) -> None:
-    path = tmp_path / "pulses.toml"
-    path.write_text(BARE.read_text(encoding="utf-8") + "\n[commands]\npulse = [1100, 1500, 1900]\n", encoding="utf-8")
-    vehicle = rov_fmu.load(path)
-    axis = next(iter(vehicle.layout.kinds))
-    recorded = vehicle.simulate([0.0, 1.0], {axis: -0.5}, record=[*vehicle.layout.commands])
-    assert {float(values[0]) for values in recorded.values()} <= {1300.0, 1700.0}
-
-
 def test_a_wrong_command_along_an_axis_is_a_line(videoray: VehicleModel) -> None:
     with pytest.raises(InputError, match=r"^inputs\['u_l'\]: surge drives this input, too$"):
         videoray.simulate(TIMES, {"surge": 0.3, "u_l": 0.1})
@@ -407,8 +362,3 @@ def test_a_duration_gives_a_result_every_hundredth_of_a_second(videoray: Vehicle
     for wrong in (0.0, -1.0, 1e9):
         with pytest.raises(InputError, match=r"^time = .*: a duration must be within 0\.01 \.\.\. 10000 s"):
             videoray.simulate(wrong)
-
-
-def test_a_word_for_a_coefficient_is_understood(videoray: VehicleModel) -> None:
-    with pytest.raises(InputError, match=r"^mass: there is no such coefficient of this vehicle; did you mean m_rov\?$"):
-        videoray.with_(mass=5.0)

@@ -48,27 +48,6 @@ def test_many_unknown_tables(
     assert lines[10:] == [f"rov-fmu: {path}: {number - 10} more mistakes"]
 
 
-def test_unknown_coefficients_are_counted_too(tmp_path: Path, capsys: Capsys) -> None:
-    path, command = _rov(tmp_path)
-    quantity = '{ value = 1.0, unit = "kg", source = "nowhere" }'
-    known = "[known]\n" + "".join(f"m_rov{n} = {quantity}\n" for n in range(2000))
-    path.write_text(path.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
-    assert main(command) == 2
-    lines = capsys.readouterr().err.splitlines()
-    reason = "there is no such coefficient of this vehicle; did you mean m_rov?"
-    assert lines[0] == f"rov-fmu: {path}: known.m_rov0: {reason}"
-    assert lines[10:] == [f"rov-fmu: {path}: 1990 more mistakes"]
-
-
-def test_a_misspelt_key_is_not_reported_as_missing_too(tmp_path: Path, capsys: Capsys) -> None:
-    path, command = _vehicle(tmp_path)
-    text = path.read_text(encoding="utf-8").replace("\nidentifier =", "\nidentifer =", 1)
-    path.write_text(text, encoding="utf-8")
-    assert main(command) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "vehicle.identifer: there is no such key" in line
-
-
 def test_a_toml_file_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsys) -> None:
     path, command = _vehicle(tmp_path)
     with path.open("ab") as file:

@@ -1,6 +1,5 @@
 """Names in files lead to places inside the folder of the file; any other name is refused in one line."""
 
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -8,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.io.paths import MODELS, inside, inside_or_shipped, name_of
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.io.paths import MODELS, inside_or_shipped
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE, BARE, TESTS
 
@@ -137,20 +136,3 @@ def test_tables_are_searched_in_the_folder_and_then_among_the_shipped_ones(folde
 def test_shipped_files_name_nothing_above_their_folder() -> None:
     for path in MODELS.rglob("*.toml"):
         assert "../" not in path.read_text(encoding="utf-8"), path
-
-
-def test_a_shipped_vehicle_can_be_tuned_in_any_folder(folder: Path) -> None:
-    output = folder / "tuned.toml"
-    assert main(["tune", "videoray", "--axis=heave", "--command=0.3", "--v-ss=0.2", "-o", str(output)]) == 0
-    assert 'data = "videoray/tables"' in output.read_text(encoding="utf-8")
-    assert load_vehicle(output).files == load_vehicle(VIDEORAY).files
-
-
-def test_a_name_and_its_place_are_each_others_inverse(folder: Path) -> None:
-    for name in ("tables", "tables/a.csv", "Röv [1].html", "ab:c", "videoray/tables"):
-        assert name_of(inside_or_shipped(folder, name), folder) == name
-    assert inside(folder, "tables/./a.csv") == folder / "tables" / "a.csv"
-    with pytest.raises(ValueError, match="is not inside the folder of this file"):
-        name_of(folder.parent / "secret", folder)
-    with pytest.raises(ValueError, match="is not inside the folder of this file"):
-        name_of(Path(os.devnull), folder)

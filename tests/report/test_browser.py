@@ -14,7 +14,6 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,11 +24,11 @@ from rov_fmu.fmu.variables import Variable, unit_of, variables
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.conftest import Visit
-from tests.report.pages import UNFOLD, row_of
+from tests.report.pages import UNFOLD
 from tests.report.results import example
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    pass
 
 pytestmark = pytest.mark.interop
 
@@ -69,21 +68,6 @@ def test_the_documentation_asks_for_nothing_and_fits(
     light = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
     assert (int(light) > 128) == (scheme == "light")
     assert axe.Axe().run(seen.page).response["violations"] == []
-
-
-def test_the_documentation_shows_the_variables_in_groups(
-    videoray_dir: Path, visit: Callable[..., Visit], declared: tuple[Variable, ...]
-) -> None:
-    page = visit().page
-    page.goto((videoray_dir / "documentation" / "index.html").as_uri())
-    page.locator("summary", has_text="Variables").click()
-    groups = page.evaluate(
-        "Array.from(document.querySelectorAll('#variables tbody'), group => Array.from(group.rows,"
-        " row => Array.from(row.cells, cell => cell.innerText.trim())))"
-    )
-    expected = groupby(declared, lambda v: (v.causality, v.variability, v.initial))
-    assert groups == [[row_of(v) for v in members] for _, members in expected]
-    assert len(groups) == 7  # inputs, states, derivatives, thrust, the tunable mass, fixed and tunable coefficients
 
 
 # ---- The report of an identification ---------------------------------------------------------------------------------
@@ -193,17 +177,6 @@ def test_a_plot_of_the_report_zooms_by_dragging_and_by_keys(report: Path, visit:
     seen.page.keyboard.press("Escape")
     assert plot.locator(".zoomed").count() == 0
     assert not seen.problems()
-
-
-def test_without_scripts_the_report_has_its_plots(report: Path, browser: "Browser") -> None:
-    context = browser.new_context(java_script_enabled=False, viewport={"width": 1440, "height": 900})
-    page = context.new_page()
-    page.goto(report.as_uri())
-    box = page.locator(".broad svg").bounding_box()
-    assert box is not None
-    assert box["height"] > 200
-    assert page.locator(".values").count() == 0
-    context.close()
 
 
 # ---- FMPy's web app --------------------------------------------------------------------------------------------------

@@ -4,7 +4,6 @@ import io
 import re
 from dataclasses import dataclass
 from decimal import Decimal
-from io import StringIO
 from math import inf, nan
 from pathlib import Path
 from time import sleep
@@ -16,7 +15,7 @@ from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
 from rov_fmu.report import templates
 from rov_fmu.report.console import console, paragraph, print_end, print_table, table, text
-from rov_fmu.report.progress import Parts, StudyParts, compiling, parts, per_second
+from rov_fmu.report.progress import Parts, StudyParts, parts, per_second
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -72,30 +71,6 @@ def test_only_these_places_print() -> None:
 # ---- The progress of long work ---------------------------------------------------------------------------------------
 
 
-def test_a_pipe_gets_a_line_for_each_platform(capsys: pytest.CaptureFixture[str]) -> None:
-    with compiling(["linux64", "win64", "darwin64"]) as (begin, done):
-        begin()
-        for name in ("win64", "linux64", "darwin64"):
-            done(name)
-    lines = capsys.readouterr().err.splitlines()
-    assert [re.sub(r"\d\.\d", "0", line) for line in lines] == [
-        f"rov-fmu: compiling {name}: done in 0 s" for name in ("win64", "linux64", "darwin64")
-    ]
-
-
-def test_the_times_of_the_compilers_begin_with_them(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The content of the FMU takes longer than the first of them."""
-    clock = iter((7.0, 7.0, 8.0, 9.0))
-    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: next(clock))
-    with compiling(["linux64", "win64"]) as (begin, done):
-        begin()
-        done("linux64")
-        done("win64")
-    assert re.findall(r"done in (\S+) s", capsys.readouterr().err) == ["1.0", "2.0"]
-
-
 @dataclass
 class Runs:
     """The progress of a study."""
@@ -125,22 +100,6 @@ def test_a_pipe_gets_a_line_again_and_again(
     assert 1 <= len(found) <= 3, "none after the end"
     sleep(0.1)
     assert not capsys.readouterr().err
-
-
-def test_a_terminal_shows_a_bar_a_count_and_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    file = StringIO()
-    monkeypatch.setattr(file, "isatty", lambda: True)
-    monkeypatch.setattr("sys.stderr", file)
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("COLUMNS", "80")
-    with parts() as shown:
-        shown.begin("drawing \x1b[31m")("plot 3", 0.25)
-        assert shown.is_shown
-        shown._display.refresh()  # type: ignore[union-attr]
-    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", file.getvalue())
-    assert "plot 3" in text
-    assert "25%" in text
-    assert max(len(line) for line in re.split(r"[\r\n]", text)) <= 80
 
 
 @pytest.mark.parametrize(("rate", "words"), [(1120.4, "1,120 runs/s"), (10.0, "10 runs/s"), (0.25, "0.25 runs/s")])

@@ -8,7 +8,6 @@ import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -18,27 +17,22 @@ from lxml import html
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import SURGE, YAW, Axis
 from rov_fmu.fmu.archive import Content, native_content, python_content, web_module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page, plot_steady, plot_steps
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import BARE
-from tests.report.conftest import Visit
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.pages import (
-    check_breaks_long_words,
     check_is_whole,
     check_refers_to_itself_alone,
     row_of,
     rows,
     text_of,
 )
-from tests.vehicles import SIX, VEHICLES, a_vehicle, pulsed
+from tests.vehicles import SIX, VEHICLES, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
@@ -87,11 +81,6 @@ def test_the_page_is_whole_loads_nothing_and_is_small(page: str) -> None:
     plots = [svg for svg in root.iter("svg") if not svg.get("id")]  # the script fills those with an id
     assert (len(plots), len(list(root.iter("img")))) == (10, 2)
     assert len(page.encode()) - len(live_section(page).encode()) < 160_000  # 9 kB are the style of the live section
-
-
-def test_long_words_break(page: str, vehicle: Vehicle, tmp_path: Path, visit: Callable[..., Visit]) -> None:
-    check_breaks_long_words(page, tmp_path / "index.html", visit)
-    check_breaks_long_words(fly_page([Flown(vehicle, b"")]), tmp_path / "fly.html", visit)
 
 
 def live_section(page: str) -> str:
@@ -236,20 +225,6 @@ def test_the_plots_are_in_degrees_and_have_knots_beside_metres_per_second(vehicl
     assert np.asarray(steps.lines[0].get_ydata())[-1] == pytest.approx(float(V[commands == 50.0][0]), rel=0.03)
 
 
-def test_what_is_always_0_or_holds_everywhere_is_not_drawn(heavy: Vehicle) -> None:
-    """BlueROV2 Heavy holds for every command, so nothing is shaded; lines near 0 have labels beside each other."""
-    ax = panel_of(plot_steady, heavy, HEAVE)
-    assert not ax.patches
-    assert panel_of(plot_steady, replace(heavy, command_range=(0.2, 0.7)), HEAVE).patches
-    steps = panel_of(plot_steps, heavy, HEAVE, commands=[Decimal(10), Decimal(100)])
-    boxes = [text.get_window_extent() for text in steps.texts]
-    assert len(boxes) == 4
-    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
-    (knots,) = steps.child_axes
-    numbers = [label.get_window_extent() for label in knots.get_yticklabels()]
-    assert not any(box.overlaps(number) for box in boxes for number in numbers)
-
-
 @pytest.mark.parametrize(
     ("value", "text"),
     [
@@ -307,35 +282,6 @@ def heavy_page(heavy: Vehicle) -> str:
     return page_without_plots(replace(heavy, intervals={"a_d_u": (130.5, 151.5)}))
 
 
-def test_the_page_describes_lag_and_coupling(heavy_page: str) -> None:
-    text, table = text_of(heavy_page), rows(heavy_page)
-    for claim in (
-        "eight thrusters",
-        "surge, sway, heave and yaw",
-        "lag of first order",
-        "Coriolis and Munk",
-        "dead band",
-        "16 continuous states",
-        "a_t_t200_reverse",
-        "tau_t200",
-        "With all inputs zero, the constant load",
-    ):
-        assert claim in text, claim
-    for claim in (
-        "rear thruster",
-        "Table 9",
-        "Tables 6",
-        "closed-form solution",
-        "one axis reads",
-        "R sin",
-        "paper calls",
-    ):
-        assert claim not in text, claim
-    assert ["1 thruster 1 (front starboard)", "u_1", "t200", "−0.7071, 0.7071, 0", "0.156, 0.111, 0.085"] in table
-    (row,) = [row for row in table if row[0] == "a_d_u" and len(row) == 6]
-    assert row[2:4] == ["141", "130 … 152"]
-
-
 def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_page: str) -> None:
     """Both directions where they differ, by the equation of the steady state: a_d V^2 + b_d V = F + F_0."""
     table = {row[0]: row for row in rows(heavy_page) if row and row[0].startswith(("Surge (", "Heave "))}
@@ -388,30 +334,6 @@ def test_vehicles_of_the_same_name_are_told_apart(vehicle: Vehicle, changes: dic
     assert f"The ghost is {title.split(' beside ')[1]}, under" in " ".join(root.text_content().split())
 
 
-def test_the_files_of_two_vehicles_have_their_folders_if_their_names_are_the_same(tmp_path: Path) -> None:
-    files = [tmp_path / folder / "bare.toml" for folder in ("old", "new")]
-    for file in files:
-        file.parent.mkdir()
-        file.write_bytes(BARE.read_bytes())
-    target = tmp_path / "page.html"
-    assert main(["fly", str(files[0]), "--against", str(files[1]), "-o", str(target)]) == 0
-    (heading,) = html.fromstring(target.read_text(encoding="utf-8")).iter("h1")
-    assert all(f"({file})" in heading.text for file in files)
-
-
-def test_keys_leave_the_other_axes_at_rest() -> None:
-    """Each key of a vehicle with six axes pushes along its own axis only, where thrust is linear in the commands."""
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
-    (script,) = html.fromstring(fly_page([Flown(a_vehicle(rov), b"")])).xpath("//script[@id='live-vehicles']")
-    (data,) = json.loads(script.text)
-    assert [axis["keys"] for axis in data["axes"]] == ["WS", "EQ", "FR", "LJ", "IK", "DA"]
-    for driven in data["axes"]:
-        assert max(map(abs, driven["shares"].values())) == 1.0
-        for form in rov.layout.axes:
-            pushed = sum(t.effect(form.axis) * driven["shares"].get(f"u_{t.name}", 0.0) for t in rov.layout.thrusters)
-            assert pushed > 0.3 if form.axis.name == driven["name"] else abs(pushed) < 1e-3
-
-
 @pytest.mark.parametrize("kind", ["coupled without lag, three commands, no heave", "surge and sway without yaw"])
 def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
     vehicle = a_vehicle(VEHICLES[kind])
@@ -425,20 +347,6 @@ def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
         assert v.name in text
 
 
-@pytest.mark.parametrize(
-    ("kind", "absent"),
-    [
-        ("heave only", ("north,", "current", "each axis", "axes heave", "x north", "(4)")),
-        ("yaw only", ("depth", "Depth", "buoyancy", "Buoyancy", "current", "each axis", "(4)")),
-    ],
-)
-def test_the_page_of_a_vehicle_of_one_axis_speaks_of_one(kind: str, absent: tuple[str, ...]) -> None:
-    text = text_of(page_without_plots(a_vehicle(VEHICLES[kind])))
-    for name in absent:
-        assert name not in text, name
-    assert f"drive {kind.split(maxsplit=1)[0]} with quadratic and linear drag" in text
-
-
 def test_the_page_mirrors_no_directions_that_differ() -> None:
     by_direction, yaw = (
         text_of(page_without_plots(a_vehicle(VEHICLES[kind])))
@@ -446,37 +354,3 @@ def test_the_page_mirrors_no_directions_that_differ() -> None:
     )
     assert "between the two directions" not in by_direction
     assert "What differs between the two directions of drag." in yaw
-
-
-def test_the_page_names_the_axes_that_a_command_pushes_too() -> None:
-    """A turn of a pair: one thruster ahead, one in reverse, which is weaker; F = a_t m^2 + b_t m, m = 1 - c_0."""
-    rov = VEHICLES["lag without coupling"]
-    table = {row[0]: row for row in rows(page_without_plots(a_vehicle(rov))) if len(row) > 2}
-    m = 1.0 - rov["c_0_t200"]
-    ahead, back = (rov[f"a_t_t200{end}"] * m**2 + rov[f"b_t_t200{end}"] * m for end in ("", "_reverse"))
-    hold = "u_l = c, u_r = −c"
-    assert table["Yaw bow to starboard (rad/s)"][1] == f"{hold}also pushes surge with {number(ahead - back, 3)} N"
-    assert table["Surge forward (m/s)"][1] == "u_l = c, u_r = c"
-
-
-def test_the_page_of_pulse_widths_says_what_they_stand_for() -> None:
-    vehicle = a_vehicle(pulsed(VEHICLES["sway and yaw"], (1100.0, 1480.0, 1900.0)))
-    text = text_of(documentation_page(vehicle))
-    assert "1100 is full thrust in reverse, c = −1; 1480 is neutral, c = 0; 1900 is full thrust, c = 1." in text
-    assert "u is the command as a fraction: −1, 0 and 1 at pulses of 1100, 1480 and 1900 µs" in text
-    assert "all inputs at their start values" in text
-    first = next(iter(vehicle.layout.commands))
-    assert f"{first} 1606.0" in text or f"{first} 1366.0" in text
-
-
-def test_a_sum_has_its_signs_before_its_numbers() -> None:
-    page = page_without_plots(a_vehicle(VEHICLES["with an input mix"]))
-    sums = {"".join(math.text_content().split()) for math in html.fromstring(page).iter("math")}
-    assert {"c1=uahead−uaside−0.5uturn", "c2=uahead+uaside+0.5uturn", "c5=−udown"} <= sums
-
-
-def test_words_of_variables_fit_what_they_are_of(vehicle: Vehicle) -> None:
-    layout, other = vehicle.layout, VEHICLES["neither lag nor coupling"].layout
-    assert layout.inputs["u_l"].description == "Command u_l: left thruster, positive forward; saturates at ±1"
-    assert other.coefficients["m_a_r"].description == "Added moment of inertia m_a of yaw"
-    assert other.coefficients["m_a_u"].description == "Added mass m_a of surge"

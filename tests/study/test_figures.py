@@ -1,6 +1,5 @@
 """Figures of responses for which they are known in closed form, and the reasons for missing ones."""
 
-import warnings
 from math import exp, log, nan, pi, sqrt
 
 import numpy as np
@@ -84,13 +83,6 @@ def test_a_function_is_numpys_and_hides_no_nan(function: str) -> None:
         assert Figures({"f": f"sum({function}(y))"}, y).of({"y": y})[0] == pytest.approx([nan], nan_ok=True)
 
 
-def test_max_and_min_of_several_are_the_greatest_and_the_least() -> None:
-    texts = ("max(m, 2)", "min(m, 2, -1.5)", "max(2.0, y[1])", "max(max(y, 3))", "max(y, 0)")
-    found, reason = Figures(dict(zip("abcde", texts, strict=True)), T).of({"m": 6.5, "y": np.array([1.0, nan])})
-    assert found == pytest.approx([6.5, -1.5, nan, nan, nan], nan_ok=True)
-    assert "e: must be one number, and not array(" in reason
-
-
 def test_a_figure_that_is_nan_or_infinite_is_missing_with_this_reason() -> None:
     for expression in ("Tau(0*y)", "overshoot(0*y)", "settling_time(0*y)", "log(-m)", "V_ss(0*y/0)"):
         found, reason = Figures({"f": expression}, T).of({"y": FIRST, "m": 6.5})
@@ -111,13 +103,6 @@ def test_a_time_that_no_run_has_is_refused_before_the_first_run_by_one_rule(func
     assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(reason.format("41"))
     assert unusable("at(y, 50)", ["y"], ["m"], T) == reason.format("50")
     assert unusable("at(y, m + 50)", ["y"], ["m"], T) == ""
-
-
-def test_a_plan_is_seen_without_warnings_of_numpy() -> None:
-    with warnings.catch_warnings(record=True) as warned:
-        warnings.simplefilter("always")
-        assert unusable("mean(y[t > 30])", ["y"], [], T) == ""
-    assert not warned
 
 
 def test_an_expression_has_at_most_100_levels() -> None:

@@ -3,7 +3,6 @@
 import builtins
 import errno
 import os
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -106,13 +105,6 @@ def test_any_number_of_workers_gives_the_same_rows(
     pd.testing.assert_frame_equal(results.trajectories(), native.trajectories(), check_exact=True)
 
 
-@pytest.mark.long
-def test_a_vehicle_is_built_for_its_study(tmp_path: Path, native: Results, scheduler: str) -> None:
-    results = study(_plan(tmp_path, None), tmp_path / "results", scheduler=scheduler)
-    _close(results, native)
-    assert (tmp_path / "results" / "videoray.fmu").is_file()
-
-
 def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
     tmp_path: Path,
     videoray_fmu: Path,
@@ -165,16 +157,3 @@ def test_a_folder_takes_one_study_at_a_time(
         assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
         assert not list((folder / "runs").iterdir())
     assert capsys.readouterr().err == f"rov-fmu: {folder}: another study is writing there\n"
-
-
-def test_an_fmu_that_cannot_be_loaded_is_a_line(
-    tmp_path: Path, videoray_fmu: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    fmu = tmp_path / "videoray.fmu"
-    with zipfile.ZipFile(videoray_fmu) as whole, zipfile.ZipFile(fmu, "w") as part:
-        part.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
-    plan = _plan(tmp_path, fmu)
-    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 2
-    line = without_progress(capsys.readouterr().err)
-    assert line.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
-    assert line.count("\n") == 1

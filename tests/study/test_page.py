@@ -18,7 +18,7 @@ from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.report.templates import inline_script
 from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
-from rov_fmu.study.results.plots import Plot, draw_indices, in_rows
+from rov_fmu.study.results.plots import draw_indices
 from tests.folders import beside
 from tests.report.conftest import Visit
 from tests.report.pages import check_breaks_long_words, check_is_whole
@@ -79,78 +79,6 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert inline_script("plots.js").policy in page.xpath("string(//meta[@http-equiv]/@content)")
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
     assert study_page(results) == text, "the page is the same for the same results"
-
-
-@pytest.mark.long
-def test_another_title_changes_the_page_and_not_the_results(
-    foreign: Callable[..., Path], tmp_path: Path, scheduler: str
-) -> None:
-    pages, times = [], []
-    for title in ("", 'title = "Before"', 'title = "After"'):
-        (tmp_path / "plan.toml").write_text(f"""{title}
-fmu = "{beside(foreign(), tmp_path)}"
-stop_time = 1.0
-step = 0.5
-runs = 4
-vary.a.uniform = [0.0, 1.0]
-figures.end = "y[-1]"
-""")
-        assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "r"), "--scheduler", scheduler]) == 0
-        pages.append(html.parse(tmp_path / "r" / "study.html"))
-        times.append([path.stat().st_mtime_ns for path in (tmp_path / "r" / "runs").iterdir()])
-    assert [page.findtext(".//h1") for page in pages] == ["foreign", "Before", "After"]
-    assert times == [times[0]] * 3, "the runs are kept"
-
-
-@pytest.mark.parametrize("plots", [1, 2, 3, 4, 5, 7])
-def test_rows_of_plots_are_full(plots: int) -> None:
-    def draw(figure: Figure) -> None:
-        figure.subplots()
-
-    rows = [plot["row"] for plot in in_rows([Plot(f"{n}", draw, "", "") for n in range(plots)])]
-    assert all(rows.count(row) % row == 0 for row in {*rows})
-    assert rows == sorted(rows, reverse=True)
-    assert min(rows) == 1 if plots == 1 else min(rows) >= 2
-
-
-_PLACES = """[...document.querySelectorAll(".plots.rows")].map((grid) => [grid, ...grid.children].map((e) => {
-  const { left, right, bottom } = e.getBoundingClientRect(); return [left, right, bottom]; }))"""
-_TEXT_SIZES = """[...document.querySelectorAll("svg text:not(:has(tspan))")].filter((e) => e.getClientRects().length)
-  .map((e) => Math.hypot(e.getScreenCTM().c, e.getScreenCTM().d) * parseFloat(getComputedStyle(e).fontSize))"""
-
-
-@pytest.mark.parametrize("width", [390, 1440])
-def test_the_plots_fill_the_page_with_text_of_one_size(done: Path, visit: Callable[..., Visit], width: int) -> None:
-    shown = visit(width=width)
-    shown.page.goto((done / "study.html").as_uri())
-    assert shown.page.evaluate("document.documentElement.scrollWidth") == width
-    for (left, right, _), *plots in shown.page.evaluate(_PLACES):
-        bottoms = sorted({round(bottom) for _, _, bottom in plots})
-        assert len(bottoms) == (len(plots) if width == 390 else 1), "so many rows"
-        for row in bottoms:
-            ends = [(start, end) for start, end, bottom in plots if round(bottom) == row]
-            assert (ends[0][0], ends[-1][1]) == pytest.approx((left, right), abs=1.0)
-    sizes = shown.page.evaluate(_TEXT_SIZES)
-    assert len(sizes) > 30
-    assert 11.0 < min(sizes) < max(sizes) < 1.03 * min(sizes), "pixels"
-    assert not shown.problems()
-
-
-def test_the_plots_show_the_values_under_the_pointer(done: Path, visit: Callable[..., Visit]) -> None:
-    shown = visit(width=1440)
-    shown.page.goto((done / "study.html").as_uri())
-    read = {}
-    for label in ("Distribution of end", "Trajectories of y"):
-        plot = shown.page.locator(f'.broad svg[aria-label="{label}"]')
-        plot.scroll_into_view_if_needed()
-        plot.hover()
-        read[label] = shown.page.locator(".values span").all_inner_texts()
-    assert re.search(r"runs \(%\): share \d+", read["Distribution of end"][1])
-    median = re.search(r": 5 % (−?[\d.]+); 95 % (−?[\d.]+); median (−?[\d.]+)$", read["Trajectories of y"][1])
-    assert median
-    low, high, middle = (float(text.replace("−", "-")) for text in median.groups())
-    assert low < middle < high
-    assert not shown.problems()
 
 
 def test_long_words_break(done: Path, tmp_path: Path, visit: Callable[..., Visit]) -> None:
@@ -325,25 +253,3 @@ def test_another_page_of_this_name_is_not_overwritten(
     assert capsys.readouterr().err == f"rov-fmu: {own}: {reason}\n"
     assert [*tmp_path.iterdir()] == [own]
     assert own.read_text() == "<p>My studies</p>"
-
-
-def test_reasons_that_are_not_shown_are_counted(
-    foreign: Callable[..., Path], tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A reason for each of seven values, of which the command shows five and the page all."""
-    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
-stop_time = 1.0
-step = 0.5
-sampler = "grid"
-vary.a.range = {{ from = 3.0, to = 9.0, count = 7 }}
-vary.u.values = [0.0, 1.0]
-figures.odd = "t[a]"
-figures.end = "t[-1]"
-""")
-    results = tmp_path / "results"
-    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 1
-    lines = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
-    assert len(lines) == 6
-    assert lines[-1] == "4 runs: other reasons (2), which are on the page"
-    page = (results / "study.html").read_text(encoding="utf-8")
-    assert all(f"index {n} is out of bounds" in page for n in range(3, 10))

@@ -177,12 +177,6 @@ def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
     assert not (tmp_path / "results").exists()
 
 
-def test_what_is_no_fmu_for_co_simulation_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "videoray.fmu").write_bytes(b"no archive")
-    with pytest.raises(FileError, match=r"videoray\.fmu: is not an FMU, or is damaged: "):
-        read_model(tmp_path / "videoray.fmu")
-
-
 @pytest.mark.parametrize(
     ("rows", "message"),
     {

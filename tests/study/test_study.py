@@ -24,8 +24,6 @@ from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
-from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.run_study import run_study
 from rov_fmu.study.run.separate_simulator import SeparateSimulator
 from rov_fmu.study.run.simulator import LoadError, RunError, Simulator
 from tests.commands import start, without_progress
@@ -177,13 +175,6 @@ def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(reset: int, for
 
 @posix
 @pytest.mark.long
-def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_path: Path) -> None:
-    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0") as cluster:
-        _harmful(_harmful_plan(tmp_path, foreign()), tmp_path / "results", scheduler=cluster.scheduler_address)
-
-
-@posix
-@pytest.mark.long
 def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continues(
     foreign: Foreign, tmp_path: Path
 ) -> None:
@@ -249,15 +240,6 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     _same(Results(results), whole)
 
 
-def test_the_fmu_of_a_changed_vehicle_is_refused_with_this_reason(tmp_path: Path) -> None:
-    store = Store(tmp_path / "results")
-    with store.held():
-        store.belongs_to({}, "one", "rov.toml", 1)
-        store.write(0, 1, b"", None)
-        with pytest.raises(FileError, match=r"another FMU, for the vehicle rov\.toml has changed, or rov-fmu, which"):
-            store.belongs_to({}, "another", "rov.toml", 1)
-
-
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
     with pytest.raises(FileError, match="nowhere: there is no such folder"):
         Results(tmp_path / "nowhere")
@@ -270,15 +252,6 @@ def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path,
         results.bands("y")
     with pytest.raises(FileError, match="there is no figure 'y', only end, sooner"):
         results.sensitivity("y")
-
-
-def test_the_time_of_a_study_begins_when_the_workers_are_there(
-    foreign: Foreign, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    clock = iter([0.0, 100.0, 107.0])  # at the beginning, with the workers, at the end
-    monkeypatch.setattr("rov_fmu.study.run.cluster.perf_counter", lambda: next(clock))
-    spent, _ = run_study(_plan(tmp_path, foreign(), runs=4), tmp_path / "results", None, scheduler, lambda _: None)
-    assert (spent.started, spent.elapsed) == (100.0, 7.0)
 
 
 # ---- Interrupted and killed ------------------------------------------------------------------------------------------

@@ -8,12 +8,10 @@ import pytest
 from scipy.io import savemat
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.inspection.inspection import Inspection, inspect
+from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
-from tests.commands import ROOT
 from tests.folders import rows_of
 from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log, used
 from tests.tank.readers import motion, test_bags, test_mavlink, test_ulog
@@ -78,16 +76,6 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
     assert commanded(one, "6") == pytest.approx(motion.THRUSTERS["6"])
 
 
-def test_a_file_that_was_cut_short_differs_from_one_of_an_unknown_kind(tmp_path: Path) -> None:
-    path = test_bags.Ros(2).write(tmp_path, test_bags.dive(test_bags.Ros(2)), ".mcap")
-    path.write_bytes(path.read_bytes()[:-300])
-    with pytest.raises(DataFileError, match="begins as an MCAP file, but is damaged or was cut short, and cannot be"):
-        read_log(path, BLUEROV2)
-    path.write_bytes(b"\x7fELF\x02\x01\x01\0" * 100)
-    with pytest.raises(DataFileError, match="its first bytes are those of none of the formats that are read: a CSV"):
-        read_log(path, BLUEROV2)
-
-
 @pytest.mark.parametrize("name", ["thrust_main.csv", "thrust_t200_dive.csv", "steady_surge.csv"])
 def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> None:
     if "surge" in name:  # a log of the axis in its name
@@ -97,15 +85,6 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
     tests = load_tests(folder(tmp_path))
     assert [one.file for one in tests.folder.logs] == [name]
     assert not rows_of(tests, "thrust")
-
-
-def test_columns_without_any_known_header_are_listed(tmp_path: Path) -> None:
-    table(tmp_path / "pose.csv", "stamp,pos_x,pos_z,quality", TIME, motion.NORTH, -motion.DEPTH, 0.0 * TIME)
-    (one,) = inspect(tmp_path / "pose.csv", [BLUEROV2])
-    assert isinstance(one, Inspection)
-    assert not one.commands
-    assert one.unread["pos_z"] == "-1.99 to -1"
-    assert one.unread["quality"] == "always 0"
 
 
 def test_messages_of_rostopic_are_columns(tmp_path: Path) -> None:
@@ -145,34 +124,6 @@ def test_a_table_of_thrust_in_pulses_as_a_maker_publishes_it(titles: str, tmp_pa
     assert thrust[-1].value == pytest.approx(5.0 * 9.80665)
 
 
-def test_the_sign_of_a_table_is_changed_too(tmp_path: Path) -> None:
-    (tmp_path / "thrust_t200.csv").write_text("command [%],load [N]\n50,-9\n-50,8\n", encoding="utf-8")
-    tests = load_tests(folder(tmp_path, '[columns]\n"load [N]" = "-force [N]"\n'))
-    assert [row.value for row in rows_of(tests, "thrust")["t200"]] == [9.0, -8.0]
-    (tmp_path / "thrust_t200.csv").write_text("command [%],load [N]\n50,-1e7\n", encoding="utf-8")
-    with pytest.raises(DataFileError, match=r"'-1e7': must be at least -1e\+06"):
-        load_tests(tmp_path)
-
-
-def test_a_vehicle_with_fins_is_read(tmp_path: Path) -> None:
-    shutil.copy(ROOT / "examples" / "remus100" / "remus100.toml", tmp_path)
-    rows = "".join(f"{n / 10},{n % 9},{n % 7},{0.02 * n},{n % 5}\n" for n in range(60))
-    header = "time [s],u_prop [%],u_rudder [%],surge velocity [m/s],heading [deg]\n"
-    (tmp_path / "log_dive.csv").write_text(header + rows, encoding="utf-8")
-    (tmp_path / "rov.toml").write_text(FOLDER.replace("bluerov2", "remus100.toml"), encoding="utf-8")
-    tests = load_tests(tmp_path)
-    (one,) = tests.folder.logs
-    assert axes(one) == ["surge", "yaw"]
-    assert one.commands
-    assert "prop" in one.commands.thrusters
-    told = sentences(tests.findings, SENTENCES)
-    assert any("the lift of fins is not fitted" in line for line in told)
-    assert (
-        "log_dive.csv: nothing is learnt about yaw: no thruster drives it, and the effect of fins is not fitted" in told
-    )
-    assert tests.tested.logs == ["surge"]
-
-
 # ---- Jumps -----------------------------------------------------------------------------------------------------------
 
 
@@ -180,22 +131,6 @@ def jumps(quantity: str, values: Array) -> list[str]:
     down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
     found = checked(log(down, channel(quantity, TIME, values))).findings
     return [line for line in sentences(found, SENTENCES) if "jump" in line]
-
-
-NOISE = 0.004 * np.random.default_rng(1).standard_normal(len(TIME))
-
-
-def test_jumps_of_a_position_are_told() -> None:
-    depth = motion.DEPTH + NOISE
-    assert not jumps("depth", depth)
-    assert jumps("depth", depth + 1.2 * (TIME > 5.05)) == [
-        "a.csv: 1 jump of the depth, as by a reset: +1.21 m at 5.1 s"
-    ]
-    heading = 0.2 * np.sin(TIME) + NOISE
-    (line,) = jumps("heading", heading - 0.6 * (TIME > 3.05))
-    assert "1 jump of the heading, as by a reset: -3" in line
-    (line,) = jumps("distance", 0.3 * TIME + NOISE + 2.0 * (TIME > 3.05) - 2.5 * (TIME > 7.05))
-    assert "2 jumps of the distance, as by a reset: +2.0" in line
 
 
 @pytest.mark.parametrize(

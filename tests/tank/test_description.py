@@ -27,13 +27,11 @@ from tests.folders import (
     RATE,
     SPEED,
     TOP,
-    TURNS,
     VECTORED,
     folder_of,
     pulled,
     read,
     responses,
-    rows_of,
 )
 from tests.recordings import clean, write_log
 from tests.vehicles import sources_of
@@ -159,18 +157,6 @@ def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     read_again(found, tmp_path / "mine.toml")
 
 
-def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
-    """Without yaw, the vehicle has no input for turning."""
-    mix = (
-        "[inputs]\nahead = { 3 = 1.0, 4 = 1.0, 1 = -1.0, 2 = -1.0 }\nturn = { 3 = -1.0, 4 = 1.0, 1 = 1.0, 2 = -1.0 }\n"
-    )
-    rows = {"thrust_t200.csv": pulled(30.0, 20.0), "steady_surge.csv": f"{SPEED}\n0.2,0.2\n0.4,0.35\n0.8,0.6\n"}
-    tests = read(tmp_path, VECTORED + mix, rows)
-    assert [*tests.given.vehicle.layout.mix] == ["ahead"]
-    assert len(tests.given.vehicle.layout.thrusters) == 4
-    assert tests.findings == (Finding("axis left out", axis="sway", names={"drag": "a_d_v, b_d_v"}),)
-
-
 def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) -> None:
     """The directions of two thrusters are opposite, so with equal commands they do not push along the axis."""
     rov = VECTORED + "".join(
@@ -192,18 +178,6 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
         "heave: the logs have its motion, but in all of them its thrusters cancel each other" in line
         for line in by_heading(tests.findings)["Warnings"]
     )
-
-
-def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
-    rov = VECTORED.replace("[body]", "[body]\ncoupling = true")
-    tables = {f"steady_{name}.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n" for name in ("surge", "sway")}
-    tables["thrust_t200.csv"] = pulled(30.0, 20.0)
-    tests = read(tmp_path, rov, tables)
-    assert not tests.given.vehicle.layout.coupled
-    assert tests.findings == (Finding("not coupled"),)
-    tests = read(tmp_path, rov, tables | {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n"})
-    assert tests.given.vehicle.layout.coupled
-    assert tests.findings == ()
 
 
 # ---- The paper's form ------------------------------------------------------------------------------------------------
@@ -229,17 +203,6 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     read_again(found, tmp_path / "mine.toml")
 
 
-def test_what_no_axis_needs_is_not_used(tmp_path: Path) -> None:
-    tests = read(
-        tmp_path,
-        f"{HEAD}[known]\n{MASS}{TOP}{TURNS}",
-        {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n", "thrust_rear.csv": pulled(40.0, 2.0)},
-    )
-    assert tests.given.known.keys() == {"m_rov", "a_t_top", "b_t_top"}
-    assert rows_of(tests, "thrust") == {}
-    assert Finding("unused curve", curve="rear", file="thrust_rear.csv") in tests.findings
-
-
 def test_any_coefficient_may_be_known(tmp_path: Path) -> None:
     more = (
         'm_a_w = { value = 3.0, unit = "kg", source = "a sphere" }\nT_top = { value = 0.1, unit = "s", source = "s" }\n'
@@ -256,26 +219,6 @@ def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> N
     with (tests / ROV_FILE).open("a", encoding="utf-8") as file:
         file.write(f"\n[fit]\nlag = {lag}\n")
     assert load_tests(tests).given.requests.lag == curves
-
-
-def test_the_lag_of_a_base_is_found_anew_where_asked(tmp_path: Path) -> None:
-    given = read(tmp_path, f"{BLUEROV2}[fit]\nlag = true\n", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
-    assert given.requests.lag == ("t200",)
-    assert "T_t200" not in given.vehicle.layout.coefficients
-
-
-def test_what_is_known_stands_instead_of_base_and_tests(tmp_path: Path) -> None:
-    known = """[known]
-m_rov = { value = 12.0, unit = "kg", source = "weighed" }
-a_d_v = { value = 25.0, unit = "N.s2/m2", source = "a tow" }
-"""
-    base = load_vehicle(SHIPPED["bluerov2"])
-    given = read(tmp_path, BLUEROV2 + known, {"steady_sway.csv": f"{SPEED}\n0.3,0.2\n"}).given
-    assert (given.vehicle["m_rov"], given.known["m_rov"].source) == (12.0, "weighed")
-    assert (given.vehicle["a_d_v"], given.known["a_d_v"].source) == (25.0, "a tow")
-    assert "b_d_v" not in given.known
-    assert given.known["I_r"].source == base.sources["I_r"]
-    assert given.description.limits == base.limits
 
 
 def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:

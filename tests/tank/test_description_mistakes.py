@@ -228,20 +228,6 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
     ]
 
 
-def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
-    rov = f'base = "nowhere"\n{HEAD}'
-    folder = folder_of(tmp_path / "tests", rov, {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_twist.csv": ""})
-    with pytest.raises(FileError) as caught:
-        load_tests(folder)
-    told = str(caught.value).splitlines()
-    assert [line[len(str(folder)) :].split(":")[0] for line in told] == [
-        "/rov.toml",
-        "/steady_twist.csv",
-        "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
-    ]
-    assert "twist is not an axis of any vehicle, only surge, sway, heave, roll, pitch and yaw" in told[1]
-
-
 HEADERS = """[columns]
 "Time (s)" = "time [s]"
 "Pull (N)" = "force [N]"
@@ -275,16 +261,6 @@ def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, li
         load_tests(folder)
     (told,) = str(caught.value).splitlines()
     assert told.startswith(f"{folder}/rov.toml: {line}")
-
-
-def test_mistakes_of_the_vehicle_and_of_the_columns_are_told_together(tmp_path: Path) -> None:
-    rov = DOWN.replace('"kg"', '"lb"').replace("[known]", "[body]") + HEADERS.replace("depth [m]", "depth [ft]")
-    folder = folder_of(tmp_path / "tests", rov, FILES)
-    with pytest.raises(FileError) as caught:
-        load_tests(folder)
-    unit, column = str(caught.value).splitlines()
-    assert "body.m_rov.unit = 'lb'" in unit
-    assert "columns.Depth (m) = 'depth [ft]': must be 'depth [m]' or" in column
 
 
 def check_lines(text: str, folder: Path) -> None:

@@ -1,48 +1,12 @@
 """The exact limits of the checks of files."""
 
-import re
-import shutil
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import sentences
 from rov_fmu.io.csv_table import DataFileError
 from tests.commands import TESTS
-from tests.folders import rows_of
-from tests.tank.logs import used
-
-
-@pytest.mark.parametrize("samples", [19, 20])
-def test_twenty_samples_are_enough(samples: int, tmp_path: Path) -> None:
-    """Blank cells do not count."""
-    shutil.copytree(TESTS, tmp_path / "tests")
-    rows = [f"{0.1 * n:g},30,{0.01 * n:g}" for n in range(samples)] + ["5,30,"]
-    log = tmp_path / "tests" / "log_heave.csv"
-    log.write_text("\n".join(("time [s],command [%],depth [m]", *rows)), encoding="utf-8")
-    tests = load_tests(log.parent)
-    (one,) = tests.folder.logs
-    assert used(one, "depth").count == samples
-    told = sentences(finding for finding in tests.findings if finding.file == "log_heave.csv")
-    few = "log_heave.csv: the depth has 19 samples and needs at least 20, so it is left out"
-    assert told == (() if samples == 20 else (few,))
-    assert tests.tested.logs == (["heave"] if samples == 20 else [])
-
-
-@pytest.mark.parametrize("force", [0.049, 0.051])
-def test_a_force_against_the_command_is_noise_up_to_a_twentieth_of_the_largest(force: float, tmp_path: Path) -> None:
-    shutil.copytree(TESTS, tmp_path / "tests")
-    rov = tmp_path / "tests" / "rov.toml"
-    rov.write_text(re.sub(r"^[ab]_t_rear .*$", "", rov.read_text(encoding="utf-8"), flags=re.M), encoding="utf-8")
-    path = tmp_path / "tests" / "thrust_rear_more.csv"
-    path.write_text(f"command [%],force [N]\n80,10\n-1,{10.0 * force:g}\n", encoding="utf-8")
-    if force > 0.05:
-        with pytest.raises(DataFileError, match="must have the sign of the command"):
-            load_tests(path.parent)
-    else:
-        assert rows_of(load_tests(path.parent), "thrust")["rear"][-1].value == 10.0 * force
-
 
 _THRUST, _HEAVE = ("thrust_rear", "command [%],force [N]"), ("steady_heave", "command [%],velocity [m/s]")
 _YAW, _TAU = ("steady_yaw", "command [%],velocity [rad/s]"), ("time_constant_yaw", "command [%],time constant [s]")

@@ -31,36 +31,9 @@ def test_findings_about_files_share_the_files_and_the_range_of_numbers() -> None
     )
 
 
-def test_every_axis_of_a_sentence_belongs_to_every_file() -> None:
-    found = [outliers(axis, file, 0.1) for axis, file in (("heave", A), ("yaw", A), ("heave", B), ("yaw", B))]
-    both = f"heave and yaw: 10% of the samples of {A} and {B} are outliers"
-    assert sentences(found) == (both,)
-    assert sentences([*found, outliers("surge", C, 0.1)]) == (
-        both,
-        f"surge: 10% of the samples of {C} are outliers",
-    )
-
-
 def test_findings_that_differ_only_in_the_axis_are_one() -> None:
     found = [Finding("free", axis) for axis in ("surge", "heave", "surge")]
     assert sentences(found) == ("surge and heave: as many coefficients as points",)
-
-
-def test_findings_that_differ_otherwise_are_several() -> None:
-    late = Finding("late", "heave", names={"of": "the depth"}, numbers={"value": 0.1})
-    pairs = [
-        (late, replace(late, numbers={"value": 0.2})),
-        (outliers("heave", A, 0.1), Finding("jumps", "heave", file=A, numbers={"count": 4.0}, names=JUMPS)),
-        (Finding("unused curve", curve="rear", file=A), Finding("unused curve", curve="top", file=A)),
-        (late, replace(late, names={"of": "the motion"})),
-        (late, replace(late, file=A)),
-    ]
-    for pair in pairs:
-        assert len(sentences(pair)) == 2
-    assert sentences([]) == ()
-
-
-JUMPS = {"quantity": "depth", "jumps": "+1 m at 3 s"}
 
 
 def test_counts_have_a_singular_and_a_plural() -> None:

@@ -9,7 +9,6 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
-from rov_fmu.identify.likelihood.records import recorded
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
@@ -69,17 +68,6 @@ def test_a_log_without_fault_has_no_findings(tmp_path: Path) -> None:
     assert not read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).findings
 
 
-def test_two_logs_in_one_file_are_read_apart(tmp_path: Path) -> None:
-    rows = [f"{n % 30},30,{n}" for n in range(60)]
-    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert [one.file for one in log.logs] == ["log.csv", "log.csv (from 29 s)"]
-    assert [measured(one, "depth")[[0, -1]].tolist() for one in log.logs] == [
-        pytest.approx([0.0, 0.29]),
-        pytest.approx([0.3, 0.59]),
-    ]
-    assert log.findings == [Finding("clock restarts", file="log.csv", names={"at": "29"})]
-
-
 def test_rows_in_no_order_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
         DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back and does not return"
@@ -96,13 +84,6 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     assert [len(depth) for depth in depths] == [600, 600]
     assert depths[1][0] == pytest.approx(6.0)
     assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
-
-
-def test_a_few_rows_over_times_that_were_logged_before_are_sorted(tmp_path: Path) -> None:
-    times = [*np.arange(0.0, 30.0, 0.1), *np.arange(20.05, 20.9, 0.1), *np.arange(30.0, 40.0, 0.1)]
-    rows = [f"{time},{30 * (n > 9)},{n}" for n, time in enumerate(times)]
-    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert [(found.kind, found.numbers["count"]) for found in log.findings] == [("rows sorted", 9)]
 
 
 @pytest.mark.parametrize("late", [slice(20, 21), slice(20, 28), slice(20, 60)])
@@ -137,14 +118,6 @@ def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, t
         read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
 
 
-def test_as_a_european_spreadsheet_saves_it(tmp_path: Path) -> None:
-    rows = [f"{n / 10}; {100 * STEP[n]} ;{n / 100};".replace(".", ",") for n in range(N)]
-    log = read(tmp_path, "TIME [s] ;Command[%]; Depth [M];", rows, HEAVE).log
-    assert used(log, "depth").time == pytest.approx(0.1 * np.arange(N))
-    assert commanded(log, COMMAND) == pytest.approx(STEP)
-    assert measured(log, "depth") == pytest.approx(0.01 * np.arange(N))
-
-
 # ---- Several commands ------------------------------------------------------------------------------------------------
 
 
@@ -165,28 +138,6 @@ def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
     assert commanded(log, "r") == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
     assert commanded(log, "t") == pytest.approx([0.5] * 30 + [0.0] * 60)
     assert not found.findings
-
-
-def test_names_of_the_fmu(tmp_path: Path) -> None:
-    rows = [f"{n / 10},{STEP[n]},{-STEP[n]},{STEP[n]},{n / 10},{n / 100},{n}" for n in range(N)]
-    log = read(tmp_path, "time [s],u_l [1],u_r [1],u_t [1],r [deg/s],w [m/s],u [V]", rows).log
-    assert {c.quantity.name for c in log.channels if not c.unused} == {"heave velocity", "yaw velocity"}
-    assert measured(log, "yaw velocity") == pytest.approx(np.radians(0.1 * np.arange(N)))
-
-
-def test_a_position_and_a_velocity_of_an_axis_are_both_used(tmp_path: Path) -> None:
-    rows = [f"{n / 10},{STEP[n]},{n},{n / 100}" for n in range(N)]
-    log = read(tmp_path, "time [s],u_t [1],depth [m],heave velocity [m/s]", rows).log
-    one = recorded(log, PAPER)
-    assert one
-    assert [(sensor.axis, sensor.is_velocity) for sensor in one.record.sensors] == [(HEAVE, False), (HEAVE, True)]
-
-
-def test_a_thruster_without_a_column_is_told(tmp_path: Path) -> None:
-    rows = [f"{n / 10},{STEP[n]},{STEP[n]},{n}" for n in range(N)]
-    found = read(tmp_path, "time [s],u_l [1],u_r [1],surge distance [m]", rows)
-    assert not commanded(found.log, "t").any()
-    assert found.findings == [Finding("missing column", file="log.csv", names={"column": "u_t"})]
 
 
 def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) -> None:
@@ -274,14 +225,6 @@ def test_what_cannot_be_is_one_clear_line(case: str, tmp_path: Path) -> None:
     assert str(error.value).startswith(str(tmp_path / "log.csv"))
     assert told in str(error.value)
     assert len(str(error.value).splitlines()) == 1
-
-
-def test_a_heading_is_unwrapped_over_blanks(tmp_path: Path) -> None:
-    rows = [f"{n / 10},{STEP[n]},{-STEP[n]},{(350 + 5 * n) % 360 if n % 2 else ''}" for n in range(2 * N) if n < N] + [
-        f"{N / 10 + n / 10},0.3,-0.3,{(350 + 5 * (N + n)) % 360}" for n in range(10)
-    ]
-    log = read(tmp_path, "time [s],u_l [1],u_r [1],heading [deg]", rows).log
-    assert measured(log, "heading")[-1] == pytest.approx(radians(350 + 5 * (N + 9)))
 
 
 def test_a_log_of_one_axis_tells_of_the_conditions(tmp_path: Path) -> None:

@@ -145,36 +145,3 @@ def test_a_wrong_dive_is_one_line(folder: Path, dive: str, line: str) -> None:
     found = mistakes(folder)
     assert len(found) == 1
     assert found[0].startswith(line)
-
-
-def test_unknown_columns_are_named(folder: Path) -> None:
-    table(folder / "depth.csv", "t,Pressure depth", 1000.0 + TIME, 100.0 * motion.DEPTH)
-    names = '[columns]\n"Pressure depth" = "depth [cm]"\nt = "time [s]"\n'
-    (folder / "rov.toml").write_text(f"{ROV}{names}[dives.may]\n{FILES}\n", encoding="utf-8")
-    _, log = read(folder)
-    assert measured(log, "depth") == pytest.approx(motion.DEPTH, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("names", "line"),
-    [
-        ('[columns]\nDepthh = "depth [m]"', "rov.toml: columns.Depthh = 'depth [m]': no CSV file has such a column"),
-        ('[columns]\nx = "dpeth [m]"', "rov.toml: columns.x = 'dpeth [m]': there is no such column, but"),
-        ('[topics]\n"/d.data" = "depth [m]"', "rov.toml: topics./d.data = 'depth [m]': no log has such a topic"),
-        ('[columns]\nx = "--depth [m]"', "rov.toml: columns.x = '--depth [m]': there is no such column, but"),
-        ('[topics]\n"/d.data" = "depth"', "rov.toml: topics./d.data = 'depth': must be 'depth [m]' or"),
-    ],
-)
-def test_an_unknown_name_is_one_line(folder: Path, names: str, line: str) -> None:
-    (folder / "rov.toml").write_text(f"{ROV}{names}\n[dives.may]\n{FILES}\n", encoding="utf-8")
-    found = mistakes(folder)
-    assert len(found) == 1
-    assert found[0].startswith(line)
-
-
-def test_a_header_that_stands_for_another_column_is_not_suggested(folder: Path) -> None:
-    titles = ",".join(["time [s]", *(f"thr_{name}_pwm" for name in motion.THRUSTERS if name != "2")])
-    table(folder / "commands.csv", titles, TIME, *[1500.0 + 400.0 * c for c in motion.THRUSTERS.values()][1:])
-    names = "".join(f'thr_{name}_pwm = "u_{name} [us]"\n' for name in motion.THRUSTERS)
-    (folder / "rov.toml").write_text(f"{ROV}[columns]\n{names}[dives.may]\n{FILES}\n", encoding="utf-8")
-    assert mistakes(folder) == ["rov.toml: columns.thr_2_pwm = 'u_2 [us]': no CSV file has such a column"]

@@ -48,14 +48,6 @@ def test_noise_beyond_the_end_of_the_range_is_no_second_turn() -> None:
     assert found == pytest.approx(heading, abs=np.radians(2.1))
 
 
-@pytest.mark.parametrize("turns", [0.05, 3.0], ids=["within a turn", "several turns"])
-def test_a_continuous_heading_stays_as_it_is_over_a_gap(turns: float) -> None:
-    """The vehicle turns by more than half a turn in the gap, which looks like a jump."""
-    heading = turns * pi * np.where(STEPS < 8.0, 0.0, 1.0) + np.where(STEPS < 8.0, 0.0, 3.2) + 0.001 * STEPS
-    there = (STEPS < 8.0) | (STEPS > 12.0)
-    assert (unwrapped(channel("heading", STEPS[there], heading[there])) == heading[there]).all()
-
-
 @pytest.mark.parametrize(("scale", "is_told"), [(1.0, False), (1.008, False), (1.02, True), (0.97, True)])
 def test_sensors_of_other_scales_are_told(scale: float, is_told: bool) -> None:
     """A noisy depth, and the velocity of the same motion at other times, with a current of 0.05 m/s between them."""

@@ -18,9 +18,7 @@ from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
-from rov_fmu.vehicle.writer import write_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 from tests.commands import TESTS, without_progress
 from tests.folders import rows_of
 from tests.tank.logs import measured, used
@@ -94,21 +92,6 @@ def test_the_table_columns_of_rov_toml_serves_tables_too(folder: Path) -> None:
         load_tests(folder)
 
 
-def test_unknown_headers_of_a_table_are_named_beside_the_expected_ones(folder: Path) -> None:
-    (folder / "thrust_top_a.csv").write_text("Throttle (%),Pull (kgf)\n50,2\n", encoding="utf-8")
-    (folder / "thrust_top_b.csv").write_text("command [%],Pull (kgf)\n50,2\n", encoding="utf-8")
-    with pytest.raises(DataFileError) as error:
-        load_tests(folder)
-    hint = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
-    one, other, *_ = str(error.value).splitlines()
-    assert one == (
-        f"{folder / 'thrust_top_a.csv'}, line 1 = 'Throttle (%), Pull (kgf)': none of these headers is known; "
-        f"the first line must have the headers command [%], force [N]{hint}"
-    )
-    place = f"{folder / 'thrust_top_b.csv'}, line 1, column 3"
-    assert other == f"{place}: 'force [N]' is missing. The other columns are 'Pull (kgf)'{hint}"
-
-
 def test_columns_in_any_order_and_unit(folder: Path) -> None:
     (folder / "steady_yaw.csv").write_text("velocity [deg/s],command [1]\n90,0.2\n-180,-.4\n", encoding="utf-8")
     (folder / "thrust_rear_a.csv").write_text("command [%],force [N]\n50,12.5\n0,0\n", encoding="utf-8")
@@ -124,14 +107,6 @@ def test_columns_in_any_order_and_unit(folder: Path) -> None:
         Row("thrust_rear_b.csv", 2, -0.2, -3.0),
     ]
     assert rows_of(found, "time_constant")["yaw"][0].value == pytest.approx(3.05)
-
-
-@pytest.mark.parametrize(("header", "newton"), [("force [kgf]", 9.80665), ("thrust [lbf]", 4.4482216152605)])
-def test_a_spring_balance_in_other_units(header: str, newton: float, folder: Path) -> None:
-    (folder / "thrust_rear.csv").write_text(f"command [%],{header}\n50,1.5\n-20,-0.3\n", encoding="utf-8")
-    without_curve(folder, "rear")
-    forces = [row.value for row in rows_of(load_tests(folder), "thrust")["rear"]]
-    assert forces == pytest.approx([1.5 * newton, -0.3 * newton], rel=1e-15)
 
 
 def without_curve(folder: Path, name: str) -> None:
@@ -155,23 +130,6 @@ def test_log_with_heading_of_a_compass_and_blanks(folder: Path) -> None:
     assert measured(found, "heading") == pytest.approx([radians(350 + 2 * n) for n in range(0, 60, 2)])
 
 
-def test_log_with_depth_and_velocity(folder: Path) -> None:
-    rows = [f"{n},0.3,{10 * n},{0.1 + 0.001 * n}" for n in [*range(30), 29]]
-    found, findings = log(folder, "heave", "time [ms],command [1],depth [cm],velocity [m/s]", rows)
-    assert measured(found, "depth")[-1] == pytest.approx(2.9)
-    assert measured(found, "heave velocity")[-1] == pytest.approx(0.129)
-    assert used(found, "depth").time[-1] == pytest.approx(0.029)
-    assert findings == (Finding("time stamps merged", file="log_heave.csv", numbers={"count": 1}),)
-
-
-def test_as_spreadsheets_save_them(folder: Path) -> None:
-    before = rows_of(load_tests(folder), "steady")
-    path = folder / "steady_surge.csv"
-    text = path.read_text(encoding="utf-8").replace(",", " , ").replace("\n", "\r\n")
-    path.write_bytes(("\ufeff" + text + "\r\n ,\r\n").encode())
-    assert rows_of(load_tests(folder), "steady") == before
-
-
 def test_names_in_any_case(folder: Path) -> None:
     before = load_tests(folder)
     (folder / "time_constant_heave.csv").rename(folder / "time_constant_heave.CSV")
@@ -184,26 +142,6 @@ def test_names_in_any_case(folder: Path) -> None:
         assert [row.value for row in now] == [row.value for row in then]
     assert [(one.file, one.axis) for one in found.folder.logs] == [("Log_Heave.csv", HEAVE)]
     assert {"time_constant_heave.CSV", "Steady_YAW.Csv", "Log_Heave.csv"} <= set(found.inputs)
-
-
-def test_names_that_differ_by_case_are_two_files(folder: Path) -> None:
-    before = rows_of(load_tests(folder), "steady")["surge"]
-    (folder / "Steady_Surge.CSV").write_text(STEADY + "20,0.3\n", encoding="utf-8")
-    if (folder / "steady_surge.csv").read_text(encoding="utf-8") == STEADY + "20,0.3\n":
-        pytest.skip("this file system takes both names for one file")
-    found = rows_of(load_tests(folder), "steady")["surge"]
-    assert sorted(found, key=lambda row: row.file) == [Row("Steady_Surge.CSV", 2, 0.2, 0.3), *before]
-
-
-def test_a_vehicle_to_compare_with_is_a_file_in_the_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rov = folder / "rov.toml"
-    text = rov.read_text(encoding="utf-8").replace('against = "videoray"', 'against = "mine.toml"')
-    rov.write_text(text, encoding="utf-8")
-    refused(folder, (f"{rov}: against = 'mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
-    write_vehicle(load_vehicle(VIDEORAY), folder / "mine.toml")
-    against = load_tests(folder).given.description.tables.against
-    assert against
-    assert against.samefile(folder / "mine.toml")
 
 
 def test_a_copy_of_a_file_is_left_out(folder: Path) -> None:
@@ -294,13 +232,6 @@ def test_every_mistake_of_a_rov_file_is_told(folder: Path) -> None:
         assert line.startswith(f"{path}: {words}")
 
 
-def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    refused(tmp_path / "nowhere", ("no such folder",), capsys)
-    refused(tmp_path, ("rov.toml", "there is no such file"), capsys)
-    shutil.copy(TESTS / "rov.toml", tmp_path)
-    refused(tmp_path, ("no tests",), capsys)
-
-
 NO_PUSH, STILL = [f"{n / 10},0,{n / 10}" for n in range(50)], [f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)]
 
 
@@ -326,15 +257,6 @@ def test_a_log_that_teaches_nothing_is_refused_where_there_is_no_other_test(
     assert [line.partition(": ")[0] for line in str(error.value).splitlines()] == [
         str(folder / name) for name in ("log_heave.csv", "log_heave_2.csv")
     ]
-
-
-def test_of_a_log_against_the_command_no_axis_is_good(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for path in folder.glob("[st]*.csv"):
-        path.unlink()
-    rows = [f"{n / 10},{30 * (n > 9)},{-0.02 * max(n - 9, 0):.2f}" for n in range(100)]
-    (folder / "log_heave.csv").write_text(LOG + "\n".join(rows) + "\n", encoding="utf-8")
-    assert main(["identify", str(folder)]) == 0
-    assert "heave: do not use" in capsys.readouterr().out
 
 
 def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -68,12 +68,6 @@ def test_the_curve_is_the_least_squares_fit(ship: Vehicle) -> None:
     assert [ship[name] for name in names] == pytest.approx(fit.x, rel=0.025)
 
 
-def test_one_symmetric_quadratic_leaves_nine_times_as_much() -> None:
-    c, thrust = points()
-    fit = least_squares(lambda k: quadratic(k[0], k[1], 0.0, c) - thrust, [20.0, 20.0])
-    assert rms(fit.fun) == pytest.approx(2.92, abs=0.02)
-
-
 def test_the_lag_loses_the_impulse_of_the_published_transfer_function() -> None:
     t = np.linspace(0.0, 3.0, 30_001)
     _, rise = step(TransferFunction([6136.0, 108700.0], [1.0, 89.0, 9258.0, 108700.0]), T=t)

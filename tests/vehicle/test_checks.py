@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 import tomlkit
 
-from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import (
     ARM,
     AXES,
@@ -590,14 +589,6 @@ def test_numbers_that_are_probably_wrong_give_a_warning(case: str, tmp_path: Pat
     with pytest.warns(UserWarning, match=re.escape(f"{path}: {words}")) as caught:
         load_vehicle(path)
     assert len(caught) == 1
-
-
-def test_the_command_line_prints_a_warning_on_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "rov.toml"
-    path.write_text(changed({"body.W.value": 12.0}, SIX), encoding="utf-8")
-    assert main(["tables", str(path)]) == 2
-    first, *_ = capsys.readouterr().err.splitlines()
-    assert first.startswith(f"rov-fmu: warning: {path}: body.W.value = 12.0: ")
 
 
 def test_a_vehicle_without_weight_is_neutral(tmp_path: Path) -> None:

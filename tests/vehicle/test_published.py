@@ -210,46 +210,6 @@ def test_files_hold_the_printed_cells(tables: Mapping[str, ResponseTable]) -> No
         assert [cell.rounds_to_printed for cell in cells] == [band is ROUNDED for _, band in expected]
 
 
-def test_table_8_is_lost_but_for_the_velocities_of_table_4(tables: Mapping[str, ResponseTable]) -> None:
-    surge = tables["surge"]
-    for row, model in product(surge.rows, MODELS):
-        V_ss, Tau = cells_of(tables, "surge", int(row.command), model)
-        assert (V_ss.printed, Tau.printed, Tau.measured) == (None, None, None)
-        assert V_ss.measured == surge.steady[row.command]
-
-
-@pytest.mark.parametrize("axis", ["heave", "yaw"])
-def test_tables_6_and_7_repeat_the_velocities_of_tables_3_and_5(axis: str, tables: Mapping[str, ResponseTable]) -> None:
-    for row in tables[axis].rows:
-        assert row.scaled.V_ss.measured == tables[axis].steady[row.command]
-
-
-def test_cell_deviations() -> None:
-    cell = Cell(printed=Decimal("0.50"), computed=0.55, measured=Decimal("0.44"))
-    assert cell.from_printed == pytest.approx(0.1)
-    assert cell.from_measured == pytest.approx(0.25)
-    lost = Cell(printed=None, computed=0.55, measured=Decimal("0.0"))
-    assert (lost.from_printed, lost.from_measured) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("printed", "computed", "rounds"),
-    [
-        ("0.50", 0.5049, True),
-        ("0.50", 0.4951, True),
-        ("0.50", 0.5051, False),
-        ("0.50", 0.4949, False),
-        ("0.5", 0.549, True),
-        ("12", 12.49, True),
-        ("12", 12.51, False),
-        ("1.2e2", 124.0, True),
-        ("0.50", inf, False),
-    ],
-)
-def test_rounds_to_printed_digits(printed: str, computed: float, rounds: bool) -> None:
-    assert Cell(Decimal(printed), computed, None).rounds_to_printed is rounds
-
-
 # ---- rov-fmu tables -------------------------------------------------------------------------------------
 
 
@@ -349,33 +309,3 @@ def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.C
 
     vehicle_file, table = tables_with(tmp_path, name, change)
     check_refused(vehicle_file, (str(table), *named), capsys)
-
-
-@pytest.mark.parametrize(
-    ("content", "named"),
-    [
-        (b"", ("the file is empty",)),
-        (b"command [%],forward [m/s]\n", ("line 1", "no rows")),
-        (b"command [%],forward [m/s]\n20,0.31 \xb5\n", ("UTF-8", "byte 34")),
-    ],
-    ids=["empty", "header alone", "not UTF-8"],
-)
-def test_bad_file(content: bytes, named: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    vehicle_file, table = tables_with(tmp_path, SURGE_STEADY, lambda _: content)
-    check_refused(vehicle_file, (str(table), *named), capsys)
-
-
-def test_missing_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    vehicle_file, table = tables_with(tmp_path, SURGE_STEADY, str.encode)
-    table.unlink()
-    check_refused(vehicle_file, (str(table), "there is no such file"), capsys)
-
-
-def test_tables_as_spreadsheets_save_them(tmp_path: Path, vehicle: Vehicle) -> None:
-    """A byte order mark, CRLF, blank lines and blanks around cells are allowed."""
-
-    def change(text: str) -> bytes:
-        return ("\ufeff" + text.replace(",", " , ").replace("\n", "\r\n") + "\r\n ,\r\n").encode()
-
-    vehicle_file, _ = tables_with(tmp_path, SURGE_STEADY, change)
-    assert load_tables(load_vehicle(vehicle_file)) == load_tables(vehicle)

@@ -70,19 +70,6 @@ def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_t
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
-    {
-        "a negative current": ("command [%],current [A]\n-100,-1\n0,0\n100,1\n", "must be at least 0"),
-        "half of the commands": ("command [%],current [A]\n0,0\n50,1\n100,2\n", "must cover the commands from -1 to 1"),
-        "no current": ("command [%],thrust [N]\n-100,-1\n0,0\n100,1\n", "current"),
-    }.values(),
-)
-def test_a_table_of_current_that_is_wrong_is_refused(text: str, wanted: str, tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match=re.escape(wanted)):
-        read_current(table(tmp_path, text))
-
-
-@pytest.mark.parametrize(
     ("given", "wanted"),
     [
         (None, "curves.bow.electric_current: this key is missing, and curves.main has it"),
@@ -137,12 +124,6 @@ def test_a_table_that_is_no_thrust_curve_is_refused(text: str, wanted: str, tmp_
         read_thrust(table(tmp_path, text))
     assert wanted in str(error.value)
     assert str(error.value).startswith(str(tmp_path / "t.csv"))
-
-
-def test_a_table_of_current_is_linear_between_its_points(tmp_path: Path) -> None:
-    found = read_current(table(tmp_path, "pulse [us],current [A]\n1120,8\n1500,0\n1900,10\n1900,12\n"))
-    assert (found.commands, found.currents) == ((-0.95, 0.0, 1.0), (8.0, 0.0, 11.0))
-    assert [found.current(c) for c in (-1.0, -0.475, 0.0, 0.5, 1.0)] == pytest.approx([8.0, 4.0, 0.0, 5.5, 11.0])
 
 
 @pytest.mark.parametrize(
@@ -318,14 +299,6 @@ def test_a_mistake_is_a_clear_line(name: str, folder: Path) -> None:
     lines = refusal(path).splitlines()
     assert any(wanted in line for line in lines), lines
     assert all(line.startswith(f"{path}: ") for line in lines)
-
-
-def test_a_damaged_table_is_named_with_its_line(folder: Path) -> None:
-    (folder / _FILES[0]).write_text("command [1],thrust [N]\n-1,-2\n0,x\n1,2\n", encoding="utf-8")
-    path = folder / "rov.toml"
-    path.write_text(TEXT, encoding="utf-8")
-    (line,) = refusal(path).splitlines()
-    assert f"{_FILES[0]}, line 3, column 'thrust [N]' = 'x': must be a number" in line
 
 
 def test_a_battery_that_nothing_needs_is_refused(folder: Path) -> None:

@@ -1,6 +1,5 @@
 """[estimates] of a vehicle file: writing, reading, checking and drawing vehicles."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,8 +16,7 @@ from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import ALONE, FROZEN_REFIT, REFIT
-from tests.vehicle.test_vehicle import refusal
+from tests.commands import ALONE, FROZEN_REFIT
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
 ROW = "b_d_u = { error = 1.30987, correlation = { a_d_u = -0.883478 } }"
@@ -138,13 +136,6 @@ def test_a_bad_estimate_is_one_clear_line(case: str, tmp_path: Path, capsys: pyt
     assert line.startswith(f"rov-fmu: {path}: {words}")
 
 
-def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
-    path = tmp_path / "bad.toml"
-    text = TEXT.replace("{ a_d_u =", "{ m_rov =").replace("a_d_w = -0.652272", "beta_w = 0.9")
-    path.write_text(text, encoding="utf-8")
-    assert len(refusal(path).splitlines()) == 2
-
-
 def test_a_correlation_of_1_is_allowed(tmp_path: Path) -> None:
     """Drag in reverse is identified as a multiple of drag ahead, so their correlation is 1 before rounding."""
     path = tmp_path / "one.toml"
@@ -177,11 +168,6 @@ def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
     assert (np.diag(found.correlation) == 1.0).all()
     assert found.correlation[place["a_d_u"], place["a_d_w"]] == 0.0
     assert np.linalg.eigvalsh(found.correlation)[0] > 0.01
-
-
-def test_each_interval_of_the_refit_that_ships_is_an_estimate() -> None:
-    shipped = load_vehicle(REFIT)
-    assert {*shipped.uncertainty.names} == {*shipped.intervals} == {*shipped.estimates}
 
 
 def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path) -> None:
@@ -217,12 +203,6 @@ def test_an_interval_cut_on_one_side_gives_the_error_by_the_other(refit: Vehicle
     assert drawn.max(axis=0)[[0, 2]].tolist() == [1e6, 1000.0]
 
 
-def test_without_intervals_nothing_is_drawn(vehicle: Vehicle) -> None:
-    found = vehicle.uncertainty
-    assert found.names == ()
-    assert found.drawn(np.empty((5, 0))).shape == (5, 0)
-
-
 def test_draws_are_normal_with_the_given_correlations() -> None:
     """The rank correlation of normal numbers is 6/π arcsin(ρ/2)."""
     found = of([50.0, 80.0, 60.0], [1.0, 2.0, 3.0], [[1.0, -0.9, 0.3], [-0.9, 1.0, 0.0], [0.3, 0.0, 1.0]])
@@ -231,18 +211,6 @@ def test_draws_are_normal_with_the_given_correlations() -> None:
         assert kstest(drawn[:, n], norm(found.values[n], found.errors[n]).cdf).statistic < 0.01
     ranks = spearmanr(drawn).statistic
     assert ranks == pytest.approx(6.0 / np.pi * np.arcsin(found.correlation / 2.0), abs=0.01)
-
-
-def test_the_intervals_contain_95_percent_of_the_draws(refit: Vehicle) -> None:
-    """2.5 % are on either side of an interval that no bound cuts, also for the positive factor β."""
-    alone = {name: Estimated(error=row.error) for name, row in refit.estimates.items()}
-    found = replace(refit, estimates=alone).uncertainty
-    drawn = found.drawn(qmc.Sobol(len(found.names), seed=0).random(8192))
-    for name in ("a_d_u", "b_d_u", "beta_w", "beta_r"):
-        low, high = refit.intervals[name]
-        values = drawn[:, found.names.index(name)]
-        assert [np.mean(values < low), np.mean(values > high)] == pytest.approx([0.025, 0.025], abs=0.006)
-    assert (drawn >= 0.0).all()
 
 
 @pytest.mark.parametrize("b", [0.0, 0.5, 3.0])
@@ -259,16 +227,6 @@ def test_draws_at_a_bound_agree_with_bounded_fits(b: float) -> None:
     for numbers in ([1.0, 0.0], [0.0, 1.0], [0.36, 0.6]):  # a, b, and the force at x = 0.6
         assert kstest(drawn @ numbers, fits @ numbers).statistic < 0.06
     assert np.mean(drawn[:, 1] == 0.0) == pytest.approx(np.mean(fits[:, 1] < 1e-12), abs=0.05)
-
-
-def test_the_table_is_readable(refit: Vehicle) -> None:
-    """Each row has the correlations of one coefficient with those above it."""
-    rows = re.search(r"^\[estimates\]\n((?:\w+ = .*\n)+)", TEXT, re.M)
-    assert rows
-    names = [line.split(" = ")[0] for line in rows[1].splitlines()]
-    assert names == list(refit.estimates)
-    for n, name in enumerate(names):
-        assert {*refit.estimates[name].correlation} <= {*names[:n]}
 
 
 # ---- Intervals as text -----------------------------------------------------------------------------------------------

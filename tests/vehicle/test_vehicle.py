@@ -232,17 +232,6 @@ def test_every_mistake_in_a_file_is_reported(tmp_path: Path) -> None:
         assert line.startswith(f"{path}: {words}")
 
 
-def test_a_mistake_in_several_thrusters_is_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "bad.toml"
-    thrusters = ALONE.count("[[thruster]]")
-    text = ALONE.replace("\ndirection = ", "\ndrection = ").replace('curve = "top"', "curve = 7", 1)
-    path.write_text(text, encoding="utf-8")
-    direction, curve = refusal(path).splitlines()
-    assert curve.endswith(".curve = 7: must be text in quotes")
-    assert "drection: there is no such key" in direction
-    assert direction.endswith(f"did you mean direction? (and in {thrusters - 1} more entries)")
-
-
 def test_missing_folders_are_reported_together_with_other_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     text = TEXT.replace("command_min = 0.2", "command_min = 0.8")
@@ -287,23 +276,3 @@ def test_bad_file_is_one_clear_line(case: str, tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(change(WITH_SHIPPED_FOLDERS), encoding="utf-8")
     check_line(refusal(path), path, named)
-
-
-def test_commands_refuse_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path, fmu = tmp_path / "bad.toml", tmp_path / "bad.fmu"
-    change, named = BAD_FILES["negative mass"]
-    path.write_text(change(WITH_SHIPPED_FOLDERS), encoding="utf-8")
-    for arguments in (["build", str(path), "-o", str(fmu), "--platform", "host"], ["tables", str(path)]):
-        assert main(arguments) == 2
-        out, err = capsys.readouterr()
-        assert out == ""
-        check_line(err, path, named)
-    assert [*tmp_path.iterdir()] == [path]
-
-
-def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
-    check_line(refusal(tmp_path / "nowhere.toml"), tmp_path / "nowhere.toml", ("there is no such file",))
-    check_line(refusal(tmp_path), tmp_path, ())
-    path = tmp_path / "latin.toml"
-    path.write_bytes(TEXT.split("[body]")[0].replace("VideoRay Pro 4", "Röv", 1).replace("β", "b").encode("latin-1"))
-    check_line(refusal(path), path, ("UTF-8", f"byte {path.read_bytes().index(0xF6)}"))

@@ -2,7 +2,6 @@
 
 import csv
 import re
-import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,11 +19,10 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
 from verification.interoperability.__main__ import main
-from verification.interoperability.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
-from verification.interoperability.install import install
+from verification.interoperability.importers import EXACT, HERE, IMPORTERS, RUNNERS, Importer, pinned
 from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, VEHICLES, Manoeuvre, ResultError
 from verification.interoperability.page import PageError, write_table
-from verification.interoperability.run import Outcome, Verdict, build_fmu, run, without_places
+from verification.interoperability.run import Outcome, Verdict, build_fmu, run
 
 TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
@@ -124,13 +122,6 @@ def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
     return path
 
 
-def test_reference_agrees_with_itself(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
-    expected = manoeuvre.reference
-    between = [row | {"time": row["time"] + 0.05, "u": 99.0} for row in expected]
-    rows = sorted(expected + between, key=lambda row: row["time"])
-    assert manoeuvre.difference(write_result(tmp_path / "result.csv", rows)) == 0.0
-
-
 @pytest.mark.parametrize("point", [0, 150, 300])
 def test_difference_is_noticed(tmp_path: Path, manoeuvre: Manoeuvre, point: int) -> None:
     for name in manoeuvre.outputs:
@@ -210,81 +201,7 @@ def test_verdict(
     assert main(arguments) == (0 if verdict.is_good else 1)
 
 
-def test_thrust_that_lags_has_a_tolerance_of_its_own(tmp_path: Path, tools: Path, manoeuvre: Manoeuvre) -> None:
-    rows = [*manoeuvre.reference]
-    rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
-    program = COPY.format(source=str(write_result(tmp_path / "given.csv", rows)))
-    importer = replace(PRETEND, command=("{python}", "-c", program), lagging_tolerance=1e-6)
-    (tmp_path / "any.fmu").touch()
-    expected = Verdict.AGREES if manoeuvre.vehicle == "bluerov2_heavy" else Verdict.DIFFERS
-    assert run(importer, tmp_path / "any.fmu", tools, manoeuvre).verdict is expected
-
-
-def test_importer_that_is_not_installed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    fmu = tmp_path / "any.fmu"
-    fmu.touch()
-    monkeypatch.setattr("verification.interoperability.importers.IMPORTERS", (PRETEND,))
-    arguments = ["--vehicle", "videoray", "--fmi", "2", "--fmu", str(fmu), "--tools", str(tmp_path)]
-    assert main(arguments) == 0
-    assert "python -m verification.interoperability --install python" in capsys.readouterr().out
-    assert main([*arguments, "pretend"]) == 1, "what is asked for by name must run"
-    assert main([*arguments, "python"]) == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ("nothing", "nothing: no such importer"),
-        ("--vehicle videoray --fmi 3 --fmu nothing.fmu", "nothing.fmu"),
-        ("--vehicle videoray --fmu nothing.fmu", "--fmu goes with --vehicle and --fmi"),
-        ("--fmi 3 --fmu nothing.fmu", "--fmu goes with --vehicle and --fmi"),
-        ("--fmi 3 fmpy-cs fmpy-cs-fmi3", "fmpy-cs: not with this version of FMI"),
-        ("--fmi 3 java", "java: not with this version of FMI"),
-    ],
-)
-def test_bad_arguments(arguments: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(arguments.split()) == 2
-    assert capsys.readouterr().err.startswith(f"interop: {message}")
-
-
-def test_each_importer_gets_the_version_that_it_takes(
-    tools: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    built = []
-
-    def build(vehicle: str, fmi: int, folder: Path) -> Path:
-        built.append((vehicle, fmi))
-        (folder / f"{vehicle}{fmi}").write_text(str(fmi))
-        return folder / f"{vehicle}{fmi}"
-
-    program = "import sys; from pathlib import Path; sys.exit(Path('rov.fmu').read_text() != sys.argv[1])"
-    importers = [
-        replace(PRETEND, name=f"{n}", command=("{python}", "-c", program, f"{fmi}"), tolerance=None, fmi=fmi)
-        for n, fmi in enumerate((2, 3, 3, 2))
-    ]
-    monkeypatch.setattr("verification.interoperability.importers.IMPORTERS", tuple(importers))
-    monkeypatch.setattr("verification.interoperability.__main__.build_fmu", build)
-    assert main(["--tools", str(tools)]) == 0
-    assert sorted(built) == [(vehicle, fmi) for vehicle in sorted(MANOEUVRES) for fmi in (2, 3)], "each is built once"
-    assert [fmi for fmi in capsys.readouterr().out.split() if fmi in {"2.0", "3.0"}] == ["2.0", "3.0", "3.0", "2.0"]
-
-
-def test_log_names_no_folder_and_no_host(tmp_path: Path) -> None:
-    text = f"{tmp_path}/x {Path.home()}/y {HERE}/z https://packages.example:8080/simple ftp://example.org"
-    assert (
-        without_places(text, tmp_path, TOOLS)
-        == "./x ~/y ./verification/interoperability/z https://.../simple ftp://..."
-    )
-
-
 # ---- The declarations ------------------------------------------------------------------------------------------------
-
-
-def test_names_are_unique() -> None:
-    names = [importer.name for importer in IMPORTERS]
-    assert len({*names, *KITS}) == len(names) + len(KITS)
 
 
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
@@ -306,51 +223,9 @@ def test_every_requirement_is_pinned(file: Path) -> None:
         pinned("requirements.txt", "fmp")
 
 
-def test_no_environment_is_cleared_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-
-    def call(command: list[str], tools: Path) -> None:
-        calls.append(command)
-        for importer in IMPORTERS if "-r" in command else ():
-            if importer.kit == "python" and command[-1] == str(HERE / importer.pin[0]):
-                place = tools / importer.proof.format(version=importer.version).replace("*", ".11")
-                place.mkdir(parents=True, exist_ok=True)
-
-    monkeypatch.setattr("verification.interoperability.install._call", call)
-    said: list[str] = []
-    install("python", tmp_path, said.append)
-    made = [command[-1] for command in calls if "venv" in command]
-    files = [command[-1] for command in calls if "-r" in command]
-    assert made == [str(tmp_path / name) for name in ("python", "python-cofmupy")]
-    assert files == [str(HERE / name) for name in ("requirements.txt", "requirements-cofmupy.txt")]
-    for importer in IMPORTERS:
-        if importer.kit == "python":
-            assert importer.is_installed(tmp_path)
-            assert Path(importer.command_line(tmp_path)[0]).parent.parent in {Path(place) for place in made}
-    calls.clear()
-    shutil.rmtree(tmp_path / "python-cofmupy")
-    install("python", tmp_path, said.append)
-    assert [command[-1] for command in calls if "venv" in command] == [str(tmp_path / "python-cofmupy")]
-
-
 def _outcome(importer: Importer, vehicle: str, difference: float | None) -> Outcome:
     verdict = Verdict.NO_FINDING if difference is None else Verdict.AGREES
     return Outcome(importer, vehicle, verdict, difference)
-
-
-def test_the_page_shows_the_larger_difference_of_both_versions(tmp_path: Path) -> None:
-    two, three = (next(i for i in IMPORTERS if i.name == name) for name in ("ecos-cs", "ecos-cs-fmi3"))
-    check = next(i for i in IMPORTERS if i.name == "schemas")
-    run_of_all = [_outcome(two, "a", 2e-14), _outcome(three, "a", 4e-13), _outcome(two, "b", 3e-15)]
-    page = tmp_path / "page.md"
-    page.write_text("before\n<!-- matrix -->\nold\n<!-- end -->\nafter\n")
-    write_table([*run_of_all, _outcome(check, "a", None)], page)
-    text = page.read_text()
-    assert f"| Ecos {two.version} | 2.0, 3.0 | CS | 4e-13 | 3e-15 |" in text
-    assert f"| lxml {check.version} | 2.0 | XML schemas | no finding | – |" in text, "it has not seen the other vehicle"
-    assert "old" not in text
-    assert text.startswith("before\n")
-    assert text.endswith("<!-- end -->\nafter\n")
 
 
 @pytest.mark.parametrize("verdict", [Verdict.NOT_RUN, Verdict.FAILED, Verdict.DIFFERS])

@@ -1,6 +1,5 @@
 """The mutation test: which lines it changes, and which tests it runs for them."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -48,40 +47,6 @@ def test_only_code_is_mutated(source: Path) -> None:
     assert {mutant.line for mutant in mutants} == {5, 13}
     assert {mutant.after.replace(" ", "") for mutant in mutants if mutant.line == 5} == {"x:list[1]=4", "x:list[1]=2"}
     assert [mutant.after for mutant in mutation.draw(1)] == [mutant.after for mutant in mutation.draw(1)]
-
-
-@pytest.mark.long
-def test_a_line_of_c_is_changed_in_one_place() -> None:
-    pytest.importorskip("universalmutator")
-    mutants = mutation._c_mutants("/* a + b */\nx = a + b;\n")
-    assert set(mutants) == {2}
-    assert "/* a + b */\nx = a - b;\n" in [make() for make in mutants[2]]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("line", "changed", "is_mutant"),
-    [
-        ("size >= SERIALIZED_SIZE,", "size > SERIALIZED_SIZE,", True),
-        ("size >= SERIALIZED_SIZE,", "size >= SERIALIZED_SIZE + 0,", False),
-        ("size >= SERIALIZED_SIZE,", "size >= ,", False),
-        ("the state is NULL.", "the state == NULL.", False),
-    ],
-    ids=["another condition", "the same object code", "not C", "a message"],
-)
-def test_a_mutant_of_c_compiles_to_other_code(line: str, changed: str, is_mutant: bool) -> None:
-    text = (mutation.ROOT / "fmu_src" / "c" / "saved.c").read_text(encoding="utf-8")
-    assert line in text
-    assert mutation._is_valid_c("fmu_src/c/saved.c", text, text.replace(line, changed)) is is_mutant
-
-
-@pytest.mark.long
-def test_survivors_are_those_that_no_test_notices(monkeypatch: pytest.MonkeyPatch) -> None:
-    file = "rov_fmu/equation/alone.py"
-    monkeypatch.setattr(mutation, "TESTS", {file: "equation/test_alone.py"})
-    text = (mutation.ROOT / file).read_text(encoding="utf-8")
-    same = mutation.Mutant(file, 1, "", "", f"{text}\n")
-    assert mutation.survivors([same, replace(same, text=f"{text}1 / 0\n")], jobs=1) == [same]
 
 
 def test_a_kept_mutant_is_found_where_its_line_is_today(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

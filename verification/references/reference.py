@@ -104,11 +104,15 @@ class Motion:
         if sign * C < 0 and v0 != 0 and (rest := self.legs[0].rest()) < h:
             self.legs.append(Leg(*back, -sign * C, mp.mpf(0), rest, -sign, self.legs[0].distance(rest)))
 
+    def at(self, time: Number) -> tuple[Number, Number]:
+        """Return the velocity and the distance at a time (s), from 0 to h."""
+        leg = self.legs[-1] if time >= self.legs[-1].start else self.legs[0]
+        return leg.velocity(time), leg.distance(time)
+
     def end(self) -> tuple[Number, Number, Number]:
         """Return the velocity, the distance and the length of the path, back and forth."""
-        last = self.legs[-1]
-        distance = last.distance(self.h)
-        return last.velocity(self.h), distance, abs(last.offset) + abs(distance - last.offset)
+        (velocity, distance), turned = self.at(self.h), self.legs[-1].offset
+        return velocity, distance, abs(turned) + abs(distance - turned)
 
 
 @dataclass(frozen=True)
@@ -128,9 +132,7 @@ def axis(
     A: Number, B: Number, C: Number, v0: Number, h: Number, astern: tuple[Number, Number] | None = None
 ) -> AxisEnd:
     """Return the motion of one axis after h seconds, with as much precision as 50 stable digits need."""
-    # Terms cancel by as many digits as the magnitudes of the numbers, or of their squares, differ.
-    digits = DIGITS + sum(abs(mp.mag(number)) * 6 // 10 for number in (A, B, C, v0, h, *(astern or ())) if number != 0)
-    before = None
+    digits, before = _digits(A, B, C, v0, h, *(astern or ())), None
     while True:
         with mp.workdps(digits):
             v, s, path = Motion(A, B, C, v0, h, astern).end()
@@ -139,6 +141,21 @@ def axis(
             if before and abs(v - before[0]) <= limit * scale and abs(s - before[1]) <= limit * path:
                 return AxisEnd(v, s, path, scale, digits)
             digits, before = digits + DIGITS, (v, s)
+
+
+def _digits(*numbers: Number) -> int:
+    """Return a precision at which 50 digits may be stable.
+
+    Terms cancel by as many digits as the magnitudes of the numbers, or of their squares, differ.
+    """
+    return int(DIGITS + sum(abs(mp.mag(number)) * 6 // 10 for number in numbers if number != 0))
+
+
+def time_to_rest(A: float, B: float, C: float, v0: float) -> float:
+    """Return the time (s) at which a force C < 0 stops a motion v0 > 0."""
+    with mp.workdps(_digits(A, B, C, v0)):
+        leg = Leg(mp.mpf(A), mp.mpf(B), mp.mpf(C), mp.mpf(v0), mp.zero, 1, mp.zero)
+        return float(leg.rest())
 
 
 @cache

@@ -163,6 +163,11 @@ class Signal(Strict):
         """The points of either kind."""
         return self.steps or self.ramps or ()
 
+    def value_given(self, n: int) -> float | list[float]:
+        """Return what the plan has of a point: its time and value, or only the value of an input that is a number."""
+        time, value = self.points[n]
+        return value if time == _ALWAYS else [time, value]
+
     def jumps(self, before: float) -> Iterator[int]:
         """Yield the numbers of the points at which the value jumps; `before` is the value before the first point."""
         last: tuple[float, float] | None = None

@@ -158,18 +158,9 @@ def _extremes(varied: Varied) -> Sequence[float]:
 def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
     """Yield a line for each input in the plan that does not fit."""
     for name, signal in plan.inputs.items():
-        key = f"inputs.{name}"
-        if name not in has:
-            yield key_line(key, unknown(name, has))
-        elif reason := _no_input(name, plan, has):
-            yield key_line(key, reason)
-        elif signal.ramps and not has[name].is_continuous:
-            yield key_line(key, "must be steps, because the variable is not continuous")
-        else:
-            for n, reason in _out_of_bounds(signal, has[name]):
-                yield key_line(key, reason, signal.points[n][1])
-            for n, reason in _misplaced_jumps(signal, plan, has[name].start):
-                yield key_line(key, reason, [*signal.points[n]])
+        for n, reason in _misfits(name, signal, plan, has):
+            given = [] if n is None else [signal.value_given(n)]
+            yield key_line(f"inputs.{name}", reason, *given)
 
 
 def _check_rows(
@@ -177,19 +168,28 @@ def _check_rows(
 ) -> Iterator[str]:
     """Yield a line for each input in a file that does not fit, with its column and the line of its row."""
     for name, signal in from_file.items():
-        column, points = f"column {shown(name)}", signal.points
-        if reason := "is given in [inputs] too" if name in plan.inputs else _no_input(name, plan, has):
-            yield f"{column}: {reason}"
-        else:
-            for n, reason in (*_out_of_bounds(signal, has[name]), *_misplaced_jumps(signal, plan, has[name].start)):
-                yield f"line {lines[n]}, {column} = {points[n][1]:g} at {points[n][0]:g} s: {reason}"
+        taken = [(None, "is given in [inputs] too")] if name in plan.inputs else []
+        for n, reason in taken or _misfits(name, signal, plan, has):
+            place = f"column {shown(name)}"
+            if n is not None:
+                time, value = signal.points[n]
+                place = f"line {lines[n]}, {place} = {value:g} at {time:g} s"
+            yield f"{place}: {reason}"
 
 
-def _no_input(name: str, plan: Plan, has: Mapping[str, Variable]) -> str:
-    """Return why the plan cannot set a variable over time, or an empty text."""
-    if has[name].causality != "input":
-        return f"is no input of the FMU; its causality is {has[name].causality}"
-    return "is given in [set] too" if name in plan.set else ""
+def _misfits(name: str, signal: Signal, plan: Plan, has: Mapping[str, Variable]) -> Iterator[tuple[int | None, str]]:
+    """Yield why a signal cannot be an input: the number of a point, or None for the whole signal, and the reason."""
+    if name not in has:
+        yield None, unknown(name, has)
+    elif has[name].causality != "input":
+        yield None, f"is no input of the FMU; its causality is {has[name].causality}"
+    elif name in plan.set:
+        yield None, "is given in [set] too"
+    elif signal.ramps and not has[name].is_continuous:
+        yield None, "must be steps, because the variable is not continuous"
+    else:
+        yield from _out_of_bounds(signal, has[name])
+        yield from _misplaced_jumps(signal, plan, has[name].start)
 
 
 def _out_of_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, str]]:

@@ -96,13 +96,6 @@ def test_another_source_of_a_curve_is_kept() -> None:
     ]
 
 
-def test_beta_at_zero_keeps_the_velocity_as_its_description_says() -> None:
-    inputs = {"u_l": 1.0, "u_r": 1.0, "u_t": 1.0}
-    result = rov_fmu.load("videoray").with_(beta_u=0.0).simulate([0.0, 1.0, 5.0], inputs, start={"u": 0.25})
-    assert result["u"].tolist() == [0.25, 0.25, 0.25]
-    assert result["w"][-1] > 0.1
-
-
 def test_loads_and_velocities_have_the_units_and_sizes_of_their_axes() -> None:
     layout = rov_fmu.load("bluerov2_heavy").layout
     assert {n: (d.unit, d.nominal) for n, d in layout.inputs.items() if n.endswith("_ext")} == {
@@ -189,14 +182,6 @@ def test_a_pulse_width_stands_for_a_fraction_on_each_side_of_neutral(pulse: floa
     declared = layout.commands["u_l"]
     assert (declared.unit, declared.minimum, declared.maximum, declared.start) == ("us", 1000.0, 1900.0, 1400.0)
     assert layout.usual_inputs["u_l"] == declared.nominal == 1400.0
-
-
-@pytest.mark.parametrize(("together", "share"), [(1, ""), (2, ", half of the pair's"), (4, ", 1/4 of their curve")])
-def test_the_thrust_of_a_thruster_is_described_as_its_share_of_the_curve(together: int, share: str) -> None:
-    thrusters = (thruster("a", "c", (-0.6, 0.8, 1e-9)),)
-    layout = replace(_layout(*thrusters), curves=(Curve("c", ("a_t", "b_t", "d"), together),))
-    words = f"Thrust F_a: thruster a{share}, in water at rest, positive astern and to starboard"
-    assert layout.calculated["F_a"].description == words
 
 
 def test_a_voltage_is_bounded_by_the_tables_and_otherwise_only_below() -> None:

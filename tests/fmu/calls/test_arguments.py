@@ -253,13 +253,6 @@ def test_a_call_without_an_instance_is_an_error(fmu: Fmu) -> None:
         assert fmu.call(function, None, *(zero.get(t) for t in types)) == ERROR, function
 
 
-def test_freeing_null_is_allowed(fmu: Fmu) -> None:
-    getattr(fmu.dll, fmu.name("FreeInstance"))(None)
-    with fmu.instance() as rov:
-        rov.expect("FreeFMUState", None)
-        rov.expect("FreeFMUState", ctypes.byref(c_void_p()))
-
-
 UNUSUAL_CALLS: list[Case] = [
     *((ME, CONTINUOUS, of.name("GetEventIndicators"), (None, 0)) for of in WRAPPERS),
     *((CS, STEP, of.name("SetDebugLogging"), (-1, 0, None)) for of in WRAPPERS),
@@ -295,16 +288,6 @@ def test_unusual_arguments_of_real_importers_work(fmus: dict[int, Fmu], version:
             rov.expect(function, *arguments)
 
     assert failures(calls_of(version, UNUSUAL_CALLS), check) == []
-
-
-def test_a_step_depends_on_its_length_alone(fmu: Fmu) -> None:
-    results = []
-    for t in (0.0, -1.4e-17, 0.1, 1e6):
-        with fmu.instance() as rov:
-            rov.start({"u_l": 0.5, "u_r": -0.3, "u_t": 0.2})
-            assert rov.step(t, 0.1) == OK
-            results.append(bytes(reals(*rov.get(fmu.outputs))))
-    assert len(set(results)) == 1
 
 
 @pytest.mark.parametrize(
@@ -369,28 +352,6 @@ def test_a_repeated_or_skipped_communication_point_gives_one_warning(
             assert [(m.status, m.category) for m in rov.log] == [(WARNING, "logStatusWarning")] * warned
             rov.log.clear()
             assert rov.get(fmu.outputs) == regular.get(fmu.outputs)
-
-
-def test_a_step_tried_again_from_a_restored_state_is_no_jump(fmu: Fmu) -> None:
-    with fmu.instance() as rov:
-        rov.start()
-        assert rov.step(0.0, 0.5) == OK
-        before = rov.save()
-        assert rov.step(0.5, 0.5) == OK
-        assert rov.load(before) == OK
-        assert rov.step(0.5, 0.25) == OK
-        assert rov.log == []
-
-
-def test_a_thousand_steps_added_up_reach_the_stop_time(fmu: Fmu) -> None:
-    with fmu.instance() as rov:
-        rov.start(stop=10.0)
-        t = 0.0
-        for _ in range(1000):
-            assert rov.step(t, 0.01) == OK, rov.log
-            t += 0.01
-        assert t != 10.0
-        assert rov.step(t, 0.01) == ERROR
 
 
 def test_status_after_a_step(fmu2: fmi2.Fmu) -> None:

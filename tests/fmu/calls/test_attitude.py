@@ -1,13 +1,10 @@
 """The attitude of a vehicle with six axes in the FMU: its parameters, the quaternion, and the count of turns."""
 
 import random
-import shutil
 from collections.abc import Sequence
 from ctypes import c_bool, c_int, pointer
 from math import cos, pi, sin
-from pathlib import Path
 
-import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_model_description
@@ -103,26 +100,6 @@ def test_a_quaternion_before_the_start_is_a_guess_that_the_angles_replace(fmu: F
             for instance in (rov, usual):
                 instance.expect("Reset")
                 instance.log.clear()
-
-
-def test_casadi_starts_at_the_attitude(fmu: Fmu, tmp_path: Path) -> None:
-    casadi = pytest.importorskip("casadi")
-    shutil.copytree(fmu.folder, tmp_path / "rov")  # CasADi unpacks nothing from a folder
-    rov = casadi.DaeBuilder("rov", str(tmp_path / "rov"), {})
-    start = dict(zip(rov.x(), rov.start(rov.x()), strict=True))
-    assert [start[name] for name in QUATERNION] == [1.0, 0.0, 0.0, 0.0]
-    model = rov.create("model", ["x", "u"], ["ode", "y"])
-    rates, outputs = model(casadi.DM(list(start.values())), casadi.DM(rov.start(rov.u())))
-    assert np.isfinite(rates.full()).all()
-    assert np.isfinite(outputs.full()).all()
-
-
-@pytest.mark.parametrize("mode", [INITIALIZATION, STEP])
-def test_the_quaternion_is_not_set_in_co_simulation(fmu: Fmu, mode: str) -> None:
-    with fmu.instance() as rov:
-        rov.reach(mode)
-        assert rov.set({"eta": 0.5}) == ERROR
-        assert rov.log[-1].text.endswith(f"eta must not be set in {mode}.")
 
 
 def test_steps_are_those_of_python(fmu: Fmu) -> None:

@@ -141,17 +141,6 @@ def test_too_many_changes_are_refused_and_change_nothing(fmu: Fmu) -> None:
         assert rov.step(MOST_WAITING * h, T_d) == OK
 
 
-def test_an_importer_that_moves_the_time_keeps_the_dead_time(fmu: Fmu) -> None:
-    with fmu.instance() as rov:
-        rov.start(ALL_ON)
-        assert rov.step(0.0, 0.04) == OK
-        assert rov.step(100.0, 0.0599) == OK
-        assert rov.log[-1].status == WARNING
-        assert delayed(rov) == dict.fromkeys(DELAYED, 0.0)
-        assert rov.step(100.0599, 0.0002) == OK
-        assert delayed(rov) == DELAYED
-
-
 def test_changes_arrive_as_time_events_in_model_exchange(fmu: Fmu) -> None:
     with fmu.instance(MODEL_EXCHANGE) as rov:
         assert rov.set(ALL_ON) == OK

@@ -22,7 +22,6 @@ from tests.fmi import (
     STEP,
     AnyInstance,
     Fmu,
-    integers,
     reals,
     room,
 )
@@ -177,24 +176,6 @@ def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
 # ---- Adjoint derivatives ----
 
 
-@pytest.mark.parametrize(
-    "number", [1, pytest.param(6, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)]
-)
-@pytest.mark.parametrize("kind", MODES)
-def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kind: int, number: int) -> None:
-    """The unknowns are all outputs and derivatives; the knowns are all inputs, states and coefficients."""
-    unknowns = fmu3.outputs + fmu3.derivatives
-    for point in points(fmu3, number, seed=1):
-        columns = [slopes(rov_of(fmu3), point, known) for known in point]
-        size = [max(1.0, *map(abs, column.values())) for column in columns]
-        with fmu3.instance(kind) as instance:
-            bring(instance, INITIALIZATION, point)
-            for name in unknowns:
-                row = instance.adjoint([name], list(point), [1.0])
-                for known, d, column, scale in zip(point, row, columns, size, strict=True):
-                    assert d == pytest.approx(column[name], rel=1e-12, abs=1e-14 * scale), (name, known, point)
-
-
 @pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
 def test_adjoint_derivatives_agree_with_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
     """(v J) u = v (J u) for the knowns of the mode."""
@@ -230,15 +211,6 @@ def test_the_numbers_of_seeds_and_sensitivities_must_match_the_variables(fmu3: f
 # ---- The model structure ----
 
 
-def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu) -> None:
-    variables = fmu.variables.values()
-    assert fmu.outputs == [v.name for v in variables if v.causality == "output"]
-    assert fmu.derivatives == [v.name for v in variables if v.derivative is not None]
-    initial = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
-    assert initial == [v.name for v in variables if v.initial == "calculated"]
-    assert fmu.derivatives == [f"der({name})" for name in fmu.states]
-
-
 # ---- Derivatives by time ----
 
 
@@ -267,18 +239,6 @@ def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, n
             assert instance.rates(fmu.outputs) == pytest.approx(expected, rel=1e-11, abs=1e-13 * size), motion
             instance.expect("Terminate")
             assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
-
-
-@pytest.mark.parametrize("order", [-1, 0, 2, 19])
-def test_output_derivatives_of_other_orders_are_refused(fmu: Fmu, order: int) -> None:
-    """Only order 1 is declared; no value is written if any order of a call is refused."""
-    assert fmu.description.coSimulation.maxOutputDerivativeOrder == 1
-    values = room(2)
-    with fmu.instance() as rov:
-        rov.start({"u": 0.5})
-        assert rov.rates_by(fmu.references(["w", "u"]), integers(1, order), values) == ERROR
-        assert list(values) == list(room(2))
-        assert rov.log[-1].text.endswith(f"order {order} of u is not available, only 1.")
 
 
 @pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])

@@ -6,15 +6,12 @@ from typing import Any
 import pytest
 from fmpy.fmi2 import fmi2CallbackFunctions
 from fmpy.fmi3 import (
-    fmi3ClockUpdateCallback,
     fmi3IntermediateUpdateCallback,
-    fmi3LockPreemptionCallback,
     fmi3LogMessageCallback,
-    fmi3UnlockPreemptionCallback,
 )
 
 from tests import fmi2, fmi3
-from tests.fmi import CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Message, references, room
+from tests.fmi import CO_SIMULATION, ERROR, MODEL_EXCHANGE, Message, references
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
 GUID = object()  # stands for the GUID of the FMU
@@ -52,39 +49,6 @@ def test_a_bad_instantiation_gives_no_instance_and_one_log_line(
 
 def test_no_callbacks_give_no_instance(fmu2: fmi2.Fmu) -> None:
     assert fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, None, None, 0, 0) is None
-
-
-@pytest.mark.parametrize(
-    "uri",
-    [
-        None,
-        b"",
-        b"file:/x",
-        b"file:///x",
-        b"file:////x/",
-        b"file:///no such%20folder",
-        b"\xff%n%s",
-        b"C:\\x",
-        b"x" * 9999,
-    ],
-)
-def test_any_resource_location_is_accepted(fmu2: fmi2.Fmu, uri: bytes | None) -> None:
-    callbacks = fmi2CallbackFunctions()  # all of them NULL
-    component = fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, uri, ctypes.byref(callbacks), -1, -1)
-    assert fmu2.call("fmi2SetupExperiment", component, 0, 0.0, 0.0, 0, 0.0) == OK
-    assert fmu2.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR  # also without a logger
-    fmu2.dll.fmi2FreeInstance(component)
-
-
-def test_the_callbacks_are_copied(fmu2: fmi2.Fmu) -> None:
-    log: list[Message] = []
-    callbacks = fmi2.recording_callbacks(log)
-    given = fmi2CallbackFunctions.from_buffer_copy(callbacks)
-    component = fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, None, ctypes.byref(given), 0, 0)
-    ctypes.memset(ctypes.byref(given), 0xAA, ctypes.sizeof(given))
-    assert fmu2.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR
-    fmu2.dll.fmi2FreeInstance(component)
-    assert len(log) == 1
 
 
 # ---- FMI 3.0 ----
@@ -145,29 +109,3 @@ def test_variables_of_intermediate_update_must_be_variables_of_the_fmu(fmu3: fmi
         assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size, logging=False) is None
         (message,) = log
         assert "requiredIntermediateVariables" in message.text
-
-
-def test_intermediate_variables_without_a_callback_are_accepted_as_some_importers_pass_them(fmu3: fmi3.Fmu) -> None:
-    component = instantiate(fmu3, b"rov", fmu3.token, NO_LOGGER, references(*fmu3.vr.values()), len(fmu3.vr))
-    assert fmu3.call("EnterInitializationMode", component, False, 0.0, 0.0, False, 0.0) == OK
-    assert fmu3.call("ExitInitializationMode", component) == OK
-    flags = [fmi3.flags(True) for _ in range(3)]
-    last = room()
-    assert fmu3.call("DoStep", component, 0.0, 0.1, True, *flags, last) == OK
-    assert last[0] == 0.1
-    assert fmu3.call("DoStep", component, 0.1, 0.0, True, *flags, last) == ERROR  # also without a logger
-    fmu3.dll.fmi3FreeInstance(component)
-
-
-def test_there_is_no_scheduled_execution(fmu3: fmi3.Fmu) -> None:
-    log: list[Message] = []
-    logger = fmi3.recorder(log)
-    callbacks = fmi3ClockUpdateCallback(), fmi3LockPreemptionCallback(), fmi3UnlockPreemptionCallback()  # NULL
-    for logging in (False, True):
-        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, *callbacks)
-        assert fmu3.dll.fmi3InstantiateScheduledExecution(*arguments) is None
-    (message,) = log
-    assert (message.status, message.text) == (
-        ERROR,
-        "fmi3InstantiateScheduledExecution: this FMU has no Scheduled Execution.",
-    )

@@ -443,19 +443,6 @@ def test_a_value_that_a_variable_has_already_is_set_with_one_warning(
             assert rov.save() == before
 
 
-def test_an_input_of_an_intermediate_update_may_come_with_fixed_parameters(fmu3: fmi3.Fmu) -> None:
-    with new(fmu3, CO_SIMULATION, INTERMEDIATE) as rov:
-        reach(rov, INTERMEDIATE)
-        inertia = rov.get(["I_r"])[0]
-
-        def act() -> None:
-            assert rov.set({"I_r": inertia, "u_l": 0.25}) == OK
-            assert rov.set({"I_r": inertia + 1.0}) == ERROR
-
-        inside(rov, INTERMEDIATE, act)
-        assert rov.get(["u_l"]) == [0.25]
-
-
 def test_a_step_that_overflows_leads_to_error_mode_with_the_state_from_before(fmu: Fmu) -> None:
     with fmu.instance() as rov:
         rov.start({"u": 0.5, "psi": 0.25, "V_N": 1e308, "x": 3.0})
@@ -498,9 +485,3 @@ def test_without_logging_only_fmi_2_logs_errors_until_logging_is_switched_on(fmu
         rov.expect("SetDebugLogging", True, 1, strings(b"logStatusError"))
         assert rov.call("ExitInitializationMode") == ERROR
         assert [m.category for m in rov.log] == ["logStatusError"]
-
-
-def test_the_libraries_return_their_version_of_fmi(fmu2: fmi2.Fmu, fmu3: fmi3.Fmu) -> None:
-    assert fmu2.dll.fmi2GetVersion() == b"2.0"
-    assert fmu2.dll.fmi2GetTypesPlatform() == b"default"
-    assert fmu3.dll.fmi3GetVersion() == b"3.0"

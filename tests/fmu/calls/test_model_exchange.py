@@ -1,16 +1,14 @@
 """Model Exchange: an integrator of the importer gives the trajectory of the exact steps, and there are no events."""
 
-import ctypes
 from itertools import pairwise
 from math import inf, nan
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import fmi2EventInfo
 from numpy.typing import NDArray
 
-from tests.fmi import CONTINUOUS, DISCARD, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, Fmu, integers, reals, room
+from tests.fmi import CONTINUOUS, DISCARD, MODEL_EXCHANGE, OK, Fmu, reals
 
 # Inputs that are held from one time to the next: straight and turning, ahead and astern, saturated, loads, a current.
 START = {"u": -0.5, "w": 0.2, "r": 1.5, "psi": 2.0}
@@ -69,29 +67,6 @@ def test_cvode_gives_the_trajectory_of_co_simulation_within_its_tolerance(
     assert error.max() < 1000.0 * tolerance
 
 
-def test_the_trajectory_turns_and_has_velocities_of_both_signs(fmu: Fmu, exact: NDArray[np.float64]) -> None:
-    for name, column in zip(fmu.states, exact.T, strict=True):
-        if name in ("u", "w", "r"):
-            assert column.min() < -0.1, name
-            assert column.max() > 0.1, name
-    assert np.ptp(exact[:, fmu.states.index("psi")]) > 6.0
-
-
-def test_there_are_no_events(fmu2: Fmu) -> None:
-    fmu = fmu2
-    assert fmu.description.numberOfEventIndicators == 0
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        rov.reach(EVENT)
-        for _ in range(2):
-            info = fmi2EventInfo(*[-1] * 5, -7.0)
-            rov.expect("fmi2NewDiscreteStates", ctypes.byref(info))
-            assert not any(getattr(info, name) for name, _ in fmi2EventInfo._fields_)
-        rov.expect("EnterContinuousTimeMode")
-        enter, terminate = integers(-1), integers(-1)
-        rov.expect("fmi2CompletedIntegratorStep", 0, enter, terminate)
-        assert (enter[0], terminate[0]) == (0, 0)
-
-
 def test_event_mode_keeps_the_states_and_takes_inputs_and_tuning(fmu: Fmu) -> None:
     n = len(fmu.states)
     states = reals(*(0.25 * i - 0.7 for i in range(n)))
@@ -120,16 +95,6 @@ def test_a_solver_may_go_back_in_time(fmu: Fmu) -> None:
             states.add(rov.save())
         assert all(a == b for a, b in pairwise(results))  # the model is autonomous
         assert len(states) == 4  # and the time is part of the state
-
-
-def test_nominals_are_those_of_the_description(fmu: Fmu) -> None:
-    n = len(fmu.states)
-    nominals = room(n)
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        rov.reach(INITIALIZATION)
-        rov.expect("GetNominalsOfContinuousStates", nominals, n)
-    assert list(nominals) == [fmu.number(name, "nominal") for name in fmu.states]
-    assert min(nominals) > 0.0
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])

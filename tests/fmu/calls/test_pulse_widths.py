@@ -18,16 +18,13 @@ from fmpy.validation import validate_model_description
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import python_content
-from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.osp import osp_model_description
-from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi2
 from tests.conftest import Made, unzipped
 from tests.equation.test_thrust_effects import immediate
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, Message
-from tests.fmi2 import recording_callbacks
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.vehicles import THRUST_EFFECTS, pulsed
 from verification.references.fmpy_slave import fmpy_slave, keep_loaded
@@ -98,14 +95,6 @@ def test_the_description_declares_the_pulse_widths(fmus: Pair) -> None:
     assert terminals(PULSES.layout)[0].description == "Commands to the thrusters and fins, pulse widths"
 
 
-def test_without_a_command_nothing_moves(fmus: Pair) -> None:
-    with fmus[0].instance() as rov:
-        rov.start()
-        assert rov.get(COMMANDS) == [PULSE[1]] * len(COMMANDS)
-        assert rov.step(0.0, 1.0) == OK
-        assert rov.get(fmus[0].outputs) == [0.0] * len(fmus[0].outputs)
-
-
 def test_steps_are_those_of_the_fractions_bit_for_bit(fmus: Pair) -> None:
     commands = commands_of(random.Random(1))
     with fmus[0].instance() as rov, fmus[1].instance() as other:
@@ -173,18 +162,6 @@ def test_a_warning_names_the_end_of_the_range_and_the_thrust_curve(made_once: Ma
             assert say(rov) == BEYOND
 
 
-def test_the_python_flavour_gives_the_same_warnings(tmp_path: Path) -> None:
-    log: list[Message] = []
-    slave, place = python_slave(RANGES, tmp_path, recording_callbacks(log))
-    for values in (
-        {**dict.fromkeys(COMMANDS, 0.0), "u_r": 2500.0, "voltage": 16.0},
-        *({"u_l": 500.0}, {"voltage": 13.0}, {"u_r": 0.0, "voltage": 8.0}, {"voltage": 25.0}),
-    ):
-        slave.setReal([place[name] for name in values], [*values.values()])
-    slave.freeInstance()
-    assert [text.replace(".0 ", " ") for text in warnings_of(log)] == BEYOND
-
-
 @pytest.mark.long
 def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -236,15 +213,3 @@ def test_the_python_flavour_waits_at_neutral_for_the_dead_time(tmp_path: Path) -
     assert np.abs(in_c[-1, : len(STATES)]).max() > 0.1
     slave.terminate()
     slave.freeInstance()
-
-
-def test_the_reference_results_are_those_of_the_fractions() -> None:
-    found, expected = reference_results(PULSES), reference_results(FRACTIONS)
-    assert found.keys() == expected.keys()
-    results = [path for path in found if path.endswith("_expected.csv")]
-    assert results
-    for path in results:
-        assert found[path] == expected[path], path
-    stimuli = found[f"{FOLDER}/surge_100.csv"].decode().splitlines()
-    assert stimuli[0] == f"time,{','.join(COMMANDS)}"
-    assert stimuli[1] == "0,1900,1900,1480,1480,1480"

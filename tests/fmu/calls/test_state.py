@@ -1,7 +1,6 @@
 """A run continues with the same bits wherever its state is saved and restored."""
 
 import ctypes
-import shutil
 import subprocess
 import sys
 from ctypes import c_void_p
@@ -86,13 +85,6 @@ def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> N
         assert state.value is None
 
 
-def test_a_run_continues_in_an_instance_that_was_only_instantiated(fmu: Fmu, whole: bytes, midway: bytes) -> None:
-    with fmu.instance() as rov:
-        assert rov.load(midway) == OK
-        assert rov.mode() == STEP
-        assert run(rov, 10, 20) == half(whole)
-
-
 def test_a_run_continues_in_another_process(fmu: Fmu, whole: bytes, midway: bytes, tmp_path: Path) -> None:
     saved = tmp_path / "state"
     saved.write_bytes(midway)
@@ -111,34 +103,6 @@ def test_a_run_continues_in_another_process(fmu: Fmu, whole: bytes, midway: byte
         check=True,
     )
     assert bytes.fromhex(result.stdout) == half(whole)
-
-
-def test_reset_and_run_again_gives_the_same_bits(fmu: Fmu, whole: bytes) -> None:
-    with fmu.instance() as rov:
-        rov.start({"u": 2.0, "alpha_u": 0.5, "R": 0.3})
-        run(rov, 0, 7)
-        rov.expect("Reset")
-        rov.start(DISTURBED, stop=1.0)
-        assert run(rov, 0, 20) == whole
-
-
-def test_a_freed_and_a_new_instance_give_the_same_bits(fmu: Fmu, whole: bytes) -> None:
-    for _ in range(3):
-        with fmu.instance() as rov:
-            rov.start(DISTURBED, stop=1.0)
-            assert run(rov, 0, 20) == whole
-
-
-def test_the_library_unloaded_and_loaded_again_gives_the_same_bits(fmu: Fmu, whole: bytes, tmp_path: Path) -> None:
-    copy = tmp_path / fmu.library.name
-    shutil.copyfile(fmu.library, copy)
-    for _ in range(2):
-        loaded = type(fmu)(fmu.folder, copy)
-        rov = loaded.instance()
-        rov.start(DISTURBED, stop=1.0)
-        assert run(rov, 0, 20) == whole
-        rov.free()
-        loaded.unload()
 
 
 def test_instances_that_step_in_turns_give_the_same_bits_as_alone(fmu: Fmu, whole: bytes) -> None:
@@ -235,31 +199,6 @@ def test_a_state_holds_every_value_and_the_time(fmu: Fmu, midway: bytes) -> None
         assert rov.get(list(fmu.variables)) == before
         assert rov.time() == pytest.approx(0.5, abs=1e-15)
         assert rov.step(0.5, 0.6) == ERROR  # past its stop time
-
-
-def test_a_state_is_a_copy_that_later_calls_leave_alone(fmu: Fmu, midway: bytes) -> None:
-    state = c_void_p()
-    with fmu.instance() as rov, fmu.instance() as another:
-        assert rov.load(midway) == OK
-        rov.expect("GetFMUState", ctypes.byref(state))
-        run(rov, 10, 15)
-        rov.expect("Reset")
-        assert rov.save(state) == midway
-        assert another.save(state) == midway  # any instance can read it
-        another.expect("FreeFMUState", ctypes.byref(state))
-
-
-def test_a_state_given_again_is_overwritten_in_place(fmu: Fmu, midway: bytes) -> None:
-    state = c_void_p()
-    with fmu.instance() as rov:
-        rov.expect("GetFMUState", ctypes.byref(state))
-        first, new = state.value, rov.save(state)
-        assert rov.load(midway) == OK
-        rov.expect("GetFMUState", ctypes.byref(state))
-        assert (state.value, rov.save(state)) == (first, midway)
-        assert rov.deserialize(new, state) == OK
-        assert (state.value, rov.save(state)) == (first, new)
-        rov.expect("FreeFMUState", ctypes.byref(state))
 
 
 @pytest.mark.parametrize(("kind", "mode"), [(CO_SIMULATION, STEP), (MODEL_EXCHANGE, CONTINUOUS)])

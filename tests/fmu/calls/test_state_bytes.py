@@ -105,12 +105,3 @@ def test_a_mode_that_no_run_can_be_in_is_refused(fmu: Fmu, serialized: bytes, wo
     struct.pack_into("<Q", content, start + 8 * word, value)
     with fmu.instance() as rov:
         assert_refused(rov, bytes(content) + checksum(bytes(content)))
-
-
-def test_a_parameter_at_its_bounds_is_restored(fmu: Fmu) -> None:
-    for bound in (0, 1):
-        extreme = {name: fmu.bounds(name)[bound] for name in fmu.parameters}
-        with fmu.instance() as rov, fmu.instance() as another:
-            rov.start(extreme)
-            assert another.load(rov.save()) == OK
-            assert another.get(fmu.parameters) == list(extreme.values())

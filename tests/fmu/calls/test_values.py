@@ -16,7 +16,6 @@ from tests.fmi import (
     OK,
     STEP,
     WARNING,
-    WITH_EVENTS,
     AnyInstance,
     Fmu,
     integers,
@@ -72,13 +71,6 @@ def test_a_parameter_takes_its_bounds_and_nothing_beyond(fmu: Fmu) -> None:
                 assert rov.get([name]) == [value]
 
 
-def test_a_tunable_parameter_is_checked_between_steps_too(fmu: Fmu) -> None:
-    with fmu.instance() as rov:
-        rov.reach(STEP)
-        assert_discarded(rov, "beta_u", -0.001)
-        assert rov.set({"beta_u": 2.0}) == OK
-
-
 def test_values_that_overflow_are_logged_and_not_returned(fmu: Fmu) -> None:
     n = len(fmu.states)
     for kind, status in [(CO_SIMULATION, ERROR), (MODEL_EXCHANGE, DISCARD)]:
@@ -118,28 +110,11 @@ def test_a_command_beyond_full_saturates_and_is_logged_once(fmu: Fmu, command: s
     )
 
 
-def test_every_command_that_saturates_is_logged_once_and_again_after_reset(fmu: Fmu) -> None:
-    with fmu.instance() as rov:
-        for _ in range(2):
-            assert rov.set(dict.fromkeys(COMMANDS, 1.25)) == OK
-            assert rov.set(dict.fromkeys(COMMANDS, -1.25)) == OK
-            rov.expect("Reset")
-        assert [m.text.split()[1] for m in rov.log if m.status == WARNING] == [*COMMANDS, *COMMANDS]
-
-
 def test_in_fmi_3_a_message_is_the_text_with_every_hash_doubled(fmu3: fmi3.Fmu) -> None:
     with fmu3.instance() as rov:
         assert rov.call("SetDebugLogging", 1, 1, strings(b"#50 %d%%n%##")) == ERROR
         (message,) = rov.log
     assert message.text == "fmi3SetDebugLogging: there is no log category ##50 %d%%n%####."
-
-
-def test_in_event_mode_of_co_simulation_invalid_values_are_discarded(fmu3: fmi3.Fmu) -> None:
-    with fmu3.instance(WITH_EVENTS) as rov:
-        rov.reach(EVENT)
-        for name in fmu3.settable(EVENT):
-            assert_discarded(rov, name, nan)
-        assert_discarded(rov, "beta_u", -0.001)
 
 
 def test_in_fmi_2_a_message_is_a_printf_format_that_gives_the_text(fmu2: Fmu) -> None:
@@ -182,17 +157,3 @@ def test_log_categories_are_switched_on_and_off(fmu: Fmu) -> None:
         rov.expect("Reset")  # restores the categories of the instantiation
         assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
         assert {c.name for c in fmu.description.logCategories} >= {"logStatusError", "logStatusDiscard", "logEvents"}
-
-
-def test_the_category_of_all_messages_switches_every_category(fmu: Fmu) -> None:
-    """FMUSDK switches logAll on right after instantiation, and stops if that fails."""
-    assert "logAll" in {c.name for c in fmu.description.logCategories}
-    with fmu.instance(logging=False) as rov:
-        rov.expect("SetDebugLogging", True, 1, strings(b"logAll"))
-        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        rov.expect("SetDebugLogging", False, 1, strings(b"logAll"))
-        assert refused(rov) == []
-        rov.expect("SetDebugLogging", True, 2, strings(b"logStatusError", b"logEvents"))
-        assert refused(rov) == ["logEvents", "logStatusError"]
-        rov.expect("SetDebugLogging", True, 2, strings(b"logEvents", b"logAll"))
-        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]

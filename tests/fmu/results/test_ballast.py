@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fmpy import read_model_description
 
 from tests import fmi3
 from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, OK, STEP, WITH_EVENTS, Fmu
@@ -69,12 +68,6 @@ def test_ballast_changed_in_event_mode_is_the_rigid_body_restarted_there(six3_di
     assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
 
 
-def test_python_agrees_with_the_rigid_body_too(expected: list[float]) -> None:
-    state = ROV.step(INPUTS, ROV.layout.at_rest, 10.0)
-    state = ROV.replaced(BALLAST).step(INPUTS, state, 10.0)
-    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
-
-
 def test_a_mass_that_is_not_positive_definite_is_refused_and_nothing_changes(fmu: Fmu) -> None:
     for kind, mode in ((CO_SIMULATION, STEP), (MODEL_EXCHANGE, EVENT)):
         with fmu.instance(kind) as rov:
@@ -105,10 +98,3 @@ def test_a_saved_state_contains_the_ballast_and_no_impossible_mass(fmu: Fmu) -> 
         content = saved[:place] + struct.pack("<d", IMPOSSIBLE["z_G"]) + saved[place + 8 : -8]
         assert rov.load(content + checksum(content)) == ERROR
         assert "values that no run can reach" in rov.log[-1].text
-
-
-def test_the_ballast_is_tunable(fmu: Fmu) -> None:
-    variables = {v.name: v for v in read_model_description(str(fmu.folder), validate=False).modelVariables}
-    tunable = {name for name, v in variables.items() if v.variability == "tunable"}
-    places_of_centres = {f"{axis}_{point}" for axis in "xyz" for point in "GB"}
-    assert tunable == {"m_rov", "W", "B", *places_of_centres, *ROV.layout.tuning}

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST, Experiment, ReferenceResults
-from rov_fmu.fmu.proof import Finding, _deviation, _signals
-from rov_fmu.io.csv_table import Series
+from rov_fmu.fmu.proof import _deviation
 from rov_fmu.io.messages import FileError
 
 _ROWS = "time,y\n0,0\n1,1\n"
@@ -133,14 +132,3 @@ def test_the_deviation_is_the_largest(at: tuple[float, ...], expected: tuple[flo
     run, values = np.array([0.0, 1.0, 2.0, 2.0, 3.0]), [0.0, 10.0, 20.0, -5.0, 30.0]
     assert _deviation(run, values, array("d", at), array("d", expected)) == pytest.approx(deviation, abs=1e-12)
     assert _deviation(run, [*values[:4], np.nan], array("d", (3.0,)), array("d", (30.0,))) == np.inf
-
-
-def test_stimuli_become_rows_and_a_deviation_equal_to_the_tolerance_passes() -> None:
-    columns = Series(
-        {name: array("d", values) for name, values in {"t": (0.0, 1.0), "u": (2.0, 3.0), "v": (4.0, 5.0)}.items()}
-    )
-    signals = _signals(columns)
-    assert signals is not None
-    assert (signals.dtype.names, signals.tolist()) == (("time", "u", "v"), [(0.0, 2.0, 4.0), (1.0, 3.0, 5.0)])
-    assert _signals(None) is None
-    assert [Finding("a", "y", x, 1e-3).passed for x in (1e-3, 1.1e-3, np.inf)] == [True, False, False]

@@ -7,7 +7,6 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 from math import e
 from pathlib import Path
@@ -19,7 +18,6 @@ import pytest
 from lxml import etree
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
@@ -27,7 +25,7 @@ from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
-from tests.vehicles import SIX, VEHICLES, a_vehicle, at_rest, four_axes, still
+from tests.vehicles import SIX, a_vehicle, at_rest, four_axes, still
 from verification.references import reference, rigid_vehicle
 from verification.references.rigid_body import VELOCITIES, quaternion_of, rotation
 
@@ -199,32 +197,7 @@ def test_all_expected_values_are_right_to_their_last_digit(name: str) -> None:
 # ---- Fast motions ----------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def spinner() -> Vehicle:
-    """Return a vehicle that turns at thousands of radians per second, which a vehicle file allows."""
-    rov = VEHICLES["sway and yaw"]
-    coefficients = {name: rov[name] for name in rov.layout.coefficients} | {"a_d_r": 0.0, "b_d_r": 0.01}
-    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
-    return replace(vehicle, data=None, layout=rov.layout, coefficients=coefficients)
-
-
-def test_expected_values_of_a_vehicle_that_spins_fast_are_right(spinner: Vehicle) -> None:
-    files = reference_results(spinner)
-    assert spinner.response(AXES["yaw"], 1.0)[0] > 1000.0
-    for experiment in ("sway_100", "yaw_100", "manoeuvre"):
-        _check(spinner, files, experiment)
-
-
 # ---- Roll and pitch --------------------------------------------------------------------------------------------------
-
-
-def test_every_axis_of_the_heavy_moves_although_its_rotation_matrix_has_entries_of_rounding_errors_alone() -> None:
-    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
-    files = reference_results(vehicle)
-    check_experiments_of_axes(vehicle, files)
-    for form in vehicle.layout.axes:
-        last = _rows(files, f"{form.axis.name}_100_expected.csv")[-1]
-        assert 0.05 < last[form.axis.velocity] < 1.2 * vehicle.response(form.axis, 1.0)[0]
 
 
 @pytest.mark.long

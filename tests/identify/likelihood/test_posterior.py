@@ -95,20 +95,6 @@ def test_without_an_effect_the_others_have_their_conditional_means() -> None:
     assert posterior.without([]) is posterior
 
 
-def test_without_several_effects_their_order_does_not_matter() -> None:
-    second = replace(LOAD, of="surge", null=0.1)
-    posterior = posterior_of(LOAD, INERTIA, second)
-    one, other = posterior.without([0, 2]), posterior.without([2, 0])
-    assert one.z == pytest.approx(other.z)
-    assert one.z[[0, 2]].tolist() == [0.0, 0.1]
-
-
-def test_without_an_effect_the_others_stay_within_their_bounds() -> None:
-    posterior = posterior_of(LOAD, replace(INERTIA, low=0.03), LINEAR)
-    free = posterior_of(LOAD, INERTIA, LINEAR).without([0])
-    assert posterior.without([0]).z[1] == max(free.z[1], 0.03)
-
-
 def test_only_optional_effects_without_evidence_are_absent() -> None:
     table_of_three = table(LOAD, replace(LOAD, of="surge"), INERTIA)
     posterior = Posterior(table_of_three, np.array([0.001, 0.1, 0.0]), np.diag(np.square([0.01, 0.01, 0.3])))

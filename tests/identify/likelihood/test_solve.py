@@ -94,11 +94,6 @@ def test_bounds_hold_and_the_others_move_on() -> None:
     least(found, 2.0 * bounded.cost)
 
 
-def test_a_start_outside_is_moved_inside() -> None:
-    found = minimise(Small(linear, np.zeros(4), WIDE, low=-0.1), np.full(4, -5.0))
-    assert found.z[[1, 3]] == pytest.approx([-0.1, -0.1], abs=1e-12)
-
-
 def test_without_noise_its_parameters_keep_their_value() -> None:
     found = minimise(Small(linear, np.zeros(4), WIDE, noise=(0, 3)), np.zeros(4), with_noise=False)
     assert found.z[[0, 3]].tolist() == [0.0, 0.0]
@@ -142,8 +137,3 @@ def test_places_where_motion_diverges_are_avoided() -> None:
     assert [found.z[0], np.exp(found.z[1])] == pytest.approx([2.0, 1.3], rel=0.02)
     with pytest.raises(DivergedError):
         minimise(Small(cliff, np.array([1.0, 0.0]), 3.0), np.array([0.2, 2.0]))
-
-
-def test_the_work_is_limited() -> None:
-    found = minimise(Small(decay, np.array([1.0, 0.0]), 3.0), np.array([4.0, -1.5]), most=2)
-    assert (found.steps, found.has_converged) == (2, False)

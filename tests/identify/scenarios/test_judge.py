@@ -13,7 +13,6 @@ from tests.identify.scenarios.scenario import Expected
 
 COMPLETE = Expected(("load of heave",))
 INCOMPLETE = replace(COMPLETE, causes=("voltage", "time"), complete=False)
-TETHER = replace(COMPLETE, complete=False, unusable=("surge", "sway"))
 OWNER = replace(COMPLETE, like_owners=True)
 TRUTHS = {("surge", "a_d_u"): 20.0, ("surge", "beta_u"): 0.8, ("heave", "a_d_w"): 40.0, ("heave", "V_ss 30 %"): 0.2}
 NO_GATE: Gate = {}
@@ -106,26 +105,6 @@ def test_intervals_that_always_cover_fail_if_the_data_narrow_them() -> None:
     assert wrong(wide) == []
 
 
-def test_one_wrong_number_of_many_seeds_fails() -> None:
-    (words,) = wrong(seeds(200, lambda seed, name: seed % 20 < (4 if name == "beta_u" else 1)), family=300)
-    assert words == "surge beta_u: only 160 of 200 intervals cover"
-
-
-def test_a_number_without_an_interval_covers_nothing() -> None:
-    without = [replace(o, estimates=tuple(replace(e, interval=None) for e in o.estimates)) for o in seeds(20)]
-    assert "all: only 0 of 80 intervals cover" in wrong(without)
-    assert "all: only 0 of 0 intervals cover" in wrong(seeds(20, estimates=()))
-
-
-def test_owners_intervals_may_cover_more_often_but_not_always() -> None:
-    assert wrong(seeds(20, lambda *_: False), OWNER) == []
-    assert wrong(seeds(100, lambda seed, _: seed % 20 < 2), OWNER) == []
-    (words,) = wrong(seeds(100, lambda seed, _: seed % 20 < 4), OWNER)
-    assert words == "all: only 320 of 400 intervals cover"
-    (words,) = wrong([replace(o, estimates=3 * o.estimates) for o in seeds(100, lambda *_: False)], OWNER)
-    assert words == "as many as 1200 of 1200 intervals cover"
-
-
 def test_a_bias_fails() -> None:
     """The intervals are ± 10 %, so a standard error is 5.1 %: 200 seeds allow about 2 %, and 2 seeds more."""
     assert wrong(seeds(200, offset=0.019)) == []
@@ -154,12 +133,6 @@ def test_false_effects_fail() -> None:
     ]
 
 
-def test_an_impossible_effect_fails() -> None:
-    false = (("dead time", "", -4.9),)
-    found = wrong(some(seeds(20), 1, effects=false), replace(INCOMPLETE, effects=("dead time", "load of heave")))
-    assert found == ["an impossible dead time of the vehicle -4.9"]
-
-
 @pytest.mark.parametrize(
     "alarm", [{"disturbances": (("surge", ""),)}, {"verdicts": {"surge": "do not use", "heave": "good"}}]
 )
@@ -177,13 +150,6 @@ def test_a_wrong_cause_fails_and_an_unknown_one_does_not() -> None:
     assert wrong(some(seeds(100), 25, **tether), INCOMPLETE) == ["25 of 100 runs name a wrong cause: the distance"]
 
 
-def test_a_model_that_must_not_be_used_must_be_called_so() -> None:
-    refused = {"verdicts": {"surge": "good", "sway": "do not use"}}
-    assert wrong(some(seeds(20), 19, **refused), TETHER) == []
-    assert wrong(some(seeds(20), 10, **refused), TETHER) == ["only 10 of 20 runs say `do not use` of surge or sway"]
-    assert wrong(seeds(20, verdicts={"heave": "do not use"}), TETHER)
-
-
 @pytest.mark.parametrize(
     ("expected", "passes", "fails"), [(COMPLETE, 0.9, 0.75), (INCOMPLETE, 0.85, 0.7), (OWNER, 0.98, 1.1)]
 )
@@ -196,13 +162,6 @@ def test_bands_that_contain_too_few_samples_fail(expected: Expected, passes: flo
     assert wrong(with_bands(passes), expected) == []
     assert wrong(with_bands(fails), expected) == [f"bands contain {fails:.1%} of the held-out samples"]
     assert "bands contain 0.0% of the held-out samples" in wrong(seeds(20, bands=()), expected)
-
-
-def test_wide_bands_fail() -> None:
-    """Those of all seeds are judged together, because a single prediction may happen to be good."""
-    wide = (Band("surge", "velocity", 0.95, 1.0, 9.0),)
-    assert wrong(some(seeds(20), 1, bands=wide), OWNER) == []
-    assert wrong(seeds(20, bands=wide), OWNER) == ["bands of surge velocity are 3.00 times as wide as the errors imply"]
 
 
 def gate(half: float, *, covers: bool = True) -> Gate:

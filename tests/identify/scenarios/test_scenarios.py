@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, Axis
 from rov_fmu.identify import beginning
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
@@ -23,14 +23,13 @@ from rov_fmu.identify.result import (
     Prediction,
     Verdict,
 )
-from rov_fmu.tank.folder import read_folder
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.identify.scenarios import outcome as of_outcome
-from tests.identify.scenarios.catalogue import COMPLETE, DEPTH, HEADING, INCOMPLETE, OWNERS, SCENARIOS
+from tests.identify.scenarios.catalogue import COMPLETE, HEADING, INCOMPLETE, OWNERS, SCENARIOS
 from tests.identify.scenarios.judge import broken, promises
 from tests.identify.scenarios.outcome import Estimate, outcome, read_gate, read_result, rows
-from tests.identify.scenarios.owners import AXES, SMALL, Kind, Owner, Plan, fly
-from tests.identify.scenarios.tank import Logs, Sensor, Tank, flights, moved, true_values
+from tests.identify.scenarios.owners import Kind, Owner, Plan, fly
+from tests.identify.scenarios.tank import Logs, Tank, flights, moved, true_values
 from verification.references import pool
 from verification.references.pool import NOTHING, Array, Commands, Conditions, Tilt
 
@@ -192,20 +191,6 @@ def test_logs_that_are_held_out_by_hand_are_predicted_and_not_fitted(
 # ---- Tank tests and dives --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", INCOMPLETE)
-def test_what_the_model_lacks_is_large(name: str) -> None:
-    """It moves a sensor by at least three times its noise (RMS)."""
-    scenario = INCOMPLETE[name]
-    (flight,) = flights(replace(scenario, logs=replace(scenario.logs, count=1)), np.random.default_rng(0))
-    real = moved(scenario.truth, flight.commands, flight.time, flight.conditions)
-    modelled = moved(scenario.truth, flight.commands, flight.time, Conditions())
-    changes = [
-        float(np.sqrt(np.mean((s.scale * true_values(s, real) - true_values(s, modelled)) ** 2))) / s.noise
-        for s in scenario.sensors
-    ]
-    assert max(changes) >= 3.0
-
-
 def logged(scenario: Tank, folder: Path) -> dict[str, dict[str, Array]]:
     """Return the columns of the logs of seed 0, by file."""
     scenario.write(0, folder)
@@ -215,20 +200,6 @@ def logged(scenario: Tank, folder: Path) -> dict[str, dict[str, Array]]:
     return {
         file: {name.partition("_[")[0]: t[name] for name in t.dtype.names or ()} for file, t in sorted(tables.items())
     }
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("dead band in heave", "sag with voltage", "tilt with roll and pitch"),
-        pytest.param("heavy", marks=pytest.mark.long),
-    ],
-)
-def test_tank_tests_can_be_read(name: str, tmp_path: Path) -> None:
-    COMPLETE[name].write(0, tmp_path)
-    folder = read_folder(tmp_path)
-    assert [*folder.mistakes, *folder.rov_file_mistakes] == []
-    assert len(folder.logs) == COMPLETE[name].logs.count
 
 
 def test_a_log_has_what_the_vehicle_did(tmp_path: Path) -> None:
@@ -245,70 +216,7 @@ def test_a_log_has_what_the_vehicle_did(tmp_path: Path) -> None:
         assert 0.7 * sensor.noise < np.std(errors) < 1.3 * sensor.noise
 
 
-def test_rows_are_where_a_scenario_puts_them(tmp_path: Path) -> None:
-    one = Logs("pilot", count=1)
-
-    def time(folder: str, logs: Logs) -> Array:
-        (log,) = logged(replace(COMPLETE["pilot"], logs=logs), tmp_path / folder).values()
-        return log["time"]
-
-    assert np.diff(time("even", one)) == pytest.approx(0.05)
-    assert np.ptp(np.diff(time("scattered", replace(one, scatter=0.8)))) > 0.05
-    gaps = np.diff(time("gaps", replace(one, plan="steps", gaps=2, axes=(YAW,))))
-    assert np.sort(gaps)[-3:] == pytest.approx([0.05, 4.05, 4.05], abs=0.051)
-
-
-def test_values_are_as_a_scenario_measures_them(tmp_path: Path) -> None:
-    def first(folder: str, sensor: Sensor, logs: Logs) -> Array:
-        scenario = replace(COMPLETE["clean"], logs=logs, sensors=(sensor,))
-        return next(iter(logged(scenario, tmp_path / folder).values()))[sensor.quantity]
-
-    depth = first("depth", replace(DEPTH, resolution=0.01), Logs(axes=(HEAVE,), count=1))
-    assert 100.0 * depth == pytest.approx(np.round(100.0 * depth), abs=1e-6)
-    turning = Logs(axes=(YAW,), count=1)
-    heading = first("heading", replace(HEADING, noise=0.0), turning)
-    wrapped = first("wrapped", replace(HEADING, noise=0.0, wraps=True), turning)
-    late = first("late", replace(HEADING, noise=0.0, late=0.5, every=2), turning)
-    assert np.abs(wrapped).max() <= 180.0
-    assert np.ptp(heading) > 720.0
-    assert (heading - wrapped) / 360.0 == pytest.approx(np.round((heading - wrapped) / 360.0), abs=1e-6)
-    assert np.isnan(late[1::2]).all()
-    assert late[10::2] == pytest.approx(heading[:-10:2], abs=1e-4)
-
-
 # ---- Owners' vehicles ------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "name", ["owner, sag with voltage", "owner, tilt with roll and pitch", "auv of 100 kg", "rov of 2 kg"]
-)
-def test_the_dives_of_an_owner_can_be_read(name: str, tmp_path: Path) -> None:
-    """The third dive is held out by hand, and the other dives have what the scenario measures."""
-    scenario = OWNERS[name]
-    scenario.write(0, tmp_path)
-    folder = read_folder(tmp_path)
-    assert [*folder.mistakes, *folder.rov_file_mistakes, *folder.findings] == []
-    assert [log.file for log in folder.logs] == ["dive_1.csv", "dive_2.csv"]
-    assert [path.name for path in (tmp_path / "unseen").iterdir()] == ["dive_3.csv"]
-    expected = {"depth", "heading", "yaw velocity", "surge velocity", "sway velocity"}
-    expected |= {column if column == "voltage" else f"{column} angle" for column in scenario.columns}
-    for log in folder.logs:
-        assert {channel.quantity.name for channel in log.channels} == expected
-        assert log.commands
-        assert len(log.commands.thrusters) == len(scenario.kind.thrusters)
-
-
-@pytest.mark.parametrize("name", ["owner", "auv of 100 kg", "rov of 2 kg"])
-def test_the_true_velocity_is_that_of_a_hold(name: str) -> None:
-    """Each axis is driven alone, from rest, and not so long that the Munk moment turns the vehicle."""
-    scenario = OWNERS[name]
-    kind, truths = scenario.vehicle(np.random.default_rng(3)), scenario.truths(3)
-    for n, axis in enumerate(AXES):
-        if name == "auv of 100 kg" and axis == "yaw":
-            continue  # its main thrusters push unequally ahead and astern as they turn it
-        alone = replace(kind, load=kind.load * (axis == "heave"))
-        _, _, states = fly(alone, [(1.2 * kind.hold, {axis: -0.5})])
-        assert states[-1, n] == pytest.approx(truths[axis, "V_ss -50 %"], rel=3e-3), axis
 
 
 CONDITIONS = {
@@ -349,24 +257,3 @@ def in_pool(kind: Kind, folder: Path, command: float) -> Vehicle:
     for key, numbers in (("m_a", kind.added), ("a_d", kind.quadratic), ("b_d", kind.linear)):
         values |= {f"{key}_{name}": number for name, number in zip("uvwr", numbers, strict=True)}
     return load_vehicle(folder / "similar.toml").replaced(values)
-
-
-def test_rotors_approach_their_speed() -> None:
-    """Thrust is that of the squared speed, so it begins slowly."""
-    kind = replace(SMALL, has_rotors=True)
-    _, _, states = fly(kind, [(2.0, {"surge": 0.5})])
-    speed, steady = states[:, 10], kind.forces(np.full(6, 0.5))[2]
-    lag = kind.curves["motor"].lag
-    assert speed == pytest.approx(np.sqrt(steady) * (1.0 - np.exp(-0.1 * np.arange(len(speed)) / lag)), abs=1e-6)
-    forces = kind.arms[0] @ (states[-1, 8:] * np.abs(states[-1, 8:]))
-    assert forces == pytest.approx(kind.arms[0] @ kind.forces(0.5 * kind.mix["surge"]), rel=1e-5)
-
-
-def test_waves_move_the_vehicle_with_the_water(tmp_path: Path) -> None:
-    for name, waves in (("calm", 0.0), ("waves", 0.1)):
-        replace(Owner(), waves=waves).write(0, tmp_path / name)
-    calm, moved_by_waves = (
-        np.genfromtxt(tmp_path / name / "dive_2.csv", delimiter=",", names=True, deletechars="")["depth_[m]"]
-        for name in ("calm", "waves")
-    )
-    assert np.ptp(moved_by_waves - calm) == pytest.approx(0.2, abs=0.005)

@@ -8,11 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.result import Prediction
-from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
-from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.plots.identification import plot_answers, plot_overview, plot_prediction
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -53,13 +52,6 @@ def test_a_prediction_has_its_measured_and_predicted_values_and_the_band() -> No
     assert band[:, 1].max() == pytest.approx((p.predicted + 1.96 * p.deviation).max(), rel=1e-3)
     assert band[:, 1].min() == pytest.approx((p.predicted - 1.96 * p.deviation).min(), rel=1e-3)
     assert ax.get_title(loc="left") == "Depth (m)"
-
-
-def test_a_heading_is_drawn_in_degrees() -> None:
-    p = prediction(YAW, "heading")
-    ax = drawn(p)
-    assert ax.get_title(loc="left") == "Heading (°)"
-    assert max(lines(ax)["measured"][1]) == pytest.approx(np.degrees(p.measured.max()), rel=1e-3)
 
 
 def test_no_more_samples_are_drawn_than_can_be_seen() -> None:
@@ -127,20 +119,3 @@ def test_tau_is_in_seconds_and_points_that_do_not_count_are_hollow() -> None:
     assert point.get_markerfacecolor() == "none"
     assert "measured" not in lines(ax)
     assert "compared" not in lines(ax)
-
-
-def test_the_band_of_yaw_is_in_degrees_per_second() -> None:
-    figure = Figure()
-    plot_answers(figure, example().axes[2], "V_ss")
-    (ax,) = figure.axes
-    assert max(band[:, 1].max() for band in bands(ax)) == pytest.approx(90.0 * 1.3)
-
-
-def test_forces_stand_in_the_order_of_the_command() -> None:
-    figure = Figure()
-    plot_forces(figure, example().forces[::-1])
-    (ax,) = figure.axes
-    commands, values = lines(ax)["this fit"]
-    assert commands == pytest.approx([20, 40, 60])
-    assert values == pytest.approx([2.1, 4.2, 6.3])
-    assert [line.get_color() for line in ax.lines] == [LIGHT["blue"], LIGHT["orange"], LIGHT["orange"]]

@@ -158,18 +158,6 @@ def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path
     assert commands.rows[step + 1] - first == pytest.approx(TIME[10] + LATE - TIME[0], abs=1e-6)
 
 
-def test_arrivals_are_moved_to_the_clock_of_the_headers(tmp_path: Path) -> None:
-    """A simulator stamps its messages from 0, and the commands have only their arrival."""
-    ros = Ros(2)
-    messages = []
-    for topic, time, message in dive(ros, commands=array):
-        if hasattr(message, "header"):
-            message.header.stamp.sec -= round(START)
-        messages.append((topic, time, message))
-    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
-    motion.check(log)
-
-
 def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> None:
     """The topics count from 0; the IMU measures the attitude, and the pressure is not needed."""
     ros = Ros(2)
@@ -194,18 +182,6 @@ def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> 
     assert measured(log, "pitch angle").min() == pytest.approx(-0.2, abs=1e-3)
 
 
-def test_depth_by_pressure(tmp_path: Path) -> None:
-    ros = Ros(2)
-    messages = [(topic, time, message) for topic, time, message in dive(ros) if topic != "/odom"]
-    for n, time in enumerate(TIME):
-        pressure = 101325.0 + 9806.65 * motion.DEPTH[n]
-        header = ros.header(time)
-        messages += [("/p", time, ros.message("sensor_msgs/msg/FluidPressure", header=header, fluid_pressure=pressure))]
-    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
-    assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
-    assert any("fresh water" in line for line in told(log))
-
-
 def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     """A driver publishes percent, and an altitude in cm that is negative below the surface."""
     ros = Ros(2)
@@ -225,18 +201,6 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
     assert commanded(log.log, "2") == pytest.approx(motion.THRUSTERS["2"])
     assert log.log.names >= table.keys()
-
-
-def test_outputs_of_an_unknown_unit_are_refused(tmp_path: Path) -> None:
-    ros = Ros(2)
-    newton = ros.message("std_msgs/msg/Float64MultiArray", data=np.full(6, 35.0))
-    path = ros.write(tmp_path, [*dive(ros, commands=None), ("/thrusters", 0.0, newton)])
-    with pytest.raises(DataFileError) as error:
-        read_log(path, BLUEROV2)
-    assert str(error.value) == (
-        f"{path}, '/thrusters': outputs between 35 and 35 are neither fractions within -1 ... 1 nor pulses in us: name "
-        "their unit in the table [topics] of rov.toml"
-    )
 
 
 @pytest.mark.parametrize(("version", "suffix"), [(1, ".bag"), (2, ".db3"), (2, ".mcap")])

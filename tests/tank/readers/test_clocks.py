@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import Names, names_of, seconds
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
@@ -93,22 +92,3 @@ def test_iso_8601() -> None:
     assert seconds("1970-01-01 01:00:02+01:00") == 2.0
     with pytest.raises(ValueError, match="should be a valid datetime"):
         seconds("yesterday")
-
-
-@pytest.mark.parametrize(("unit", "rate"), [("s", "5e-06"), ("ns", "5e+03")])
-def test_an_unlikely_rate_is_told(unit: str, rate: str, tmp_path: Path) -> None:
-    path = csv(tmp_path, f"time [{unit}]", [f"{123_000_000 + 200_000 * n}" for n in range(N)])
-    if unit == "ns":  # 5 kHz is possible
-        assert len(measured(read_log(path, BLUEROV2).log, "depth")) == N
-        return
-    with pytest.raises(DataFileError) as error:
-        read_log(path, BLUEROV2)
-    assert str(error.value) == (
-        f"{path}: the column time [s] gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
-    )
-
-
-def test_a_reboot_to_times_before_those_of_the_log_splits_it(tmp_path: Path) -> None:
-    times = [f"{300 + n / 5:.1f}" for n in range(50)] + [f"{n / 5:.1f}" for n in range(50)]
-    logs = read_log(csv(tmp_path, "time [s]", times), BLUEROV2).logs
-    assert [len(one.commands.rows) for one in logs if one.commands] == [50, 50]

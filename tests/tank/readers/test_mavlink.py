@@ -3,7 +3,7 @@
 import struct
 import sys
 from collections.abc import Iterable
-from math import cos, pi, radians, sin
+from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.layout import Layout
-from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.folders import BLUEROV2, folder_of
 from tests.tank.logs import commanded, measured, read_log, used
 
 BOOT = 1_700_000_000.0  # s since 1970: when the vehicle began to count
@@ -81,32 +79,6 @@ def dive(start: float = 100.0) -> list[tuple[float, Any]]:
         found += [servos(time, 1500, 1500, 1500, 1500, down, down)]
         found += [altitude(time + 0.03, -1.0 - 0.02 * max(n - 10, 0)), attitude(time + 0.05, 1.0)]
     return found
-
-
-def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> None:
-    read = read_log(tlog(tmp_path / "Dive.TLOG", dive()), bluerov2)
-    log = read.log
-    assert log.file == "Dive.TLOG"
-    assert log.commands is not None
-    start = log.commands.rows[0]
-    assert log.commands.rows - start == pytest.approx(0.1 * np.arange(N), abs=2e-3)
-    assert measured(log, "depth") == pytest.approx([1.0 + 0.02 * max(n - 10, 0) for n in range(N)])
-    assert used(log, "depth").time - start == pytest.approx(0.1 * np.arange(N) + 0.03, abs=2e-3)
-    for thruster in ("5", "6"):
-        assert commanded(log, thruster) == pytest.approx(np.where(np.arange(N) < 10, 0.0, 0.5))
-    assert not commanded(log, "1").any()
-    assert [(f.kind, f.axis, f.file) for f in read.findings] == [("unknown direction", "", "Dive.TLOG")]
-
-
-def test_the_conditions_of_a_telemetry_log(bluerov2: Layout, tmp_path: Path) -> None:
-    """Before its first measurement, the voltage is reported as 65535."""
-    voltages = [battery(100.0, 65535), battery(101.0, 16000), battery(105.0, 15600)]
-    log = read_log(tlog(tmp_path / "a.tlog", [*dive(), *voltages]), bluerov2).log
-    assert measured(log, "voltage") == pytest.approx([16.0, 15.6], abs=1e-3)
-    voltage = used(log, "voltage")
-    assert np.diff(voltage.time[voltage.there]) == pytest.approx([4.0], abs=2e-3)
-    assert measured(log, "roll angle") == pytest.approx(0.1 * np.ones(N))
-    assert measured(log, "pitch angle") == pytest.approx(-0.2 * np.ones(N))
 
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
@@ -180,18 +152,6 @@ def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout
     assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
 
 
-def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp_path: Path) -> None:
-    """The damage is inside a message of depth, and at the end."""
-    before = tlog(tmp_path / "before.tlog", dive()[:31]).stat().st_size
-    path = tlog(tmp_path / "dive.tlog", dive())
-    content = bytearray(path.read_bytes())
-    content[before + 20 : before + 24] = b"\x07" * 4
-    path.write_bytes(content[:-7])
-    log = read_log(path, bluerov2)
-    assert measured(log.log, "depth") == pytest.approx([1.0 + 0.02 * max(n - 10, 0) for n in range(N) if n != 10])
-    assert Finding("damaged pieces", file="dive.tlog", numbers={"count": 1}) in log.findings
-
-
 # ---- .bin ------------------------------------------------------------------------------------------------------------
 
 # Type, name, format and columns, as ArduSub 4.1 declares them.
@@ -254,30 +214,6 @@ def turn() -> list[bytes]:
     return messages
 
 
-def test_a_dataflash_log_tells_of_a_turn(bluerov2: Layout, tmp_path: Path) -> None:
-    read = read_log(dataflash(tmp_path / "00000012.BIN", turn()), bluerov2)
-    log = read.log
-    assert measured(log, "heading") == pytest.approx([radians(-10.0 + 2.0 * max(n - 10, 0)) for n in range(N)])
-    assert log.commands is not None
-    assert used(log, "heading").time - log.commands.rows[0] == pytest.approx(0.1 * np.arange(N))
-    ends = [commanded(log, thruster)[-1] for thruster in "123456"]
-    assert ends == pytest.approx([0.25, -0.25, -0.25, 0.25, 0.0, 0.0])
-    assert measured(log, "roll angle") == pytest.approx(radians(4.0) * np.ones(N))
-    assert measured(log, "voltage") == pytest.approx(16.0 * np.ones(N))
-    assert not read.findings
-
-
-def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp_path: Path) -> None:
-    """CTUN.Alt stays 0; one of two barometers is inside the hull, and its altitude changes by centimetres only."""
-    messages = []
-    for n in range(N):
-        time, down = 0.1 * n, pulse(0.5 * (n >= 10))
-        messages += [rcou(time, *[1500] * 4, down, down), ctun(time, 0.0)]
-        messages += [baro(time, 0, 0.001 * n), baro(time, 1, -0.02 * n)]
-    log = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).log
-    assert measured(log, "depth") == pytest.approx(0.02 * np.arange(N), abs=1e-6)
-
-
 def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
     """At a heading of 90 deg, the vehicle moves to starboard at 0.01 n m/s; the second core differs."""
     messages = []
@@ -298,21 +234,6 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layou
     path = dataflash(tmp_path / "a.bin", turn())
     path.write_bytes(path.read_bytes()[:-cut])
     assert N - 6 <= len(measured(read_log(path, bluerov2).log, "heading")) <= N
-
-
-def test_a_damaged_dataflash_log_is_read_around_the_damage(
-    bluerov2: Layout, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    path = dataflash(tmp_path / "a.bin", turn())
-    content = bytearray(path.read_bytes())
-    at = content.index(att(53.0, 30.0)[:11])
-    content[at : at + 10] = b"\x07" * 10
-    path.write_bytes(content)
-    log = read_log(path, bluerov2)
-    heading = used(log.log, "heading")
-    assert heading.time - heading.time[0] == pytest.approx(np.delete(0.1 * np.arange(N), 30), abs=1e-3)
-    assert Finding("damaged log", file="a.bin") in log.findings
-    assert capfd.readouterr() == ("", "")
 
 
 # ---- Neither ---------------------------------------------------------------------------------------------------------
@@ -343,13 +264,6 @@ def test_what_is_no_log_is_one_clear_line(
     assert str(error.value).startswith(f"{path}")
     assert len(str(error.value).splitlines()) == 1
     assert capfd.readouterr() == ("", "")
-
-
-def test_outputs_of_servos_alone_are_refused(tmp_path: Path) -> None:
-    rov = folder_of(tmp_path, BLUEROV2, {})
-    tlog(rov / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)])
-    with pytest.raises(DataFileError, match=r"a\.tlog: nothing measured of any axis"):
-        load_tests(rov)
 
 
 def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

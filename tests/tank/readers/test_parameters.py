@@ -12,8 +12,7 @@ from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.log import Log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import TIME
-from tests.tank.readers.test_bags import array
-from tests.tank.readers.test_mavlink import N, altitude, dataflash, packed, parameter, rcou, servos, tlog
+from tests.tank.readers.test_mavlink import N, altitude, parameter, servos, tlog
 from tests.tank.readers.test_sources import ROS, numbers, one, outputs, told
 
 
@@ -79,13 +78,6 @@ def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
     assert "MOT_5_DIRECTION and MOT_6_DIRECTION changed 3 s after the first command. Each value is used" in told(log)
 
 
-def test_parameters_in_a_dataflash_log(tmp_path: Path) -> None:
-    messages = [packed("PARM", 1, name, value, 0.0) for name, value in ((b"MOT_PWM_MIN", 1000), (b"MOT_PWM_MAX", 2000))]
-    for n in range(N):
-        messages.append(rcou(0.1 * n, *[1500] * 4, 1700, 1700))
-    assert command(one(dataflash(tmp_path / "a.bin", messages)))[-1] == pytest.approx(0.4)
-
-
 def csv(folder: Path, unit: str, values: Iterable[float]) -> Path:
     rows = [f"{n / 10},{value},{0.01 * n}" for n, value in enumerate(values)]
     path = folder / "dive.csv"
@@ -115,11 +107,3 @@ def test_clipping_is_told_in_every_format(tmp_path: Path) -> None:
     assert sentence.format("u_5 [us]") in told(one(csv(tmp_path, "us", pulses)))
     percent = ROS.write(tmp_path / "p", [*numbers("/out", 120.0 * (TIME > 4.95)), *numbers("/depth", motion.DEPTH)])
     assert sentence.format("/out.data") in told(one(percent, topics={"/out.data": "u_5 [%]"}))
-
-
-@pytest.mark.parametrize(
-    "commands", [outputs, lambda: [("/thrusters", time, array(ROS, n)) for n, time in enumerate(TIME)]]
-)
-def test_a_bag_without_directions_of_motors_says_so(commands: Any, tmp_path: Path) -> None:
-    log = one(ROS.write(tmp_path, [*commands(), *numbers("/depth", motion.DEPTH)]))
-    assert "does not tell the directions of the motors (MOT_n_DIRECTION)" in told(log)

@@ -18,7 +18,6 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
-from tests.tank.logs import axes
 from tests.tank.readers import motion, test_bags, test_mavlink
 from tests.tank.readers.motion import BLUEROV2, TIME
 from tests.tank.readers.test_bags import ENU, FLU, Ros, pulses
@@ -85,13 +84,6 @@ def test_a_twist_in_a_frame_of_the_earth_is_rotated_by_the_attitude(frame: str, 
     assert values(log, "sway velocity") == pytest.approx(motion.V, abs=1e-6)
 
 
-def test_a_twist_in_a_frame_of_the_earth_is_refused_without_an_attitude(tmp_path: Path) -> None:
-    log = one(ROS.write(tmp_path, [*outputs(), *twists("/velocity_local", "map", motion.OVER_GROUND @ ENU)]))
-    assert not axes(log)
-    assert "/velocity_local is left out for surge velocity, sway velocity" in told(log)
-    assert "its frame is map, and the log has no attitude to rotate it into that of the body" in told(log)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -112,16 +104,6 @@ def test_a_twist_that_contradicts_the_positions_is_a_finding(change: Any, words:
 
 
 # ---- What is no measurement, and what is no command ------------------------------------------------------------------
-
-
-def test_setpoints_are_no_measurements(tmp_path: Path) -> None:
-    messages = [*outputs(), *numbers("/depth_setpoint", 2.0 * TIME), *numbers("/desired_depth", 2.0 * TIME)]
-    messages += [*numbers("/bar30/depth", motion.DEPTH), *twists("/cmd_vel", "base_link", np.ones((len(TIME), 3)))]
-    log = one(ROS.write(tmp_path, messages))
-    assert values(log, "depth") == pytest.approx(motion.DEPTH)
-    assert "the word setpoint, so it is no measurement of the vehicle" in reason(log, "depth", "/depth_setpoint")
-    assert "the word desired, so it is no measurement of the vehicle" in reason(log, "depth", "/desired_depth")
-    assert "the word cmd, so it is no measurement of the vehicle" in reason(log, "surge velocity", "/cmd_vel")
 
 
 @pytest.mark.parametrize("word", ["duty", "current", "speed", "rpm", "temperature", "status", "force"])
@@ -257,14 +239,6 @@ def pressures(topic: str, pascals: Array, per_pascal: float = 1.0) -> Iterator[t
 
 WATER = 101325.0 + 9806.65 * motion.DEPTH
 HULL = 100900.0 + 15.0 * np.sin(7.0 * TIME)
-
-
-def test_a_pressure_in_kpa_needs_its_unit(tmp_path: Path) -> None:
-    path = ROS.write(tmp_path, [*outputs(), *pressures("/sea", WATER, 1e-3)])
-    assert "its pressures of 111.1 ... 120.8 are below 1 % of an atmosphere" in told(log := one(path))
-    assert log.used("depth") is None
-    named = one(path, topics={"/sea.fluid_pressure": "pressure [kPa]"})
-    assert values(named, "depth") == pytest.approx(motion.DEPTH)
 
 
 def test_a_column_of_pressures(tmp_path: Path) -> None:

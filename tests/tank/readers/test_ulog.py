@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.io.csv_table import DataFileError
 from tests.tank.logs import commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, TIME
@@ -103,25 +102,3 @@ def test_disarmed_thrusters_have_the_command_0(tmp_path: Path) -> None:
     found = read_log(log.write(tmp_path / "a.ulg"), BLUEROV2).log
     assert commanded(found, "5") == pytest.approx(np.where(np.arange(100) < 50, 0.0, 0.5))
     assert not commanded(found, "1").any()
-
-
-@pytest.mark.parametrize(("kept", "reason"), [(0, "the file is empty"), (12, "Header too short"), (100, "no commands")])
-def test_a_ulog_without_data_is_one_line(kept: int, reason: str, tmp_path: Path) -> None:
-    path = tmp_path / "dive.ulg"
-    path.write_bytes(dive().content[:kept])
-    with pytest.raises(DataFileError) as error:
-        read_log(path, BLUEROV2)
-    assert str(error.value).startswith(f"{path}: ")
-    assert reason in str(error.value)
-    assert len(str(error.value).splitlines()) == 1
-
-
-def test_a_damaged_ulog_is_read_around_the_damage(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "dive.ulg"
-    content = bytearray(dive().content)
-    content[-3000] ^= 0xFF
-    content[-3300:-3290] = b"\xff" * 10
-    path.write_bytes(content[:-5])
-    log = read_log(path, BLUEROV2).log
-    assert {"surge velocity", "sway velocity", "depth", "heading"} <= {c.quantity.name for c in log.channels if c.count}
-    assert capfd.readouterr() == ("", "")
