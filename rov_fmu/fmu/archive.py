@@ -1,6 +1,7 @@
 """Collect everything that goes into an FMU and zip it. The same inputs give the same bytes."""
 
 import hashlib
+import re
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -87,6 +88,27 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
     for name, text in sorted(sources.items()):
         digest.update(name.encode() + b"\0" + text.encode() + b"\0")
     return f"{{{UUID(digest.hexdigest()[:32])}}}"
+
+
+def guid_of(files: Mapping[str, bytes]) -> tuple[str, str] | None:
+    """Return the GUID in the description of an FMU of ours, and the one that its description and sources give.
+
+    `files` are those in the FMU, by their path. None if the FMU has no GUID or no sources.
+    """
+    description = files["modelDescription.xml"]
+    claimed = re.search(rb' (?:guid|instantiationToken)="([^"]*)"', description)
+    native = {name: text for name, text in files.items() if name.startswith("sources/")}
+    own = re.compile(r"(\w+_slave\.py|variables\.json|\w+_model/(step|equation)\.py)")
+    python = {name: text for name, text in files.items() if own.fullmatch(name.removeprefix("resources/"))}
+    sources = {
+        name.partition("/")[2]: text.decode(errors="replace")
+        for name, text in (native or python).items()
+        if name not in ("sources/interface.h", "sources/buildDescription.xml")  # made from the GUID, or beside it
+    }
+    if not (claimed and sources):
+        return None
+    start, end = claimed.span(1)
+    return claimed[1].decode(errors="replace"), _guid(description[:start] + description[end:], sources)
 
 
 def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:

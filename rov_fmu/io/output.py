@@ -126,6 +126,13 @@ def sealed(text: str, comment: str) -> str:
     return f"{comment.format(f'{_WORDS} {_digest(text)}')}\n{text}"
 
 
+def seal_of(text: str) -> tuple[str, str] | None:
+    """Return the digest in the first line of a file, and that of its other lines; None if the file has no digest."""
+    first, _, rest = text.partition("\n")
+    seal = _SEAL.fullmatch(first)
+    return (seal[1], _digest(rest)) if seal else None
+
+
 def check_replaced(paths: Iterable[Path], *, force: bool) -> list[str]:
     """Return a line for each existing file that will be replaced.
 
@@ -145,13 +152,12 @@ def check_replaced(paths: Iterable[Path], *, force: bool) -> list[str]:
 def _not_as_written(path: Path) -> str:
     """Return why a file is not as `identify` wrote it, or an empty text if it is."""
     try:
-        first, _, rest = read_text(path).partition("\n")
+        seal = seal_of(read_text(path))
     except FileError:
-        first = rest = ""
-    seal = _SEAL.fullmatch(first)
+        seal = None
     if not seal:
         return "does not begin with a digest by identify, so it may have been made by hand"
-    return "" if seal[1] == _digest(rest) else "has changed since identify wrote it"
+    return "" if seal[0] == seal[1] else "has changed since identify wrote it"
 
 
 def _digest(text: str) -> str:

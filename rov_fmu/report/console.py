@@ -22,6 +22,7 @@ from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from rov_fmu.fmu.claims.claims import Proof
     from rov_fmu.fmu.proof import Finding
 
 DEVIATION = "+.1%"
@@ -161,6 +162,16 @@ def print_proof(findings: "Sequence[Finding]") -> None:
             if not f.passed:
                 found.add_row(experiment, *_deviation(f), "FAIL", f.error or f.variable)
     print_table(found, out)
+
+
+def print_claims(proof: "Proof") -> None:
+    """Print the result and the figure of every claim about an FMU."""
+    found = table("", "claim", ())
+    for column in ("result", "figure"):
+        found.add_column(column)
+    for claim, evidence in proof.evidence:
+        found.add_row(claim.name.lower(), evidence.result, evidence.figure)
+    print_table(found)
 
 
 def _deviation(f: "Finding") -> tuple[str, str]:
