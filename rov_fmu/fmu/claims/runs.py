@@ -135,10 +135,10 @@ class Runs:
             return Answer(1, int(refused), int(refused and self._is_unchanged(read, before)), words)
 
     def _is_unchanged(self, read: Callable[[], list[float]], before: list[float]) -> bool:
-        """Return True if values can be read and are as before."""
+        """Return True unless values can be read and differ from before. After an error, FMI lets an FMU refuse this."""
         now: list[float] = []
         status, _ = self._answer(lambda: now.extend(read()))
-        return status <= _WARNING and np.array_equal(now, before, equal_nan=True)
+        return status > _WARNING or np.array_equal(now, before, equal_nan=True)
 
     @staticmethod
     def _answer(call: Callable[[], object]) -> tuple[int, str]:

@@ -22,6 +22,8 @@ Capsys = pytest.CaptureFixture[str]
 Measure = Callable[[Subject], Evidence]
 VERSIONS = ["videoray_fmu", pytest.param("videoray3_fmu", marks=pytest.mark.long)]
 
+TOOLS = Path(__file__).parents[3] / "verification/interoperability/.tools"
+
 _SLAVE = """
 import os, random, time
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
@@ -312,3 +314,28 @@ def test_a_page_that_cannot_be_written_is_told_before_anything_runs(
     ):
         assert main(["prove", str(videoray_fmu), "--report", str(target)]) == 2
         assert capsys.readouterr().err == f"rov-fmu: {target}: {reason}\n"
+
+
+_BALLS = [*TOOLS.glob("python*/lib/python*/site-packages/fmpy/modelica/FMI/Resources/FMUs/*/modelDescription.xml")]
+"""The unpacked FMUs of Reference-FMUs that are part of FMPy 0.3.20, which CoFMPy pins."""
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_bouncing_ball_of_the_reference_fmus_gets_a_report(version: str, tmp_path: Path, capsys: Capsys) -> None:
+    """Its maker promised little, so it fails nothing. It never answers to a step that is not a number."""
+    wanted = (b'modelName="BouncingBall"', f'fmiVersion="{version}"'.encode())
+    found = [path.parent for path in _BALLS if all(words in path.read_bytes() for words in wanted)]
+    if not found:
+        pytest.skip("python -m verification.interoperability --install python installs the reference FMUs")
+    fmu, page = tmp_path / "BouncingBall.fmu", tmp_path / "page.html"
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for path in found[0].rglob("*"):
+            archive.write(path, path.relative_to(found[0]))
+    assert main(["prove", str(fmu), "--report", str(page)]) == 0
+    assert "do not hold" not in capsys.readouterr().err
+    text = page.read_text(encoding="utf-8")
+    assert f"FMI {version}, Co-Simulation and Model Exchange, made by Reference FMUs" in text
+    assert "100 of 100 runs of the default experiment (3 s)" in text
+    assert "it needs more than 5 s" in text
+    assert text.count('<p class="result">does not apply</p>') == 4
