@@ -67,7 +67,7 @@ CLAIMS = (
         "Digests and signature",
         "Nobody has changed the FMU since it was built.",
         measures.integrity,
-        "modelDescription.xml and sources in the FMU; the digests are below",
+        "the files in the FMU that the table names",
     ),
     Claim(
         "Unseen data",
