@@ -592,16 +592,42 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     metavar="KEY.pub",
     help="Public key that must have signed the FMU. Without it, any key may have.",
 )
-def _prove(fmu: Path, interface: str | None, tolerance: float | None, time_limit: float, key: Path | None) -> None:
+@click.option(
+    "--report",
+    type=_FILE,
+    metavar="FILE",
+    help="Measure everything else, too, and write a page (HTML) with the evidence: step size, repeatability, "
+    "conservation, cost, limits, hashes, errors on unseen data.",
+)
+def _prove(
+    fmu: Path, interface: str | None, tolerance: float | None, time_limit: float, key: Path | None, report: Path | None
+) -> None:
     """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do.
 
     Before, the hashes in the FMU and the signature beside it are checked, if there are any.
     """
     _refuse_vehicle(fmu, f"must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
+    from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
+    from rov_fmu.report.progress import parts
+
+    if report:
+        from rov_fmu.fmu.claims.claims import prove_claims
+        from rov_fmu.report.proof_page import proof_output
+
+        check_targets([report], [fmu])
+        check_written(report, PAGE)
+        with parts() as shown:
+            proof = prove_claims(fmu, interface, tolerance, time_limit, key, shown.begin("checking the claims"))
+        write_whole(proof_output(proof, report))
+        print_claims(proof)
+        print_end([report], "open it in a browser")
+        if failed := proof.with_result("fails"):
+            reasons = "; ".join(f"{claim.name.lower()}: {one.sentence.rstrip('.')}" for claim, one in failed)
+            raise ProofError(f"{fmu}: {len(failed)} of {len(proof.evidence)} claims do not hold: {reasons}")
+        return
+
     from rov_fmu.fmu.evidence.check import check_evidence
     from rov_fmu.fmu.proof import prove
-    from rov_fmu.report.console import print_evidence, print_proof
-    from rov_fmu.report.progress import parts
 
     evidence = check_evidence(fmu, key)
     with parts() as shown:

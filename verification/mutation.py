@@ -71,6 +71,7 @@ TESTS = {
     "rov_fmu/identify/*": "identify/test_findings.py identify/test_identify.py identify",
     "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
+    "rov_fmu/fmu/claims/*": "fmu/claims",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_identify.py",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",

@@ -54,6 +54,20 @@ def card_text(vehicle: Vehicle) -> str:
     return "\n".join(lines) + "\n"
 
 
+def read_card(text: str) -> dict[str, list[str]]:
+    """Return the paragraphs of a card by their headings, from the text that `card_text` wrote."""
+    found: dict[str, list[str]] = {}
+    paragraphs: list[str] = []
+    for line in text.splitlines():
+        if line.startswith("- "):
+            paragraphs.append(line[2:])
+        elif line.startswith("  ") and paragraphs:
+            paragraphs[-1] += f" {line.strip()}"
+        elif line:
+            paragraphs = found.setdefault(line, [])
+    return found
+
+
 def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:
     """Yield the thrust curves that push backward at small commands, and the command at which they change sign."""
     for curve in layout.curves:

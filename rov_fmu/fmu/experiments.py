@@ -19,17 +19,21 @@ NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
 MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
 _SETTINGS = ("startTime", "stopTime", "stepSize", "tolerance")
-_DEFAULT_TOLERANCE = 1e-3
+DEFAULT_TOLERANCE = 1e-3
 """The tolerance if neither the experiment nor the FMU has one."""
-_DEFAULT_STEPS = 500
+DEFAULT_STEPS = 500
 """The number of communication steps if neither the experiment nor the FMU has a step size."""
-_MOST_STEPS = 1_000_000
+MOST_STEPS = 1_000_000
 """The largest number of communication steps of an experiment. FMPy needs minutes for this number."""
 _MOST_EXPERIMENTS = 1000
 _MOST_BYTES = 20_000_000
 """The largest size of a file of the experiments."""
 _NON_NUMERIC = ("String", "Binary", "Clock")
 """The types whose variables cannot be columns of numbers."""
+
+
+class NoResultsError(FileError):
+    """An FMU without expected results."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class ReferenceResults:
         except zipfile.BadZipFile as error:
             raise FileError(f"{fmu}: is not an FMU, or is damaged: {error}") from error
         if MANIFEST not in self._archive.namelist():
-            raise self._manifest.error("there is no such file: the FMU carries no reference results")
+            raise NoResultsError(f"{self._manifest}: there is no such file: the FMU carries no reference results")
 
     def experiments(self, description: Any) -> list[Experiment]:
         """Return all experiments except those of uncertainty analyses.
@@ -108,7 +112,7 @@ class ReferenceResults:
         if len(experiments) > _MOST_EXPERIMENTS:
             raise self._manifest.error(f"names {len(experiments)} experiments; at most {_MOST_EXPERIMENTS} are run")
         if not any(experiment.references for experiment in experiments):
-            raise self._manifest.error("names no experiment with expected results")
+            raise NoResultsError(f"{self._manifest}: names no experiment with expected results")
         return experiments
 
     def _read(self, member: _Member, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
@@ -130,17 +134,17 @@ class ReferenceResults:
             numbers = {key: member.number(text, f"experiment {shown(name)}: {key}") for key, text in times.items()}
             start = numbers.get("startTime", 0.0)
             stop = numbers.get("stopTime", start + 1.0)
-            step = numbers.get("stepSize", (stop - start) / _DEFAULT_STEPS)
-            tolerance = numbers.get("tolerance", _DEFAULT_TOLERANCE)
+            step = numbers.get("stepSize", (stop - start) / DEFAULT_STEPS)
+            tolerance = numbers.get("tolerance", DEFAULT_TOLERANCE)
             steps = (stop - start) / step if step > 0.0 else 0.0
             reason = ""
             if not (steps > 0.0 and tolerance > 0.0):
                 reason = "must go on from its start, in steps, with a tolerance"
             elif tolerance >= 1.0:
                 reason = f"tolerance = {tolerance:g}: must be less than 1, or nothing would be compared"
-            elif steps > _MOST_STEPS:
+            elif steps > MOST_STEPS:
                 reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
-                reason += f"; at most {_MOST_STEPS} are run"
+                reason += f"; at most {MOST_STEPS} are run"
             if reason:
                 raise member.error(f"experiment {shown(name)}: {reason}")
             files = {part: member.resolve(one.get("source")) for part, one in parts.items()}

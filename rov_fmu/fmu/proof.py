@@ -73,18 +73,12 @@ def prove(
 
     Raises FileError, and ProofError if the FMU ends its process or exceeds a limit.
     """
-    import fmpy
-
     check_suffix(fmu, FMU)
     reference_results = ReferenceResults(fmu)
     with temporary_folder("fmu-") as folder:
         description = unpack_fmu(fmu, fmu, Path(folder))
-        platforms = fmpy.supported_platforms(folder)
         experiments = reference_results.experiments(description)
-        if fmpy.platform not in platforms:
-            raise FileError(
-                f"{fmu}: has no binary for this machine ({fmpy.platform}): {', '.join(platforms) or 'none'}"
-            )
+        check_binary(fmu, folder)
         has = [name for name, of in INTERFACES.items() if getattr(description, of)]
         if not has or (interface and interface not in has):
             raise FileError(
@@ -104,6 +98,15 @@ def prove(
             remedy = "; --time-limit allows more" if is_time else ""
             raise ProofError(f"{where}: the FMU {error}{remedy}") from error
     return findings
+
+
+def check_binary(fmu: Path, folder: str) -> None:
+    """Raise FileError if an unpacked FMU has no binary for this machine."""
+    import fmpy
+
+    platforms = fmpy.supported_platforms(folder)
+    if fmpy.platform not in platforms:
+        raise FileError(f"{fmu}: has no binary for this machine ({fmpy.platform}): {', '.join(platforms) or 'none'}")
 
 
 class _Experiments:

@@ -22,7 +22,8 @@ from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from rov_fmu.fmu.evidence.check import Evidence
+    from rov_fmu.fmu.claims.claims import Proof
+    from rov_fmu.fmu.evidence.check import MetaData
     from rov_fmu.fmu.proof import Finding
 
 DEVIATION = "+.1%"
@@ -164,7 +165,7 @@ def print_proof(findings: "Sequence[Finding]") -> None:
     print_table(found, out)
 
 
-def print_evidence(evidence: "Evidence") -> None:
+def print_evidence(evidence: "MetaData") -> None:
     """Print what the hashes in an FMU and its signature say, if it has any."""
     lines = []
     if evidence.files:
@@ -173,6 +174,16 @@ def print_evidence(evidence: "Evidence") -> None:
         lines.append(f"Signed with the key {evidence.signer}.")
     if lines:
         paragraph(console(), " ".join(lines))
+
+
+def print_claims(proof: "Proof") -> None:
+    """Print the result and the figure of every claim about an FMU."""
+    found = table("", "claim", ())
+    for column in ("result", "figure"):
+        found.add_column(column)
+    for claim, evidence in proof.evidence:
+        found.add_row(claim.name.lower(), evidence.result, evidence.figure)
+    print_table(found)
 
 
 def _deviation(f: "Finding") -> tuple[str, str]:

@@ -37,7 +37,7 @@ def report_output(results: Identification, path: Path, on_progress: Progress = s
     return Output(path, sealed(report_page(results, on_progress), "<!-- {} -->").encode())
 
 
-def _today() -> date:
+def today() -> date:
     """Return today's date (UTC), or the date of SOURCE_DATE_EPOCH, which makes builds reproducible."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     now = datetime.fromtimestamp(int(epoch), timezone.utc) if epoch.isdecimal() else datetime.now(timezone.utc)
@@ -59,7 +59,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         "report.html.j2",
         vehicle=results.vehicle,
         results=results,
-        made=made or _today(),
+        made=made or today(),
         findings=findings.by_heading(results.findings),
         next_tests=findings.next_tests(results.axes),
         repairs=findings.repairs(results),

@@ -20,7 +20,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from rov_fmu.fmu.claims.claims import prove_claims
 from rov_fmu.fmu.variables import Variable, unit_of, variables
+from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.conftest import Visit
@@ -177,6 +179,31 @@ def test_a_plot_of_the_report_zooms_by_dragging_and_by_keys(report: Path, visit:
     seen.page.keyboard.press("Escape")
     assert plot.locator(".zoomed").count() == 0
     assert not seen.problems()
+
+
+# ---- The evidence of `rov-fmu prove --report` ------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def evidence(videoray_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("evidence") / "evidence.html"
+    path.write_text(proof_page(prove_claims(videoray_fmu)), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1440])
+def test_the_evidence_asks_for_nothing_and_fits(
+    evidence: Path, visit: Callable[..., Visit], width: int, scheme: str
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    seen = visit(width=width, scheme=scheme)
+    seen.page.goto(evidence.as_uri())
+    assert (seen.messages, seen.requests) == ([], [evidence.as_uri()])
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+    assert axe.Axe().run(seen.page).response["violations"] == []
+    printed = seen.page.pdf(prefer_css_page_size=True)
+    assert 2 <= len(re.findall(rb"/Type /Page\b", printed)) <= 4
 
 
 # ---- FMPy's web app --------------------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ _PIECE = 2**20
 
 
 @dataclass(frozen=True)
-class Evidence:
+class MetaData:
     """What the meta-data and the signature of an FMU say. All of it has been checked."""
 
     files: Mapping[str, str] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Evidence:
     """The fingerprint of the key that signed the FMU; empty if there is no signature."""
 
 
-def check_evidence(fmu: Path, key: Path | None = None) -> Evidence:
+def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
     """Check the hashes in an FMU and the signature beside it. An FMU of another exporter may have neither.
 
     `key` is the file of a public key. With it, the FMU must be signed by this key.
@@ -44,7 +44,7 @@ def check_evidence(fmu: Path, key: Path | None = None) -> Evidence:
     fit; FileError if a file cannot be read; InputError if there is a signature and no library to check it.
     """
     check_suffix(fmu, FMU)
-    found = Evidence()
+    found = MetaData()
     try:
         with zipfile.ZipFile(fmu) as archive:
             if reason := refusal(archive):
@@ -62,7 +62,7 @@ def check_evidence(fmu: Path, key: Path | None = None) -> Evidence:
     return replace(found, signer=check_signature(fmu, key))
 
 
-def _read(fmu: Path, archive: zipfile.ZipFile) -> Evidence:
+def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
     """Return what the meta-data say. Raises FileError."""
     where = f"{fmu}: {META_DATA}"
     if (size := archive.getinfo(META_DATA).file_size) > _MOST_BYTES:
@@ -78,7 +78,7 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> Evidence:
         }
         for classification in root.iterfind("{*}Classification")
     }
-    return Evidence(entries.get(FILES, {}), entries.get(INPUTS, {}), entries.get(GENERATOR, {}))
+    return MetaData(entries.get(FILES, {}), entries.get(INPUTS, {}), entries.get(GENERATOR, {}))
 
 
 def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str]:

@@ -1,0 +1,134 @@
+"""The claims about an FMU that `rov-fmu prove --report` checks: each with its measurement and where to look."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rov_fmu.fmu.claims import measures
+from rov_fmu.fmu.claims.measures import Evidence
+from rov_fmu.fmu.claims.runs import RunError
+from rov_fmu.fmu.claims.subject import Subject, opened
+from rov_fmu.fmu.evidence.meta_data import META_DATA
+from rov_fmu.fmu.experiments import FOLDER
+from rov_fmu.fmu.proof import TIME_LIMIT
+from rov_fmu.io.child_process import ChildError, LimitError
+from rov_fmu.io.messages import Progress, ProofError, silent
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What an FMU should do, how it is measured, and where the details are."""
+
+    name: str
+    sentence: str
+    measure: Callable[[Subject], Evidence]
+    where: str
+
+
+CLAIMS = (
+    Claim(
+        "Expected results",
+        "The FMU gives the results that it carries.",
+        measures.expected,
+        f"{FOLDER} in the FMU; rov-fmu prove without --report prints every experiment",
+    ),
+    Claim(
+        "Step size",
+        "The result does not depend on the communication step.",
+        measures.step_size,
+        "the simulation named in the evidence, run with any steps in any importer",
+    ),
+    Claim(
+        "Repeatability",
+        "The same run gives the same bits every time.",
+        measures.repeatability,
+        "the same simulation, repeated in any importer",
+    ),
+    Claim(
+        "Conservation",
+        "Without thrust, energy comes from nowhere; without drag, none is lost.",
+        measures.conservation,
+        "the parameters a_d, b_d, F_0, W and B in modelDescription.xml, set to 0",
+    ),
+    Claim(
+        "Cost of a step",
+        "A step is fast, and takes about as long each time.",
+        measures.cost,
+        "this machine; another one has other times",
+    ),
+    Claim(
+        "Limits",
+        "What is impossible is refused, and changes nothing.",
+        measures.limits,
+        "min and max in modelDescription.xml; the log of the FMU",
+    ),
+    Claim(
+        "Hashes and signature",
+        "Nobody has changed the FMU since it was built.",
+        measures.integrity,
+        f"{META_DATA} in the FMU, and the file .sig beside it",
+    ),
+    Claim(
+        "Unseen data",
+        "Motion that the identification had not seen is predicted.",
+        measures.unseen,
+        "documentation/model_card.txt in the FMU",
+    ),
+)
+"""All claims, in the order of the report. A new claim is a function in measures.py and an entry here."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """An FMU with the evidence for every claim."""
+
+    fmu: Path
+    digest: str
+    """The SHA-256 of the file."""
+    description: Any
+    """FMPy's description of the FMU."""
+    card: dict[str, list[str]]
+    """The model card, by its headings; empty if the FMU has none."""
+    evidence: Sequence[tuple[Claim, Evidence]]
+
+    def with_result(self, result: measures.Result) -> list[tuple[Claim, Evidence]]:
+        """Return the claims that have a result."""
+        return [(claim, one) for claim, one in self.evidence if one.result == result]
+
+
+def prove_claims(
+    fmu: Path,
+    interface: str | None = None,
+    tolerance: float | None = None,
+    time_limit: float = TIME_LIMIT,
+    key: Path | None = None,
+    on_progress: Progress = silent,
+) -> Proof:
+    """Check all claims about an FMU of any exporter, and return the evidence.
+
+    The arguments are those of `prove` and of `check_evidence`; only the expected results can use Model Exchange. An FMU
+    that ends its process or exceeds a limit fails the claim that was checked, and the others are checked all the same.
+    Raises FileError.
+    """
+    with opened(fmu, interface, tolerance, time_limit, key) as subject:
+        evidence = []
+        for n, claim in enumerate(CLAIMS):
+            on_progress(claim.name.lower(), n / len(CLAIMS))
+            evidence.append((claim, _checked(claim, subject)))
+        digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
+        return Proof(fmu, digest, subject.description, measures.card_of(subject), evidence)
+
+
+def _checked(claim: Claim, subject: Subject) -> Evidence:
+    """Return the evidence for a claim, which fails if the FMU ends its process or does not run."""
+    try:
+        return claim.measure(subject)
+    except ProofError as error:
+        return Evidence("fails", f"{str(error).removeprefix(f'{subject.path}: ')}.")
+    except (ChildError, RunError) as error:
+        is_time = isinstance(error, LimitError) and error.limit == "time"
+        remedy = "; --time-limit allows more" if is_time else ""
+        who = "The FMU " if isinstance(error, ChildError) else ""
+        return Evidence("fails", f"{who}{error}{remedy}.")

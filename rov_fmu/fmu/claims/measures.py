@@ -1,0 +1,332 @@
+"""What is measured of an FMU, one function for each claim. A function returns the evidence."""
+
+import hashlib
+import re
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite, nan
+from typing import Any, Literal
+
+import numpy as np
+
+from rov_fmu.equation.catalogue import AXES, cross_of
+from rov_fmu.fmu.card import read_card
+from rov_fmu.fmu.claims.runs import Answer, Array, Plan, RunError
+from rov_fmu.fmu.claims.subject import Subject
+from rov_fmu.fmu.evidence.check import check_evidence
+from rov_fmu.fmu.proof import prove
+from rov_fmu.io.child_process import ChildError
+from rov_fmu.io.messages import brief, listed
+
+Result = Literal["holds", "fails", "measured", "does not apply"]
+"""`measured` is a fact without a promise: what a step costs, or what an FMU accepts that promised nothing."""
+_STEPS = (2, 5, 10, 50)
+"""The numbers of communication steps in each piece of a simulation that are compared with one step."""
+_RUNS, _PROCESSES, _STEPS_OF_RUN = 100, 2, 10
+_COST_SECONDS, _COST_STEPS = 1.0, 100
+_WAIT = 5.0
+"""The longest time for an answer to something impossible, s."""
+_GLIDE, _GLIDE_STEPS = 10.0, 100
+"""The length of a motion without thrust (s), and its number of steps."""
+_DRAG, _LOAD = re.compile(r"[ab]_d_\w+"), re.compile(r"F_0_\w+|[WB]")
+"""The parameters of drag, and those of constant loads, weight and buoyancy."""
+_LOSS = 1e-12
+"""The increase of an energy, relative to the energy, that is a rounding error."""
+
+
+_UNSEEN = "Unseen data: "
+"""The beginning of a paragraph of the model card about a prediction."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What was found about a claim."""
+
+    result: Result
+    sentence: str
+    figure: str = ""
+    """The number that says the most, in a few characters."""
+    heads: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    """A table of details, with its heads."""
+    curve: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """What the picture of the claim shows."""
+
+
+def _not(reason: str) -> Evidence:
+    return Evidence("does not apply", f"{reason[:1].upper()}{reason[1:]}.")
+
+
+def _tiny(value: float) -> str:
+    """Return a relative deviation with two digits, or 0."""
+    return f"{value:.1e}" if value else "0"
+
+
+def _is(holds: bool) -> Result:
+    return "holds" if holds else "fails"
+
+
+# ---- Experiments -----------------------------------------------------------------------------------------------------
+
+
+def expected(subject: Subject) -> Evidence:
+    """Compare the FMU with the results that it carries."""
+    if not subject.experiments:
+        return _not("the FMU carries no expected results (FMI-LS-REF)")
+    findings = prove(subject.path, subject.interface, subject.tolerance, subject.time_limit)
+    experiments = [*dict.fromkeys(f.experiment for f in findings)]
+    worst = [
+        max((f for f in findings if f.experiment == x), key=lambda f: f.deviation / f.tolerance) for x in experiments
+    ]
+    wrong = [f for f in findings if not f.passed]
+    largest = max(f.deviation for f in findings)
+    words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(experiments)} experiments are as expected"
+    words += f", within {max(f.tolerance for f in findings):.0e} of the largest value of each variable."
+    for f in wrong[:1]:
+        words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {_tiny(f.deviation)}'}."
+    rows = [(f.experiment, f.error or f.variable, _tiny(f.deviation), f"{f.tolerance:.0e}") for f in worst]
+    return Evidence(
+        _is(not wrong),
+        words,
+        _tiny(largest),
+        ("Experiment", "Worst variable", "Deviation", "Tolerance"),
+        rows if len(rows) <= 12 or wrong else (),
+        {"deviations": [f.deviation for f in worst], "tolerance": [f.tolerance for f in worst]},
+    )
+
+
+# ---- Runs ------------------------------------------------------------------------------------------------------------
+
+
+def step_size(subject: Subject) -> Evidence:
+    """Compare several communication steps with one, while the inputs are held."""
+    if subject.obstacle:
+        return _not(subject.obstacle)
+    if not subject.description.coSimulation.canHandleVariableCommunicationStepSize:
+        return _not("the FMU says that it needs communication steps of one size")
+    plan, refused = subject.plan, ""
+    ends: dict[int, Array] = {}
+    with subject.runs() as child:
+        for steps in (1, *_STEPS):
+            try:
+                ends[steps] = child.call("run", plan, steps)[steps::steps]
+            except RunError as error:
+                refused = f" It refuses {steps} in each piece: {error}."
+    if len(ends) < 2:
+        return _not(f"the FMU cannot be run with communication steps of several sizes.{refused.rstrip('.')}")
+    (least, first), *others = ends.items()
+    off = {steps: _deviation(subject, values, first) for steps, values in others}
+    largest, allowed = max(off.values()), subject.allowed
+    pieces = f"each of the {len(plan.pieces)} pieces with held inputs" if len(plan.pieces) > 1 else "the run"
+    begin = "one step" if least == 1 else f"{least} steps"
+    words = f"{subject.words}: {listed(map(str, off))} communication steps in {pieces} end where {begin} ends, "
+    words += f"within {_tiny(largest)} of the largest value; {allowed:.0e} is allowed.{refused}"
+    curve: dict[str, Sequence[float]] = {"steps": [*off], "deviations": [*off.values()], "allowed": [allowed]}
+    return Evidence(_is(largest <= allowed), words[:1].upper() + words[1:], _tiny(largest), curve=curve)
+
+
+def _deviation(subject: Subject, values: Array, reference: Array) -> float:
+    """Return the largest deviation, relative to the largest value of a variable or to 1 % of its nominal value."""
+    nominal = [abs(float(subject.variables[name].nominal or 0.0)) or 1.0 for name in subject.plan.outputs]
+    scale = np.maximum(np.abs(reference).max(axis=0), 0.01 * np.array(nominal))
+    same = (values == reference) | (np.isnan(values) & np.isnan(reference))
+    off = float(np.where(same, 0.0, np.abs(values - reference) / scale).max())
+    return off if isfinite(off) else inf
+
+
+def repeatability(subject: Subject) -> Evidence:
+    """Repeat a run in new instances of several processes, and compare the bytes of all results."""
+    if subject.obstacle:
+        return _not(subject.obstacle)
+    plan = subject.plan
+    found: dict[str, int] = {}
+    first = None
+    largest = 0.0
+    for _ in range(_PROCESSES):
+        with subject.runs() as child:
+            for _ in range(_RUNS // _PROCESSES):
+                values = child.call("run", plan, _STEPS_OF_RUN)
+                first = values if first is None else first
+                digest = hashlib.sha256(values.tobytes()).hexdigest()
+                found[digest] = found.get(digest, 0) + 1
+                largest = max(largest, _deviation(subject, values, first))
+    assert first is not None
+    same = next(iter(found.values()))
+    words = f"{same} of {_RUNS} runs of {subject.words} in {_PROCESSES} processes, with {first.size} numbers each, "
+    words += "have the bits of the first one."
+    if len(found) > 1:
+        words += f" The others deviate by up to {_tiny(largest)}."
+    return Evidence(_is(len(found) == 1), words, f"{same} of {_RUNS}")
+
+
+def cost(subject: Subject) -> Evidence:
+    """Measure how long a communication step takes."""
+    if subject.obstacle:
+        return _not(subject.obstacle)
+    plan, h = subject.plan, subject.step
+    steps = max(1, round((plan.stop - plan.start) / len(plan.pieces) / h))
+    with subject.runs() as child:
+        seconds = np.array(child.call("durations", plan, steps, _COST_SECONDS))
+    h = (plan.stop - plan.start) / len(plan.pieces) / steps
+    low, median, high = np.quantile(seconds, (0.05, 0.5, 0.95)).tolist()
+    words = f"The median of {len(seconds):,} communication steps of {h:.3g} s is {_time(median)}; 90 % take "
+    words += f"{_time(low)} to {_time(high)}, with the call from Python. "
+    words += f"That is {float(f'{h / median:.2g}'):,.6g} times as fast as real time."
+    bins = np.linspace(0.0, 2.0 * median, 41)
+    shares = np.histogram(np.minimum(seconds, bins[-1] * (1.0 - 1e-9)), bins)[0] / len(seconds)
+    return Evidence("measured", words, _time(median), curve={"edges": (1e6 * bins).tolist(), "shares": shares.tolist()})
+
+
+def _time(seconds: float) -> str:
+    factor, unit = next((pair for pair in ((1e6, "µs"), (1e3, "ms")) if seconds * pair[0] < 1e3), (1.0, "s"))
+    return f"{factor * seconds:.3g} {unit}"
+
+
+# ---- Laws of conservation --------------------------------------------------------------------------------------------
+
+
+def conservation(subject: Subject) -> Evidence:
+    """Let a vehicle glide without thrust and drag, and then with drag.
+
+    The energy is v' M v / 2. M is measured: its inverse has the accelerations that loads of 1 N or 1 N m give at rest.
+    """
+    if subject.obstacle:
+        return _not(subject.obstacle)
+    has = subject.variables
+    axes = [axis for axis in AXES.values() if {axis.velocity, axis.external, f"der({axis.velocity})"} <= has.keys()]
+    if not axes or not subject.is_ours:
+        return _not("it is known only of vehicles of rov-fmu which parameters switch drag and loads off")
+    loads = {name: "0" for name in has if _LOAD.fullmatch(name) or (cross_of(name) or ("",))[0] == "lift"}
+    off = loads | {name: "0" for name in has if _DRAG.fullmatch(name)}
+    if fixed := [name for name in off if has[name].causality != "parameter"]:
+        return _not(f"{listed(fixed)} cannot be set to 0")
+    inputs = {v.name: float(v.start or 0.0) for v in has.values() if v.causality == "input"}
+    velocities = [axis.velocity for axis in axes]
+    rates = tuple(f"der({name})" for name in velocities)
+    begin = {name: f"{0.5 + 0.1 * n:g}" for n, name in enumerate(velocities)}
+    with subject.runs() as child:
+
+        def accelerations(**load: float) -> Any:
+            return child.call("run", Plan(0.0, ((1e-3, inputs | load),), off, rates), 1)[0]
+
+        still = accelerations()
+        mass = np.linalg.inv(np.column_stack([accelerations(**{axis.external: 1.0}) - still for axis in axes]))
+        glides = [
+            child.call("run", Plan(0.0, ((_GLIDE, inputs),), {**set_to, **begin}, tuple(velocities)), _GLIDE_STEPS)
+            for set_to in (off, loads)
+        ]
+    free, braked = (0.5 * np.einsum("ti,ij,tj->t", v, mass, v) for v in glides)
+    drift = float(np.abs(free / free[0] - 1.0).max())
+    gain = float(np.max(np.diff(braked) / braked[0], initial=-inf))
+    allowed = subject.allowed
+    words = f"Without thrust, drag and constant loads, the kinetic energy stays the same for {_GLIDE:g} s within "
+    words += f"{_tiny(drift)}; {allowed:.0e} is allowed. With its own drag it falls from {braked[0]:.3g} J to "
+    words += f"{braked[-1]:.2g} J{' and never rises' if gain <= _LOSS else f', but rises by {_tiny(gain)} in a step'}."
+    return Evidence(_is(drift <= allowed and gain <= _LOSS), words, _tiny(drift))
+
+
+# ---- Limits ----------------------------------------------------------------------------------------------------------
+
+
+def limits(subject: Subject) -> Evidence:
+    """Ask for what is impossible, and see how the FMU answers."""
+    if subject.obstacle:
+        return _not(subject.obstacle)
+    found = [(what, _asked(subject, *call)) for what, call in _impossible(subject)]
+    refused = sum(answer.refused == answer.tried for _, answer in found)
+    changed = [what for what, answer in found if answer.kept < answer.refused]
+    accepted = [what for what, answer in found if answer.refused < answer.tried]
+    words = f"{refused} of {len(found)} kinds of impossible values and steps are refused"
+    words += f". Not refused: {listed(accepted)}." if accepted else ", and the old values stay." * (not changed)
+    if changed:
+        words += f"{'.' * (not accepted)} A refusal changes something: {listed(changed)}."
+    if accepted and not subject.is_ours:
+        words += " FMI leaves that to the FMU, so it is told, and is no failure."
+    rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in found]
+    result: Result = "fails" if changed or (accepted and subject.is_ours) else "measured" if accepted else "holds"
+    return Evidence(result, words, f"{refused} of {len(found)}", ("Asked for", "Refused", "Answer"), rows)
+
+
+def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
+    """Yield what is impossible in words, with the method of Runs and its argument."""
+    real = [
+        v
+        for v in subject.variables.values()
+        if v.type in ("Real", "Float64", "Float32") and not getattr(v, "dimensions", None)
+    ]
+    inputs = [v.name for v in real if v.causality == "input"]
+    parameters = [v for v in real if v.causality == "parameter"]
+    beyond = [(v.name, value) for v in parameters if (value := _beyond(*subject.bounds[v.name])) is not None]
+    for what, values in (
+        ("an input that is not a number", [(name, nan) for name in inputs]),
+        ("an infinite input", [(name, inf) for name in inputs]),
+        ("a parameter that is not a number", [(v.name, nan) for v in parameters]),
+        ("a parameter beyond its bounds", beyond),
+    ):
+        if values:
+            yield what, ("values_tried", values)
+    h = subject.step
+    for what, length in (
+        ("a step of 0 s", 0.0),
+        (f"a step of −{h:g} s", -h),
+        ("a step past the stop time", 2.0 * (subject.plan.stop - subject.plan.start)),
+        ("a step that is not a number", nan),
+    ):
+        yield what, ("step_tried", length)
+
+
+def _asked(subject: Subject, method: str, argument: Any) -> Answer:
+    """Return the answer of the FMU. One that ends its process, or does not answer in time, has not refused."""
+    try:
+        with subject.runs(min(_WAIT, subject.time_limit)) as child:
+            answer: Answer = child.call(method, subject.plan, argument)
+            return answer
+    except (ChildError, RunError) as error:
+        return Answer(len(argument) if method == "values_tried" else 1, 0, 0, brief(f"it {error}", 160))
+
+
+def _beyond(low: float, high: float) -> float | None:
+    """Return a value below the least one of a variable, or above the largest one; None if it has no bounds."""
+    if isfinite(low):
+        return low - max(1.0, abs(low))
+    return high + max(1.0, abs(high)) if isfinite(high) else None
+
+
+# ---- What the FMU says about itself ----------------------------------------------------------------------------------
+
+
+def integrity(subject: Subject) -> Evidence:
+    """Check the hashes in the FMU and the signature beside it. Raises ProofError if one of them does not fit."""
+    found = check_evidence(subject.path, subject.key)
+    if not (found.files or found.signer):
+        return _not("the FMU carries no hashes of its files, and no signature lies beside it")
+    signed = f"it is signed with the key {found.signer}" if found.signer else "it is not signed"
+    words = f"All {len(found.files)} files are as they were built; {signed}."
+    rows = [("Program", name, digest) for name, digest in found.generator.items()]
+    rows += [("Read by the identification", name, digest) for name, digest in found.inputs.items()]
+    return Evidence("holds", words, f"{len(found.files)} files", ("Made from", "Name", "Hash"), rows)
+
+
+def unseen(subject: Subject) -> Evidence:
+    """Repeat what the model card says about predictions of motion that the identification had not seen."""
+    paragraphs = card_of(subject).get("How far to trust it", [])
+    errors = [text.removeprefix(_UNSEEN) for text in paragraphs if text.startswith(_UNSEEN)]
+    if not errors:
+        known = f": {paragraphs[0].rstrip('.')}" if paragraphs else ""
+        return _not(f"the FMU says nothing about errors on unseen data{known}")
+    verdicts = [text.partition(". ") for text in paragraphs if re.match(r"[\w ]+: (good|usable|do not use)\.", text)]
+    bad = [verdict for verdict, _, _ in verdicts if verdict.endswith("do not use")]
+    words = f"The model card has the errors of {len(errors)} predictions."
+    if verdicts:
+        words += f" Its verdicts: {'; '.join(verdict for verdict, _, _ in verdicts)}."
+    rows = [tuple(one.rstrip(".").split(": ", 1)) for one in errors]
+    figure = f"{len(verdicts) - len(bad)} of {len(verdicts)} axes" if verdicts else ""
+    return Evidence(_is(not bad), words, figure, ("Quantity", "Error"), rows)
+
+
+def card_of(subject: Subject) -> dict[str, list[str]]:
+    """Return the model card of an FMU of ours, by its headings; an empty one if there is none."""
+    with zipfile.ZipFile(subject.path) as archive:
+        name = "documentation/model_card.txt"
+        return read_card(archive.read(name).decode(errors="replace")) if name in archive.namelist() else {}

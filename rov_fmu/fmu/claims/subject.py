@@ -1,0 +1,171 @@
+"""The FMU of which claims are checked: what it has, and the simulation that the measurements repeat."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+
+from rov_fmu.fmu.claims.runs import NUMBERS, Plan, Runs
+from rov_fmu.fmu.experiments import (
+    DEFAULT_STEPS,
+    DEFAULT_TOLERANCE,
+    MOST_STEPS,
+    Experiment,
+    NoResultsError,
+    ReferenceResults,
+)
+from rov_fmu.fmu.proof import DISK, MEMORY, TIME_LIMIT, check_binary
+from rov_fmu.fmu.unpacking import unpack_fmu
+from rov_fmu.io.child_process import ChildProcess, Limits
+from rov_fmu.io.file_kinds import FMU, check_suffix
+from rov_fmu.io.interrupts import temporary_folder
+
+_TOOL = "rov-fmu "
+"""The beginning of the generation tool of our FMUs."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An unpacked FMU, and how it is to be proved."""
+
+    path: Path
+    folder: str
+    description: Any
+    """FMPy's description of the FMU."""
+    experiments: list[Experiment]
+    """None if the FMU carries no expected results."""
+    interface: str | None = None
+    tolerance: float | None = None
+    time_limit: float = TIME_LIMIT
+    key: Path | None = None
+    """The file of the public key that must have signed the FMU; None if any key may have."""
+    variables: Mapping[str, Any] = field(init=False)
+    """FMPy's variables by name."""
+
+    def __post_init__(self) -> None:
+        """Collect the variables."""
+        object.__setattr__(self, "variables", {v.name: v for v in self.description.modelVariables})
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """The least and the largest value of each variable, by name. FMPy does not read those of FMI 3.0."""
+        root = etree.parse(str(Path(self.folder, "modelDescription.xml"))).getroot()
+        types = {one.get("name"): _attributes(one) for one in root.iterfind("TypeDefinitions/*")}
+        found = {}
+        for variable in root.iterfind("ModelVariables/*"):
+            own = _attributes(variable)
+            given = types.get(own.get("declaredType"), {}) | own
+            found[own["name"]] = float(given.get("min", -inf)), float(given.get("max", inf))
+        return found
+
+    @property
+    def is_ours(self) -> bool:
+        """True if this project says that it made the FMU."""
+        return str(self.description.generationTool or "").startswith(_TOOL)
+
+    @property
+    def obstacle(self) -> str:
+        """Why the FMU cannot be run for Co-Simulation in FMI 2.0 or 3.0, or an empty text."""
+        version = self.description.fmiVersion
+        if version[:1] not in ("2", "3"):
+            return f"it is an FMU of FMI {version}, and this is measured in FMI 2.0 and 3.0"
+        if not self.description.coSimulation:
+            return "it has no Co-Simulation"
+        return "" if self.plan.outputs else "it has no output that is a number"
+
+    @property
+    def step(self) -> float:
+        """The communication step of the default experiment, s."""
+        default = self.description.defaultExperiment
+        given = float(getattr(default, "stepSize", None) or 0.0)
+        length = self.plan.stop - self.plan.start
+        return given if length / MOST_STEPS < given <= length else length / DEFAULT_STEPS
+
+    @property
+    def experiment(self) -> Experiment | None:
+        """The experiment with the most inputs that are held between steps, or None."""
+        held = [x for x in self.experiments if x.stimuli and _pieces(x)]
+        return max(held, key=lambda x: (len(x.stimuli or ()), len(x.references or ())), default=None)
+
+    @property
+    def allowed(self) -> float:
+        """The relative tolerance of results."""
+        given = getattr(self.description.defaultExperiment, "tolerance", None)
+        own = self.experiment.tolerance if self.experiment else float(given or DEFAULT_TOLERANCE)
+        return self.tolerance or own
+
+    @property
+    def plan(self) -> Plan:
+        """The simulation to repeat: an experiment, or the default experiment with the inputs at their start values."""
+        outputs = tuple(
+            v.name
+            for v in self.variables.values()
+            if v.causality == "output" and v.type in NUMBERS and not getattr(v, "dimensions", None)
+        )
+        if experiment := self.experiment:
+            return Plan(experiment.start, _pieces(experiment), dict(experiment.parameters), outputs)
+        default = self.description.defaultExperiment
+        start, stop = (float(getattr(default, key, None) or 0.0) for key in ("startTime", "stopTime"))
+        return Plan(start, ((stop if stop > start else start + 1.0, {}),), {}, outputs)
+
+    @property
+    def words(self) -> str:
+        """The simulation in words."""
+        name = f"experiment {self.experiment.name}" if self.experiment else "default experiment"
+        return f"the {name} ({self.plan.stop - self.plan.start:.3g} s)"
+
+    @contextmanager
+    def runs(self, time: float | None = None) -> Iterator[ChildProcess]:
+        """Yield a child process with the FMU, whose calls are limited in time. Raises ChildError."""
+        limits = Limits(time=time or self.time_limit, memory=MEMORY, disk=DISK)
+        with closing(ChildProcess(Runs, self.folder, limits=limits)) as child:
+            yield child
+
+
+@contextmanager
+def opened(
+    fmu: Path,
+    interface: str | None = None,
+    tolerance: float | None = None,
+    time_limit: float = TIME_LIMIT,
+    key: Path | None = None,
+) -> Iterator[Subject]:
+    """Unpack an FMU of any exporter for a while. Raises FileError."""
+    check_suffix(fmu, FMU)
+    experiments: list[Experiment] = []
+    with temporary_folder("fmu-") as folder:
+        try:
+            results: ReferenceResults | None = ReferenceResults(fmu)
+        except NoResultsError:
+            results = None
+        description = unpack_fmu(fmu, fmu, Path(folder))
+        check_binary(fmu, folder)
+        with suppress(NoResultsError):
+            experiments = results.experiments(description) if results else []
+        yield Subject(fmu, folder, description, experiments, interface, tolerance, time_limit, key)
+
+
+def _attributes(element: Any) -> dict[str, str]:
+    """Return the attributes of a variable or of a type, which in FMI 2.0 belong to an element inside it."""
+    return {name: text for one in (element, *element.iterchildren("*")) for name, text in reversed(one.attrib.items())}
+
+
+def _pieces(experiment: Experiment) -> tuple[tuple[float, Mapping[str, float]], ...]:
+    """Return the times up to which the inputs of an experiment are held; none if an input is a ramp."""
+    assert experiment.stimuli
+    times, *columns = (list(map(float, values)) for values in experiment.stimuli.values())
+    names = [*experiment.stimuli][1:]
+    rows = list(zip(times, zip(*columns, strict=True), strict=True))
+    pieces = []
+    for (before, held), (after, then) in pairwise([*rows, (experiment.stop, rows[-1][1])]):
+        end = min(after, experiment.stop)
+        if end > max(before, experiment.start):
+            if held != then:
+                return ()
+            pieces.append((end, dict(zip(names, held, strict=True))))
+    return tuple(pieces)

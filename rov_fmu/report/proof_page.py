@@ -1,0 +1,75 @@
+"""The page of `rov-fmu prove --report`: what was claimed of an FMU, and the evidence."""
+
+import os
+import platform
+import re
+from collections.abc import Callable, Mapping
+from datetime import date
+from functools import partial
+from pathlib import Path
+
+import fmpy
+from markupsafe import Markup
+
+from rov_fmu import __version__
+from rov_fmu.fmu.claims.claims import Claim, Proof
+from rov_fmu.fmu.claims.measures import Evidence
+from rov_fmu.io.output import Output
+from rov_fmu.report.console import shell_words
+from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
+from rov_fmu.report.plots.svg import inline_svg, with_even_text
+from rov_fmu.report.report import today
+from rov_fmu.report.templates import number, page
+
+_SIZE = 3.7, 2.0
+"""The size of a plot, inches."""
+_PLOTS: Mapping[str, Callable[..., None]] = {
+    "Expected results": plot_expected,
+    "Step size": plot_steps,
+    "Cost of a step": plot_cost,
+}
+"""The plot of a claim, by its name."""
+_POWER = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+")
+
+
+def proof_output(proof: Proof, path: Path) -> Output:
+    """Return the file of the page about an FMU's evidence."""
+    return Output(path, proof_page(proof).encode())
+
+
+def proof_page(proof: Proof, *, made: date | None = None) -> str:
+    """Return the page as HTML. The same evidence and date (today by default) give the same text on one machine."""
+
+    def plot(claim: Claim, evidence: Evidence) -> Markup | None:
+        if not evidence.curve:
+            return None
+        draw = with_even_text(partial(_PLOTS[claim.name], **evidence.curve))
+        return inline_svg(f"{claim.name}: {evidence.sentence}", draw, _SIZE, salt=claim.name)
+
+    description = proof.description
+    return page(
+        "proof.html.j2",
+        proof=proof,
+        made=made or today(),
+        name=description.modelName,
+        about=description.description or "",
+        tool=description.generationTool or "an unknown tool",
+        interfaces=[
+            words
+            for words, has in (
+                ("Co-Simulation", description.coSimulation),
+                ("Model Exchange", description.modelExchange),
+            )
+            if has
+        ],
+        machine=f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors, "
+        f"Python {platform.python_version()}, FMPy {fmpy.__version__}, rov-fmu {__version__}",
+        command=shell_words("rov-fmu", "prove", proof.fmu.name, "--report", "report.html"),
+        plot=plot,
+        powers=_powers,
+    )
+
+
+def _powers(text: str) -> str:
+    """Return a sentence in which 1.1e-15 is 1.1·10⁻¹⁵."""
+    return _POWER.sub(lambda found: number(float(found[0]), 2), text)

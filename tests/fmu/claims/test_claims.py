@@ -1,0 +1,327 @@
+"""`rov-fmu prove --report`: every claim holds for the VideoRay, and fails for an FMU that breaks it."""
+
+import re
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from lxml import html
+from pythonfmu import FmuBuilder
+
+from rov_fmu.cli import main
+from rov_fmu.fmu.claims import measures
+from rov_fmu.fmu.claims.claims import CLAIMS, Proof, prove_claims
+from rov_fmu.fmu.claims.measures import Evidence
+from rov_fmu.fmu.claims.subject import Subject, opened
+from rov_fmu.fmu.experiments import FOLDER
+from rov_fmu.report.proof_page import proof_page
+
+Capsys = pytest.CaptureFixture[str]
+Measure = Callable[[Subject], Evidence]
+VERSIONS = ["videoray_fmu", pytest.param("videoray3_fmu", marks=pytest.mark.long)]
+
+TOOLS = Path(__file__).parents[3] / "verification/interoperability/.tools"
+
+_SLAVE = """
+import os, random, time
+from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
+
+class Slave(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.k, self.X_ext, self.u, self.noise = 0.0, 0.0, 1.0, random.random()
+        parameter, output = Fmi2Causality.parameter, Fmi2Causality.output
+        self.register_variable(Real("k", causality=parameter, variability=Fmi2Variability.tunable))
+        self.register_variable(Real("X_ext", causality=Fmi2Causality.input))
+        self.register_variable(Real("u", causality=output, start=1.0, initial=Fmi2Initial.exact))
+        self.register_variable(
+            Real("der(u)", causality=output, getter=lambda: self.X_ext, setter=lambda _: None)
+        )
+
+    def do_step(self, t, h):
+        STEP
+        return True
+"""
+"""A body of 1 kg without drag. `STEP` is replaced by what it does in a step."""
+_EXACT = "self.u += self.X_ext * h"
+
+
+def slave(step: str, folder: Path, *, ours: bool = False) -> Path:
+    """Return an FMU that does this in a step. If `ours`, it says that rov-fmu made it."""
+    (folder / "slave.py").write_text(_SLAVE.replace("STEP", step), encoding="utf-8")
+    built = Path(FmuBuilder.build_FMU(folder / "slave.py", dest=folder))
+
+    def changed(content: bytes) -> bytes:
+        return re.sub(rb'generationTool="[^"]*"', b'generationTool="rov-fmu 0"', content) if ours else content
+
+    return altered(built, {"modelDescription.xml": changed}, folder / "other.fmu")
+
+
+def altered(fmu: Path, changes: Mapping[str, Callable[[bytes], bytes]], path: Path) -> Path:
+    """Write a copy of an FMU in which some files are changed, and return its path."""
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, changes[name](content) if name in changes else content)
+    return path
+
+
+def measured(measure: Measure, fmu: Path) -> Evidence:
+    with opened(fmu) as subject:
+        return measure(subject)
+
+
+# ---- The VideoRay ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def proof(videoray_fmu: Path) -> Proof:
+    return prove_claims(videoray_fmu)
+
+
+def test_every_claim_that_applies_to_the_videoray_holds(proof: Proof) -> None:
+    assert [one.result for _, one in proof.evidence] == ["holds"] * 4 + ["measured", "holds", "holds", "does not apply"]
+    figures = {claim.name: one.figure for claim, one in proof.evidence}
+    assert float(figures["Expected results"]) < 1e-10
+    assert float(figures["Step size"]) < 1e-14
+    assert float(figures["Conservation"]) < 1e-14
+    assert (figures["Repeatability"], figures["Limits"]) == ("100 of 100", "8 of 8")
+
+
+QUESTIONS = {
+    "Which file is it?": "SHA-256 of the file",
+    "Which claims hold?": "6 hold Expected results, Step size, Repeatability, Conservation, Limits, Hashes",
+    "Does it give its expected results?": "63 of 63 results of 29 experiments are as expected, within 10⁻⁹",
+    "Does the step size matter?": "2, 5, 10 and 50 communication steps in each of the 4 pieces with held inputs",
+    "Is a run repeatable?": "100 of 100 runs of the experiment manoeuvre (8 s) in 2 processes",
+    "Does it keep its energy?": "Without thrust, drag and constant loads, the kinetic energy stays the same for 10 s",
+    "What does it do with NaN?": "fmi2SetReal: V_E = nan is not a finite number; it stays 0.",
+    "Has it been changed?": "files are as they were built; it is not signed.",
+    "How well is unseen motion predicted?": "The FMU says nothing about errors on unseen data: No errors",
+    "Does it conform to a standard?": "It claims no conformity to any standard.",
+}
+"""Ten questions of someone who has the page alone, and the words that answer them."""
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_the_page_answers(question: str, proof: Proof) -> None:
+    root = html.fromstring(proof_page(proof))
+    for drawn in root.xpath("//svg | //style"):
+        drawn.drop_tree()
+    text = " ".join(" ".join(root.xpath("//body//text()")).split())
+    assert QUESTIONS[question] in text
+    assert proof.digest in text
+
+
+def test_the_page_is_complete_and_loads_nothing(proof: Proof) -> None:
+    page = proof_page(proof)
+    assert "default-src 'none'; style-src 'unsafe-inline'\"" in page
+    assert "<script" not in page
+    assert page.count("<svg") == 3
+    for claim, evidence in proof.evidence:
+        assert claim.sentence in page
+        assert f'<section class="claim {evidence.result.replace(" ", "-")}">' in page
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_what_is_impossible_is_refused_in_both_versions(version: str, request: pytest.FixtureRequest) -> None:
+    found = measured(measures.limits, request.getfixturevalue(version))
+    assert (found.result, found.figure) == ("holds", "8 of 8")
+    assert [row[1] for row in found.rows] == ["8 of 8", "8 of 8", "20 of 20", "20 of 20", *["1 of 1"] * 4]
+
+
+@pytest.mark.long
+def test_a_vehicle_with_coupling_and_lag_keeps_its_energy(everything_dir: Path, six_dir: Path, tmp_path: Path) -> None:
+    for folder in (everything_dir, six_dir):
+        with zipfile.ZipFile(tmp_path / "vehicle.fmu", "w") as archive:
+            for path in folder.rglob("*"):
+                archive.write(path, path.relative_to(folder))
+        found = measured(measures.conservation, tmp_path / "vehicle.fmu")
+        assert found.result == "holds", found.sentence
+
+
+# ---- FMUs that break a claim -----------------------------------------------------------------------------------------
+
+
+def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    """The page is written all the same, and one line says what does not hold."""
+    name = f"{FOLDER}/surge_70_tuned_expected.csv"
+    fmu = altered(
+        videoray_fmu, {name: lambda old: re.sub(rb"(\.\d\d\d)\d*\n$", rb"\g<1>1\n", old)}, tmp_path / "other.fmu"
+    )
+    page = tmp_path / "page.html"
+    assert main(["prove", str(fmu), "--report", str(page)]) == 1
+    out, err = capsys.readouterr()
+    (line,) = [line for line in err.splitlines() if "do not hold" in line]
+    assert line.startswith(f"rov-fmu: {fmu}: 1 of 8 claims do not hold: expected results: 62 of 63 results of 29")
+    assert "Experiment surge_70_tuned: x deviates by" in line
+    assert re.search(r"expected results +fails", out)
+    assert "Experiment surge_70_tuned: x deviates by" in page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("step", "result"),
+    [(_EXACT, "holds"), ("self.u -= h * self.u", "fails"), ("self.u = 1.0 if h < 0.9 else float('nan')", "fails")],
+)
+def test_a_result_that_depends_on_the_step_size_is_found(step: str, result: str, tmp_path: Path) -> None:
+    found = measured(measures.step_size, slave(step, tmp_path))
+    assert found.result == result, found.sentence
+    if "self.u - h" in step:
+        assert float(found.figure) == pytest.approx(1.0, rel=0.5), "one step ends at 0, and many near exp(-1)"
+
+
+@pytest.mark.parametrize(
+    ("step", "result"), [(_EXACT, "holds"), ("self.u += self.noise * h", "fails"), ("self.u = -self.u", "holds")]
+)
+def test_a_run_that_is_not_repeatable_is_found(step: str, result: str, tmp_path: Path) -> None:
+    found = measured(measures.repeatability, slave(step, tmp_path))
+    assert found.result == result
+    assert found.figure == ("100 of 100" if result == "holds" else "1 of 100")
+
+
+@pytest.mark.parametrize(
+    ("step", "result"),
+    [(_EXACT, "holds"), (f"{_EXACT}; self.u *= 1.0 + 1e-4", "fails"), (f"{_EXACT}; self.u *= 1.0 - 1e-4", "fails")],
+)
+def test_energy_that_comes_from_nowhere_is_found(step: str, result: str, tmp_path: Path) -> None:
+    found = measured(measures.conservation, slave(step, tmp_path, ours=True))
+    assert found.result == result, found.sentence
+    assert ("but rises" in found.sentence) == ("+ 1e-4" in step)
+
+
+def test_a_law_of_conservation_is_not_tested_on_a_strangers_fmu(tmp_path: Path) -> None:
+    found = measured(measures.conservation, slave(_EXACT, tmp_path))
+    assert found.result == "does not apply"
+    assert found.sentence == "It is known only of vehicles of rov-fmu which parameters switch drag and loads off."
+
+
+def test_the_cost_of_a_slow_step_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measures, "_COST_SECONDS", 0.2)
+    found = measured(measures.cost, slave("time.sleep(0.002)", tmp_path))
+    assert found.result == "measured"
+    number, unit = found.figure.split()
+    assert unit == "ms"
+    assert 2.0 <= float(number) < 50.0
+    assert sum(found.curve["shares"]) == pytest.approx(1.0)
+
+
+def test_what_is_accepted_is_told_and_fails_where_it_was_promised(tmp_path: Path) -> None:
+    for ours in (False, True):
+        found = measured(measures.limits, slave(_EXACT, tmp_path, ours=ours))
+        assert found.result == ("fails" if ours else "measured")
+        assert "Not refused: an input that is not a number, an infinite input, a parameter that is" in found.sentence
+        assert ("FMI leaves that to the FMU" in found.sentence) == (not ours)
+
+
+def test_a_refusal_that_changes_something_is_found(tmp_path: Path) -> None:
+    step = "self.u += 1.0 if h <= 0.0 or h != h or h > 1.0 else h * self.X_ext; return 0.0 < h <= 1.0"
+    found = measured(measures.limits, slave(step, tmp_path))
+    assert found.result == "fails"
+    assert "A refusal changes something: a step of 0 s, " in found.sentence
+
+
+def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measures, "_WAIT", 1.0)
+    step = "h == 0.0 and time.sleep(30.0); h < 0.0 and os.abort(); h > 1.0 and os._exit(3)"
+    found = measured(measures.limits, slave(step, tmp_path))
+    answers = {row[0]: row[2] for row in found.rows}
+    assert answers["A step of 0 s"] == "it needs more than 1 s"
+    assert answers["A step of −0.002 s"] == "it ended its process: SIGABRT"
+    assert answers["A step past the stop time"] == "it ended its process: exit code 3"
+
+
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [
+        ("modelDescription.xml", "videoray_fmu"),
+        ("sources/step.c", "videoray_fmu"),
+        pytest.param("modelDescription.xml", "videoray3_fmu", marks=pytest.mark.long),
+        pytest.param("sources/step.c", "videoray3_fmu", marks=pytest.mark.long),
+    ],
+)
+def test_one_changed_byte_is_found(name: str, version: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    fmu = altered(
+        request.getfixturevalue(version), {name: lambda old: old.replace(b"the ", b"teh ", 1)}, tmp_path / "other.fmu"
+    )
+    with pytest.raises(ProofError, match=rf"other.fmu: {re.escape(name)}: was altered after the FMU was built"):
+        measured(measures.integrity, fmu)
+
+
+@pytest.mark.parametrize(("verdict", "result"), [("good", "holds"), ("usable", "holds"), ("do not use", "fails")])
+def test_the_errors_on_unseen_data_are_those_of_the_model_card(
+    verdict: str, result: str, videoray_fmu: Path, tmp_path: Path
+) -> None:
+    card = f"Model card\n\nHow far to trust it\n- surge: {verdict}. The 95% bands contain\n  90%.\n"
+    card += "- Unseen data: surge velocity: off by 0.15 m/s (RMS) in log_3.csv, and a\n  prediction of no "
+    card += "change by 1 m/s.\n"
+    fmu = altered(videoray_fmu, {"documentation/model_card.txt": lambda _: card.encode()}, tmp_path / "other.fmu")
+    found = measured(measures.unseen, fmu)
+    assert found.result == result
+    assert found.rows == [
+        ("surge velocity", "off by 0.15 m/s (RMS) in log_3.csv, and a prediction of no change by 1 m/s")
+    ]
+    assert f"Its verdicts: surge: {verdict}." in found.sentence
+
+
+# ---- Any FMU ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_strangers_fmu_gets_the_rows_that_apply(tmp_path: Path, capsys: Capsys) -> None:
+    page = tmp_path / "page.html"
+    assert main(["prove", str(slave(_EXACT, tmp_path)), "--report", str(page)]) == 0
+    out, err = capsys.readouterr()
+    assert "do not hold" not in err
+    results = [re.split("  +", line)[1] for line in out.splitlines() if line.split("  ")[0] in _NAMES]
+    none = "does not apply"
+    assert [one.strip() for one in results] == [none, "holds", "holds", none, "measured", "measured", none, none]
+    assert "The FMU carries no expected results (FMI-LS-REF)." in page.read_text(encoding="utf-8")
+
+
+_NAMES = {claim.name.lower() for claim in CLAIMS}
+
+
+def test_an_fmu_that_ends_its_process_fails_its_claims_and_gets_a_page(tmp_path: Path, capsys: Capsys) -> None:
+    page = tmp_path / "page.html"
+    assert main(["prove", str(slave("os.abort()", tmp_path)), "--report", str(page)]) == 1
+    err = capsys.readouterr().err.splitlines()[-1]
+    assert "3 of 8 claims do not hold: step size: The FMU ended its process: SIGABRT; repeatability: The FMU" in err
+    assert page.read_text(encoding="utf-8").count("The FMU ended its process: SIGABRT.") == 3
+
+
+def test_a_page_that_cannot_be_written_is_told_before_anything_runs(
+    videoray_fmu: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    for target, reason in (
+        (tmp_path, "cannot be written: is a folder, not a file to write"),
+        (tmp_path / "page.csv", "would be a page (HTML), but .csv is the suffix of a recording or a table (CSV)"),
+        (tmp_path / "none" / "page.html", f"cannot be written: there is no folder {tmp_path / 'none'}"),
+        (videoray_fmu, f"cannot be written: would overwrite {videoray_fmu}, an input or another output"),
+    ):
+        assert main(["prove", str(videoray_fmu), "--report", str(target)]) == 2
+        assert capsys.readouterr().err == f"rov-fmu: {target}: {reason}\n"
+
+
+_BALLS = [*TOOLS.glob("python*/lib/python*/site-packages/fmpy/modelica/FMI/Resources/FMUs/*/modelDescription.xml")]
+"""The unpacked FMUs of Reference-FMUs that are part of FMPy 0.3.20, which CoFMPy pins."""
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_bouncing_ball_of_the_reference_fmus_gets_a_report(version: str, tmp_path: Path, capsys: Capsys) -> None:
+    """Its maker promised little, so it fails nothing. It never answers to a step that is not a number."""
+    wanted = (b'modelName="BouncingBall"', f'fmiVersion="{version}"'.encode())
+    found = [path.parent for path in _BALLS if all(words in path.read_bytes() for words in wanted)]
+    if not found:
+        pytest.skip("python -m verification.interoperability --install python installs the reference FMUs")
+    fmu, page = tmp_path / "BouncingBall.fmu", tmp_path / "page.html"
+    with zipfile.ZipFile(fmu, "w") as archive:
+        for path in found[0].rglob("*"):
+            archive.write(path, path.relative_to(found[0]))
+    assert main(["prove", str(fmu), "--report", str(page)]) == 0
+    assert "do not hold" not in capsys.readouterr().err
+    text = page.read_text(encoding="utf-8")
+    assert f"FMI {version}, Co-Simulation and Model Exchange, made by Reference FMUs" in text
+    assert "100 of 100 runs of the default experiment (3 s)" in text
+    assert "it needs more than 5 s" in text
+    assert text.count('<p class="result">does not apply</p>') == 4
