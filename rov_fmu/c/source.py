@@ -276,7 +276,10 @@ class EquationSource:
 
     def output_lines(self) -> list[str]:
         """Return statements that assign the outputs that follow from the states."""
-        return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
+        outputs = self.equation.outputs
+        formulas = {**_needed(self.equation.orientation, outputs.values()), **outputs}
+        places = {name: f"at[REF_{name}]" for name in outputs if name in self.layout.calculated}
+        return _statements(formulas, places, self._in_c)
 
     def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""

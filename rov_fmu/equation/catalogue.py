@@ -338,6 +338,11 @@ ANGLES = {
     **HEADING,
 }
 """The Euler angles, which are calculated from the quaternion."""
+OUTSIDE = Declaration(
+    "1",
+    "How far the largest command, velocity, roll or pitch is beyond its identified range, relative to it; 0 inside",
+)
+"""The output of a vehicle whose identified ranges are known."""
 ANGLES_AT_START = {name: Declaration("rad", f"{words} at the start") for name, words in INITIAL.items()}
 """The parameters that give the attitude at the start."""
 CURRENT = {

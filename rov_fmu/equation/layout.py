@@ -33,6 +33,7 @@ from .catalogue import (
     HEADING,
     HEAVE,
     LEAST_BETA,
+    OUTSIDE,
     PITCH,
     POSITION,
     RESTORING,
@@ -322,6 +323,19 @@ class VehicleAxis(Part):
 _Part = TypeVar("_Part", Curve, VehicleAxis)
 
 
+class Range(NamedTuple):
+    """The range of a quantity over which a vehicle was identified."""
+
+    name: str
+    """The variable, or EVERY_COMMAND."""
+    low: float
+    high: float
+
+
+EVERY_COMMAND = "command"
+"""The quantity whose range limits the size of the commands of all thrusters."""
+
+
 class Owner(NamedTuple):
     """A table of the vehicle file with coefficients."""
 
@@ -362,6 +376,8 @@ class Layout:
     """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
     voltage_source: str = field(default="", compare=False)
     """The source of `voltage`."""
+    identified: tuple[Range, ...] = ()
+    """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
 
     def __post_init__(self) -> None:
         """Name the coefficients. The curves main and main_reverse would both have a coefficient d_main_reverse.
@@ -646,8 +662,8 @@ class Layout:
     def calculated(self) -> dict[str, Declaration]:
         """The calculated variables that are neither states nor rates.
 
-        They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, and the Euler
-        angles of a vehicle with an attitude. Forces and torques are those before the tuning α.
+        They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, the Euler angles
+        of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
         """
         found = {
             f"F_{t.name}": _thrust(t, self.curve_of[t.name])
@@ -658,12 +674,17 @@ class Layout:
             of = f"of the {curve.description}" if curve.description else curve.name
             words = f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard"
             found[f"tau_{curve.name}"] = Declaration("N.m", words)
-        return found | self.angles
+        return found | self.angles | self.outside
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:
         """The Euler angles, which are calculated from the quaternion."""
         return ANGLES if self.has_attitude else {}
+
+    @cached_property
+    def outside(self) -> dict[str, Declaration]:
+        """The output that says how far the vehicle is outside of what was identified, if the ranges are known."""
+        return {"outside": OUTSIDE} if self.identified else {}
 
     @cached_property
     def at_rest(self) -> dict[str, float]:

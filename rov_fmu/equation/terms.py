@@ -16,9 +16,9 @@ from itertools import combinations
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
-from .expression import Expression, Name, Names, call, directed, of, product, scaled, total
+from .expression import Expression, Name, Names, call, directed, of, product, scaled, total, where
 from .forces import COUPLING, Effect, Force, forces_of, thrusts
-from .layout import Layout, ThrustTable
+from .layout import EVERY_COMMAND, Layout, Range, ThrustTable
 from .mass import MassMatrix
 from .thrust import steady_name, thrust_formulas
 
@@ -85,7 +85,8 @@ class Equation:
     The arrived fraction p rises from 0 towards 1 during a piece of a step. Each force is then F + (steady - F) p."""
 
     outputs: Mapping[str, Expression] = field(default_factory=dict)
-    """Formulas for calculated variables that follow from the states, the orientation and the other formulas."""
+    """Formulas for calculated variables that follow from the states, the orientation and the other formulas, and for
+    what they need."""
     ends: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
     tables: Mapping[str, ThrustTable] = field(default_factory=dict)
@@ -256,7 +257,7 @@ def equation_of(layout: Layout) -> Equation:
             for curve in layout.curves
             if curve.has_lag
         },
-        outputs=angle_formulas() if layout.has_attitude else {},
+        outputs=(angle_formulas() if layout.has_attitude else {}) | _outside(layout, table.names),
         ends=quaternion_formulas() if layout.has_attitude else {},
         tables=tables,
         names=table.names,
@@ -488,3 +489,33 @@ def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
             for name, terms in rotation_terms(row, velocities).items():
                 rows[name] = tuple(Term(of(sign), factors) for sign, factors in terms)
     return rows
+
+
+def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
+    """Return formulas for the output `outside`, if the identified ranges are known.
+
+    Each quantity x with the range [low, high] gives max(x - high, low - x, 0) / (high - low), and the largest of these
+    counts. A range always includes 0, from where every motion begins. Of a command, the size counts.
+    """
+    if not layout.identified:
+        return {}
+    found: dict[str, Expression] = {}
+    limited = {*layout.velocities, *(name for name in ("phi", "theta") if name in layout.angles)}
+    largest: Expression = of(0.0)
+    for one in layout.identified:
+        quantities: dict[tuple[str, ...], Expression] = {(one.name,): Name(one.name)} if one.name in limited else {}
+        if one.name == EVERY_COMMAND:
+            quantities = {(one.name, t.name): call("abs", names("command", t.name)) for t in layout.thrusters}
+        for owners, x in quantities.items():
+            beyond, up_to = names("outside", *owners), names("largest", *owners)
+            found[beyond.identifier] = _beyond(x, one)
+            found[up_to.identifier] = where(largest < beyond, beyond, largest)
+            largest = up_to
+    return {**found, "outside": largest}
+
+
+def _beyond(x: Expression, known: Range) -> Expression:
+    """Return how far a quantity is beyond a range, relative to the range with 0 in it."""
+    low, high = min(known.low, 0.0), max(known.high, 0.0)
+    beyond = where(x > high, x - high, where(x < low, low - x, 0.0))
+    return beyond / (high - low)

@@ -6,11 +6,15 @@ file documentation/model_card.txt, and in the annotations of modelDescription.xm
 
 from collections.abc import Iterator, Mapping
 from itertools import chain
+from math import degrees
 from textwrap import fill
 
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.forces import EXPECTED, effects_of
-from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.layout import EVERY_COMMAND, Layout, Range
 from rov_fmu.io.messages import listed
+from rov_fmu.vehicle.description import UNIT_OF_RANGE
+from rov_fmu.vehicle.uncertainty import significant
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
@@ -36,6 +40,12 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
         trust = [*made.verdicts, *(f"Unseen data: {error}." for error in made.errors)]
         trust += [f"Open: {warning}." for warning in made.warnings] or ["There are no warnings."]
         holds += [f"Tested: {quantity}." for quantity in made.tested]
+    if vehicle.layout.identified:
+        holds += [f"Tested: {words}." for words in map(_in_words, vehicle.layout.identified) if words]
+        holds.append(
+            "The output outside is 0 while the commands, velocities, roll and pitch are within these ranges or between "
+            "them and 0; otherwise, it is the largest excess relative to its range."
+        )
     return {
         "What it is": [f"{vehicle.name}, version {vehicle.version}. {vehicle.summary}."],
         "From which data": data,
@@ -43,6 +53,18 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
         "How far to trust it": trust,
         "What it leaves out": [*_left_out(vehicle.layout), *vehicle.limits],
     }
+
+
+def _in_words(known: Range) -> str:
+    """Return a range that was tested in words; nothing for that of the commands, which the card has already."""
+    if known.name == EVERY_COMMAND:
+        return ""
+    unit = UNIT_OF_RANGE[known.name]
+    factor, shown = (degrees(1.0), unit.replace("rad", "deg")) if unit.startswith("rad") else (1.0, unit)
+    velocities = {axis.velocity: f"{axis.name} velocity" for axis in AXES.values()}
+    name = (velocities | {"phi": "roll", "theta": "pitch", "z": "depth"})[known.name]
+    low, high = (significant(factor * end, 2) for end in (known.low, known.high))
+    return f"{name}: {low} to {high} {shown}"
 
 
 def card_text(vehicle: Vehicle) -> str:

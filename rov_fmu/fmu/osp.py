@@ -61,6 +61,7 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     scalar, *vector = QUATERNION
     yield "quaternion_scalar", {scalar: None}
     yield "quaternion_vector", dict.fromkeys(vector)
+    yield "validity", {"outside": None}
 
 
 def osp_model_description(layout: Layout) -> bytes:

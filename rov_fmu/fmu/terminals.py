@@ -33,12 +33,12 @@ class Terminal:
 def terminals(layout: Layout) -> list[Terminal]:
     """Return the terminals of a vehicle. Every input and output is in exactly one.
 
-    All calculated variables except the Euler angles are in the terminal `thrust`.
+    All calculated variables except the Euler angles and `outside` are in the terminal `thrust`.
     """
     battery = ("voltage",) if layout.voltage is not None else ()
     loads = tuple(own.axis.external for own in layout.axes)
     current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
-    thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles)
+    thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles | layout.outside)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     driven = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
@@ -51,6 +51,9 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),
+        Terminal(
+            "validity", "output", "plug", "How far the motion is beyond what was identified", tuple(layout.outside)
+        ),
     ]
     return [terminal for terminal in groups if terminal.members]
 

@@ -10,7 +10,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
+from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -28,9 +29,11 @@ from rov_fmu.identify.result import (
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.tank import findings
+from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, SentenceForm
 from rov_fmu.tank.log import Log
+from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.uncertainty import significant, with_interval
 
 Heading = Literal["Warnings", "Doubts", "Facts"]
@@ -211,10 +214,11 @@ def told(identification: Identification) -> Identification:
         "facts": facts(findings),
         "verdicts": tuple(map(verdict_in_words, identification.axes)),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
-        "tested": tuple(_tested(identification)),
     }
     made = made.model_copy(update=sentences_of)
-    vehicle = replace(identification.vehicle, provenance=made)
+    vehicle = identification.vehicle
+    layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
+    vehicle = replace(vehicle, layout=layout, provenance=made)
     return replace(identification, findings=findings, vehicle=vehicle)
 
 
@@ -350,23 +354,36 @@ def with_error(known: tuple[float, Interval], unit: str) -> str:
     return f"{words} ±{half:.0%}" if half < 1.0 else f"{words} ±>100%"
 
 
-def _tested(identification: Identification) -> Iterator[str]:
-    """Yield the range of each velocity and depth in the logs and tables."""
-    ranges: dict[tuple[str, str], list[float]] = {}
+def _ranges(identification: Identification) -> Iterator[Range]:
+    """Yield the range of the commands, and those of each velocity, of roll and pitch and of the depth in the tests.
+
+    The ends have three digits, and an end that is next to nothing is no range.
+    """
+    found: dict[str, list[float]] = {}
     for one in identification.folder.logs:
         for channel in one.channels:
-            quantity = channel.quantity
-            if not (channel.unused or quantity.wraps or quantity.axis is None):
+            if not channel.unused and (name := _variable(channel.quantity)):
                 ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
-                ranges.setdefault((quantity.name, quantity.unit), []).extend(ends)
+                found.setdefault(name, []).extend(ends)
     for result in identification.axes:
-        for p in result.points:
-            if p.quantity == "V_ss":
-                ranges.setdefault((f"{result.axis.name} velocity", p.unit), []).append(p.measured)
-    for (name, unit), values in ranges.items():
-        factor, shown = in_degrees(unit)
-        low, high = (significant(factor * end, 2) for end in (min(values), max(values)))
-        yield f"{name}: {low} to {high}{unit_after(shown)}"
+        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
+        if measured:
+            found.setdefault(result.axis.velocity, []).extend(measured)
+    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in found.items()}
+    if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
+        yield Range(EVERY_COMMAND, 0.0, float(f"{identification.vehicle.command_range[1]:.6g}"))
+        yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
+
+
+def _variable(quantity: Quantity) -> str:
+    """Return the variable of the FMU that a sensor measures, if its range tells where the vehicle was identified."""
+    if quantity.axis is None:
+        return ""
+    return quantity.axis.velocity if quantity.is_velocity else _POSITIONS.get(quantity.axis, "")
+
+
+_POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta"}
+"""The variables of the depth and of the angles from the level."""
 
 
 def size_in_words(value: float, unit: str) -> str:

@@ -10,10 +10,13 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
+from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.io.field_types import Name, Text, not_blank, printable
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped
 from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
+from rov_fmu.vehicle.quantity import Interval
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
 """Names of devices in Windows. No file can have such a name there, whatever its extension."""
@@ -102,6 +105,37 @@ def _below_maximum(low: float, info: ValidationInfo) -> float:
     return low
 
 
+UNIT_OF_RANGE = {axis.velocity: axis.unit for axis in AXES.values()} | {"phi": "rad", "theta": "rad", "z": "m"}
+"""The quantities that a range may be given for, and their units."""
+LEAST_RANGE = 1e-6
+"""The least size of the larger end of a range, in SI units."""
+
+
+def _not_empty(ends: tuple[float, float]) -> tuple[float, float]:
+    """Return the ends of a range if they are in order and not both 0. Raises ValueError."""
+    if not (ends[0] <= ends[1] and max(map(abs, ends)) >= LEAST_RANGE):
+        raise ValueError(f"must be [low, high], and one of them at least {LEAST_RANGE:g} away from 0")
+    return ends
+
+
+class IdentifiedRange(Strict):
+    """The range of a velocity, of an angle or of the depth over which the vehicle was identified."""
+
+    range: Annotated[Interval, AfterValidator(_not_empty)]
+    """The ends, [low, high]."""
+    unit: Literal["m/s", "rad/s", "rad", "m"]
+
+
+def _with_their_units(ranges: dict[str, IdentifiedRange]) -> dict[str, IdentifiedRange]:
+    """Return the ranges if each belongs to a quantity and has its unit. Raises ValueError."""
+    for name, one in ranges.items():
+        if name not in UNIT_OF_RANGE:
+            raise ValueError(f"must have ranges of {', '.join(UNIT_OF_RANGE)}, and not of {name}")
+        if one.unit != UNIT_OF_RANGE[name]:
+            raise ValueError(f"must have the range of {name} in {UNIT_OF_RANGE[name]}, and not in {one.unit}")
+    return ranges
+
+
 class Validity(Strict):
     """The range of thruster commands in which the model holds, and what it leaves out."""
 
@@ -109,6 +143,9 @@ class Validity(Strict):
     """The strongest thruster command for which the model was identified, as a fraction of the full command."""
     command_min: Annotated[_Command, AfterValidator(_below_maximum)]
     """The weakest thruster command for which the model was identified."""
+    identified: Annotated[dict[str, IdentifiedRange], AfterValidator(_with_their_units)] = Field(default={})
+    """The ranges over which the vehicle was identified: velocities u, v, w, p, q, r, roll phi, pitch theta and depth z.
+    `rov-fmu identify` writes them. With them, the FMU has the output `outside`."""
     limits: _Sentences = ()
     """Known effects on this vehicle that the model leaves out, in sentences. They appear in the FMU's documentation."""
 
@@ -116,6 +153,14 @@ class Validity(Strict):
     def command_range(self) -> tuple[float, float]:
         """The weakest and the strongest command."""
         return self.command_min, self.command_max
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """The ranges as the layout has them; none if there are only those of the commands."""
+        if not self.identified:
+            return ()
+        measured = (Range(name, *one.range) for name, one in self.identified.items())
+        return (Range(EVERY_COMMAND, 0.0, self.command_max), *measured)
 
 
 def _report(name: object, info: ValidationInfo) -> Path:
@@ -144,7 +189,8 @@ class Provenance(Strict):
     errors: _Sentences = ()
     """The errors of predictions of unseen data."""
     tested: _Sentences = ()
-    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`."""
+    """The ranges of what was measured, such as `depth: 0.2 to 3.1 m`, as earlier versions wrote them. Now
+    `[validity.identified]` has them."""
     warnings: _Sentences = ()
     """What the data do not determine, and what speaks against the model, in sentences."""
     facts: _Sentences = ()

@@ -355,9 +355,10 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     file, problems, lost = read_tables(data, File, {"folder": path.parent, "coming": coming})
     if mistakes := [*problem_lines(problems, data, File), *check_parts(file, lost, data)]:
         raise VehicleFileError(*lines_on(path, mistakes))
-    head, validity, layout = file.vehicle, file.validity, file.layout
+    head, validity = file.vehicle, file.validity
     assert head, "read_tables tells that it is missing"
     assert validity, "read_tables tells that it is missing"
+    layout = replace(file.layout, identified=validity.ranges)
     found = file.quantities(layout)
     coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
     if mistakes := [*check_mass(layout, coefficients)]:

@@ -9,13 +9,13 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from rov_fmu.equation.layout import Curve
+from rov_fmu.equation.layout import EVERY_COMMAND, Curve
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.vehicle.description import FileHead
+from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -23,7 +23,7 @@ _DECIMALS = 6
 """The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
 _DIGITS = 6
 """The significant digits of a number: more than any tank test gives, but few enough to be equal on every machine."""
-_DEPTHS = {"curves": 2, "axes": 2, "alternatives": 2, "provenance": 2}
+_DEPTHS = {"curves": 2, "axes": 2, "alternatives": 2, "provenance": 2, "validity": 2}
 """How deep the tables in some tables of a file are written with headings; in the others, one deep. Those inside are
 written in one line."""
 
@@ -52,7 +52,17 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
     voltage = {"value": layout.voltage, "unit": "V", "source": layout.voltage_source}
     tables: dict[str, Any] = {
         "vehicle": {key: getattr(vehicle, key) for key in FileHead.model_fields},
-        "validity": {"command_min": low, "command_max": high, "limits": vehicle.limits},
+        "validity": {
+            "command_min": low,
+            "command_max": high,
+            "limits": vehicle.limits,
+            "identified": {
+                one.name: {"range": (one.low, one.high), "unit": UNIT_OF_RANGE[one.name]}
+                for one in layout.identified
+                if one.name != EVERY_COMMAND
+            }
+            or None,
+        },
         "body": {"coupling": True} if layout.coupled else {},
         "arm": {},
         "commands": {"pulse": layout.pulse} if layout.pulse else {},

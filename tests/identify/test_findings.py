@@ -315,13 +315,12 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
 
 
 def test_the_vehicle_has_the_ranges_that_were_tested() -> None:
-    made = example().vehicle.provenance
-    assert made
-    assert made.tested == (
-        "depth: -1.0 to 1.0 m",
-        "surge velocity: 0.29 to 0.51 m/s",
-        "heave velocity: 0.14 to 0.26 m/s",
-        "yaw velocity: 26 to 46 deg/s",
+    assert example().vehicle.layout.identified == (
+        ("command", 0.0, 0.7),
+        ("u", 0.29, 0.51),
+        ("w", 0.145, 0.255),
+        ("r", 0.456, 0.801),
+        ("z", -1.0, 1.0),
     )
 
 

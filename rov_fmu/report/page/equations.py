@@ -143,7 +143,7 @@ def of(layout: Layout) -> Equations:
         curves,
         [line(_rate(name), equation.rates[name]) for name in layout.pose],
         [line(Name(name), formula) for name, formula in _rotation(layout, equation).items()],
-        [line(Name(name), formula) for name, formula in equation.outputs.items()],
+        [line(Name(name), formula) for name, formula in equation.outputs.items() if name in layout.angles],
     )
 
 

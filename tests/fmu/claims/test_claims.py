@@ -15,6 +15,7 @@ from rov_fmu.fmu.claims.claims import CLAIMS, Proof, prove_claims
 from rov_fmu.fmu.claims.measures import Evidence
 from rov_fmu.fmu.claims.subject import Subject, opened
 from rov_fmu.fmu.experiments import FOLDER
+from rov_fmu.io.messages import ProofError
 from rov_fmu.report.proof_page import proof_page
 
 Capsys = pytest.CaptureFixture[str]
