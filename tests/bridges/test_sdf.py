@@ -561,7 +561,7 @@ def test_a_thruster_with_the_name_of_a_joint_is_refused() -> None:
     """SDFormat allows each name once in a model: the joint of the thruster 1 is thruster_1_joint."""
     vehicle = load_vehicle(SHIPPED["bluerov2"])
     first, second, *others = vehicle.layout.thrusters
-    renamed = (first, replace(second, name=f"{first.name}_joint"), *others)
+    renamed = (first, second.model_copy(update={"name": f"{first.name}_joint"}), *others)
     layout = replace(vehicle.layout, thrusters=renamed, mix={})
     changed = replace(vehicle, layout=layout)
     with pytest.raises(InputError, match=rf"thruster\.{first.name}_joint: choose another name for Gazebo"):

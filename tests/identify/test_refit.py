@@ -13,9 +13,9 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.identify.result import Identification, Point
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.shipped import PAPER
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT, TESTS, without_progress
+from tests.vehicles import VIDEORAY
 
 HELD_OUT = {
     ("surge", "V_ss"): 0.061,
@@ -60,7 +60,7 @@ def test_shipped_file_is_what_the_command_writes(tmp_path: Path, capsys: pytest.
     )
     assert made == shipped
     one, other = load_vehicle(path), load_vehicle(REFIT)
-    for name in PAPER.coefficients:
+    for name in VIDEORAY.layout.coefficients:
         assert one[name] == pytest.approx(other[name], rel=1e-3)
         assert one.intervals.get(name, nan) == pytest.approx(other.intervals.get(name, nan), rel=1e-2, nan_ok=True)
     assert one.provenance
@@ -102,7 +102,7 @@ def test_every_measured_number_is_compared(refit: Identification, vehicle: Vehic
 
 def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identification) -> None:
     k = refit.vehicle
-    assert all(k[name] >= 0.0 for name in PAPER.coefficients if name.startswith(("a_d", "b_d")))
+    assert all(k[name] >= 0.0 for name in VIDEORAY.layout.coefficients if name.startswith(("a_d", "b_d")))
     assert k["alpha_u"] == k["alpha_w"] == k["alpha_r"] == 1.0
     assert "beta_u" not in refit.vehicle.intervals
     (told,) = (f for f in refit.findings if f.kind == "not identified" and f.axis == "surge")
