@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
 from rov_fmu.equation.layout import Curve, Direction, Driven, Fin, Layout, Position, Thruster, Vector, VehicleAxis
-from rov_fmu.vehicle.shipped import PAPER, SHIPPED
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 Values = Mapping[str, float]
@@ -200,7 +200,11 @@ VEHICLES = {
     ),
     "lag without coupling": _rov("uwr", _LAGGING, (*_PAIR, *_VERTICAL), _ALL),
     "an arm with lag beside a swift thruster": numbered(
-        Layout(_axes("uwr", ("m_a", *_DRAG)), (Curve("rear", ("a_t", "b_t", "T"), 2), Curve("top")), PAPER.thrusters)
+        Layout(
+            _axes("uwr", ("m_a", *_DRAG)),
+            (Curve("rear", ("a_t", "b_t", "T"), 2), Curve("top")),
+            VIDEORAY.layout.thrusters,
+        )
     ),
     "sway and yaw": _rov("vr", _T200, (_BOW,)),
     "heave only": _rov("w", _T200, _VERTICAL, _EITHER),

@@ -15,6 +15,7 @@ from typing import Annotated, Literal, NamedTuple, TypeVar
 from pydantic import AfterValidator, BeforeValidator, InstanceOf, WithJsonSchema
 
 from rov_fmu.io.field_types import Finite, Name, Symbol, Text
+from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import Strict
 
 from .catalogue import (
@@ -572,7 +573,10 @@ class Layout:
         If the vehicle has `pulse`, they are pulse widths instead.
         """
         if self.mix:
-            words = {name: f"Command u_{name} of {_listed(gains)}" for name, gains in self.mix.items()}
+            words = {
+                name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
+                for name, gains in self.mix.items()
+            }
         else:
             words = {driven.name: _command(driven) for driven in self.driven}
         return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
@@ -713,11 +717,6 @@ class Layout:
         return tuple(curve for curve in self.curves if curve.name in driving)
 
 
-def _listed(names: Iterable[str]) -> str:
-    *first, last = names
-    return f"thrusters {', '.join(first)} and {last}" if first else f"thruster {last}"
-
-
 def _pushes(direction: tuple[float, float, float]) -> str:
     """Return the direction of a positive force in words."""
     words = [
@@ -725,7 +724,7 @@ def _pushes(direction: tuple[float, float, float]) -> str:
         for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
         if abs(part) > FAINT
     ]
-    return " and ".join(words)
+    return listed(words)
 
 
 def _command(driven: Thruster | Fin) -> str:

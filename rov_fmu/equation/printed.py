@@ -47,23 +47,19 @@ def equation_text(layout: Layout) -> str:
     def shared(names: Iterable[str]) -> list[int]:
         return [states.index(name) for name in names if name in states]
 
-    rotation = [[states.index(entry(row, column)) for column in (1, 2, 3)] for row in (1, 2) if layout.has_attitude]
     entries = [entry(row, column) for row in (1, 2, 3) for column in (1, 2, 3)]
     groups = [shared(names) for names in ("uvwpqr", ("x", "y", "z", "psi"), entries, quaternion)]
-    lags = {states.index(progress): dict(forces) for progress, forces in equation.lags.items()}
     numbers = {**equation.program, **equation.forces}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
     return f"""\
 STATES = {tuple(states)!r}
 MONITORED = {places(equation.monitored)!r}  # velocities on whose direction coefficients depend, and their places
 DYNAMIC = {dynamic!r}  # the groups of states that may settle, each with those on which it depends
-LAGS = {lags!r}  # for the progress of each lag, the forces that lag and the thrust that each approaches
 OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets from the start
 GROUPS = {[*filter(None, groups)]!r}  # of like size
 TURNING = {shared("pqr")!r}  # the angular velocities
 QUATERNION = {places(quaternion)!r}
 PIVOTS = {[name.identifier for name in equation.names.of_kind("pivot")]!r}  # of the mass matrix, all above 0
-ROTATION = {rotation!r}  # the first two rows of the rotation matrix
 {_tables(equation)}
 
 def numbers(values):

@@ -80,9 +80,6 @@ class Motion:
         self.settled: set[int] = set()
         """The places of the states that do not change any more."""
         self.hold()
-        for i, forces in model.LAGS.items():
-            if all(self.held[steady] == values[force] for force, steady in forces.items()):
-                self.settled.add(i)  # these forces have arrived already
         starts = {**model.numbers(self.values), **values, **dict.fromkeys(model.OFFSETS, 0.0)}
         self.y: State = [starts[name] for name in model.STATES]
         self.size = [0.0] * len(self.y)
@@ -258,29 +255,29 @@ class Motion:
 
     # ---- Attitude ----
 
-    def rows(self, y: State) -> list[list[float]]:
-        """Return the first two rows of the rotation matrix."""
-        return [[y[i] for i in row] for row in self.model.ROTATION]
+    def named(self, y: State) -> dict[str, float]:
+        """Return the states of the model by their names."""
+        return dict(zip(self.model.STATES, y, strict=True))
 
     def turned(self, y: State, heading: float) -> float:
         """Return the heading of the direction beside the nose, by at most half a turn from a heading before."""
-        return turned_heading(self.rows(y), heading) if self.model.ROTATION else heading
+        return turned_heading(self.named(y), heading) if self.model.QUATERNION else heading
 
     def swing(self, y: State) -> float:
         """Return an error above 1 if the direction beside the nose could have passed the vertical on either side."""
-        if not self.model.ROTATION:
+        if not self.model.QUATERNION:
             return 0.0
-        (a, b), (c, d) = beside_nose(self.rows(self.y)), beside_nose(self.rows(y))
+        (a, b), (c, d) = beside_nose(self.named(self.y)), beside_nose(self.named(y))
         swung = hypot(c - a, d - b) / max(0.9 * hypot(a, b), 1e-9)
         return min(swung, 1e9) ** 8
 
     def end(self) -> dict[str, float]:
         """Return the states of the vehicle by their names."""
-        y = dict(zip(self.model.STATES, self.y, strict=True))
+        y = self.named(self.y)
         found = {name: x for name, x in y.items() if name in self.values}
         found |= {name: self.values[name] + y[name] for name in self.model.OFFSETS if name in self.values}
         found |= self.model.lagging(self.held, self.time)
-        if self.model.ROTATION:
+        if self.model.QUATERNION:
             e, a, b, c = (y[name] for name in self.model.QUATERNION)
             length = (e * e + a * a + b * b + c * c) ** 0.5
             found |= {name: y[name] / length for name in self.model.QUATERNION}
@@ -390,25 +387,21 @@ def _root(f: Callable[[float], float], b: float, f_0: float, f_b: float) -> floa
     return b if abs(f_b) <= abs(f_a) else a
 
 
-def beside_nose(rows: Sequence[Sequence[float]]) -> list[float]:
-    """Return components of the direction beside the nose for rows of the rotation matrix."""
+def beside_nose(entries: Mapping[str, float]) -> list[float]:
+    """Return the parts north and east of the direction beside the nose, for the entries of the rotation matrix."""
     (a, b, c) = BESIDE_NOSE
-    return [a * x + (b * y + c * z) for x, y, z in rows]
+    return [a * entries[f"R_{n}1"] + (b * entries[f"R_{n}2"] + c * entries[f"R_{n}3"]) for n in (1, 2)]
 
 
-def turned_heading(rows: Sequence[Sequence[float]], near: float) -> float:
-    """Return the heading of the direction beside the nose that differs from another heading by at most half a turn.
-
-    `rows` are the first two rows of the rotation matrix.
-    """
-    north, east = beside_nose(rows)
+def turned_heading(entries: Mapping[str, float], near: float) -> float:
+    """Return the heading of the direction beside the nose that differs from another heading by at most half a turn."""
+    north, east = beside_nose(entries)
     return unwrapped(atan2(east, north), near)
 
 
 def heading(entries: Mapping[str, float], near: float) -> float:
     """Return the heading of the nose for a rotation matrix, in the turn that follows from a heading before."""
-    rows = [[entries[f"R_{row}{column}"] for column in (1, 2, 3)] for row in (1, 2)]
-    return unwrapped(atan2(rows[1][0], rows[0][0]), turned_heading(rows, near))
+    return unwrapped(atan2(entries["R_21"], entries["R_11"]), turned_heading(entries, near))
 
 
 def unwrapped(angle: float, near: float) -> float:

@@ -26,7 +26,7 @@ from rov_fmu.equation.catalogue import (
     Declaration,
     coefficient_name,
 )
-from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.equation.layout import Direction, Layout, VehicleAxis
 from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -46,12 +46,14 @@ from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, read_tables
-from rov_fmu.vehicle.shipped import PAPER, SHIPPED
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
 """The tables that are not allowed together with `base`, because the base has its own."""
+_FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
+"""The source of the directions of the thrusters where neither a base nor a table gives any."""
 _FILE_TABLES = ("columns", "topics", "dives", "logs")
 """The tables that explain the files of tests."""
 
@@ -364,7 +366,14 @@ def _start(file: RovTables) -> Layout:
         forms = file.layout.axes or tuple(map(VehicleAxis, (SURGE, SWAY, HEAVE, YAW)))
         own = file.layout
         return replace(Layout.of_wrench(forms), coupled=own.coupled, restoring=own.restoring, cross=own.cross)
-    return file.layout if file.thruster else PAPER
+    if file.thruster:
+        return file.layout
+    paper = load_vehicle(VIDEORAY).layout
+    thrusters = [
+        one.model_copy(update={"direction": Direction(value=one.direction.value, source=_FORM)})
+        for one in paper.thrusters
+    ]
+    return replace(paper, thrusters=tuple(thrusters))
 
 
 def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:

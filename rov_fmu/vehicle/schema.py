@@ -1,4 +1,7 @@
-"""The pydantic models of the vehicle file, with every table and key; `model.catalogue` declares the coefficients."""
+"""The pydantic models of the vehicle file, with every table and key.
+
+`equation/catalogue.py` declares the coefficients, and `equation/layout.py` has the tables of thrusters and fins.
+"""
 
 import os
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
@@ -428,7 +431,7 @@ def read_tables(
     `needed` are the tables that must be there, and `complete` those whose coefficients must be complete.
     """
     file, problems = validate(data, model, **context)
-    problems = _with_missing_keys(problems, model, _missing_keys(data, needed, complete))
+    problems = _in_order([*problems, *_missing_keys(data, needed, complete)], model)
     wrong: dict[str, set[int | str | None]] = {}
     for place in (problem["loc"] for problem in problems):
         wrong.setdefault(str(place[0]), set()).add(place[1] if len(place) > 1 else None)
@@ -446,27 +449,17 @@ def read_tables(
     return file, problems, {*wrong}
 
 
-def _with_missing_keys(
-    problems: Iterable[ErrorDetails], model: type[Strict], missing_keys: Iterable[ErrorDetails]
-) -> list[ErrorDetails]:
-    """Return the problems with a file and those that keys are missing, in the order of the tables of its model.
+def _in_order(problems: Iterable[ErrorDetails], model: type[Strict]) -> list[ErrorDetails]:
+    """Return the problems with a file in the order of the tables of its model.
 
     Unknown keys come last in a table, because one of them may be a missing key, misspelt.
     """
-    order = [*model.model_fields]
+    order = {name: n for n, name in enumerate(model.model_fields)}
 
-    def table(problem: ErrorDetails) -> int:
-        name = problem["loc"][0]
-        return order.index(str(name)) if name in order else len(order)
+    def place(problem: ErrorDetails) -> tuple[int, bool]:
+        return order.get(str(problem["loc"][0]), len(order)), problem["type"] == "extra_forbidden"
 
-    def comes_later(other: ErrorDetails, missing: ErrorDetails) -> bool:
-        is_unknown = other["type"] == "extra_forbidden" and other["loc"][:-1] == missing["loc"][:-1]
-        return is_unknown or table(other) > table(missing)
-
-    found = [*problems]
-    for missing in missing_keys:
-        found.insert(next((n for n, other in enumerate(found) if comes_later(other, missing)), len(found)), missing)
-    return found
+    return sorted(problems, key=place)
 
 
 def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -> Iterator[ErrorDetails]:

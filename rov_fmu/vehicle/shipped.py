@@ -1,9 +1,7 @@
-"""The vehicles that ship, by name, and the layout of the paper's vehicle."""
+"""The vehicles that ship, by name."""
 
 from pathlib import Path
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
 from rov_fmu.io.messages import NO_FILE, FileError, did_you_mean
 from rov_fmu.io.paths import MODELS
@@ -11,22 +9,6 @@ from rov_fmu.io.paths import MODELS
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
 """The vehicle files that ship, by name."""
 VIDEORAY = SHIPPED["videoray"]
-
-_FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
-_AHEAD, _DOWN = (Direction(value=along, source=_FORM) for along in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-PAPER = Layout(
-    axes=(VehicleAxis(SURGE), VehicleAxis(HEAVE), VehicleAxis(YAW)),
-    curves=(
-        Curve("rear", together=2, description="rear pair", equation="(9)"),
-        Curve("top", description="top thruster", equation="(10)"),
-    ),
-    thrusters=(
-        Thruster(name="l", description="left thruster", direction=_AHEAD, curve="rear", arm="port"),
-        Thruster(name="r", description="right thruster", direction=_AHEAD, curve="rear", arm="starboard"),
-        Thruster(name="t", description="top thruster", direction=_DOWN, curve="top"),
-    ),
-)
-"""The layout of the paper's vehicle: surge, heave and yaw, a pair of rear thrusters and one on top."""
 
 
 def find_vehicle(given: str | Path) -> Path:

@@ -68,7 +68,9 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "commands": {"pulse": layout.pulse} if layout.pulse else {},
         "battery": {} if layout.voltage is None else {"voltage": voltage},
         "curves": {curve.name: _curve(curve) for curve in layout.curves},
-        "thruster": [thruster.model_dump() for thruster in layout.thrusters],
+        "thruster": [
+            {"name": t.name, "description": t.description, "curve": t.curve, **t.model_dump()} for t in layout.thrusters
+        ],
         "fin": [fin.model_dump(exclude={"has_drag"}) for fin in layout.fins],
         "axes": {name: {} for name in layout.kinds},
         "cross": {},

@@ -22,8 +22,9 @@ import pytest
 from rov_fmu.build import chosen_platforms
 from rov_fmu.c.compile import PLATFORMS, fmi_headers
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import PAPER, SHIPPED
+from rov_fmu.vehicle.shipped import SHIPPED
 from tests.conftest import Made
+from tests.vehicles import VIDEORAY
 from verification.references.c_programs import compile_c, run_program
 
 lief.logging.disable()
@@ -230,7 +231,7 @@ def _recorded_steps() -> str:
         loads = [random_.choice((0.0, random_.gauss(0.0, 3.0))) for _ in range(2)] + [random_.choice((0.0, 0.1))]
         current = [random_.choice((0.0, 0.3)) for _ in range(2)]
         values = [h, *commands, *loads, *current]
-        assert len(values) == 1 + len(PAPER.inputs)
+        assert len(values) == 1 + len(VIDEORAY.layout.inputs)
         lines.append(" ".join(struct.pack(">d", value).hex() for value in values))
     return "\n".join(lines) + "\n"
 

@@ -30,6 +30,8 @@ from tests.report.pages import UNFOLD
 from tests.report.results import example
 
 if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
     pass
 
 pytestmark = pytest.mark.interop
@@ -179,6 +181,17 @@ def test_a_plot_of_the_report_zooms_by_dragging_and_by_keys(report: Path, visit:
     seen.page.keyboard.press("Escape")
     assert plot.locator(".zoomed").count() == 0
     assert not seen.problems()
+
+
+def test_without_scripts_the_report_has_its_plots(report: Path, browser: "Browser") -> None:
+    context = browser.new_context(java_script_enabled=False, viewport={"width": 1440, "height": 900})
+    page = context.new_page()
+    page.goto(report.as_uri())
+    box = page.locator(".broad svg").bounding_box()
+    assert box is not None
+    assert box["height"] > 200
+    assert page.locator(".values").count() == 0
+    context.close()
 
 
 # ---- The evidence of `rov-fmu prove --report` ------------------------------------------------------------------------

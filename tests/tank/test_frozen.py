@@ -9,8 +9,8 @@ from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
 from rov_fmu.tank.quality import checked
-from rov_fmu.vehicle.shipped import PAPER
 from tests.tank.logs import axes, channel, commands, log, read_log, used
+from tests.vehicles import VIDEORAY
 
 TIME: Array = np.arange(0.0, 60.0, 0.1)
 MOVING: Array = np.minimum(TIME, 20.0)
@@ -39,7 +39,7 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None, tmp_path: Path
     text += "".join(f"{t:.1f},{c},{c},{-c},{d:.3f},{h:.3f},{V:.2f}\n" for t, c, d, h, V in rows)
     path = tmp_path / "pool.csv"
     path.write_text(text, encoding="utf-8")
-    read = read_log(path, PAPER)
+    read = read_log(path, VIDEORAY.layout)
     start = "29.9" if value is None else "30"
     assert sentences(read.findings) == (
         f"pool.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "

@@ -12,12 +12,12 @@ from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
-from rov_fmu.vehicle.shipped import PAPER
 from tests.tank.logs import Read, commanded, measured, read_log, used
-from tests.vehicles import thruster
+from tests.vehicles import VIDEORAY, thruster
 
 N = 40
 STEP = [0.3 * (n >= 10) for n in range(N)]
+PAPER = VIDEORAY.layout
 MIXED = Layout(
     axes=(VehicleAxis(SURGE), VehicleAxis(YAW)),
     curves=(Curve("rear"),),
@@ -29,7 +29,9 @@ MIXED = Layout(
 )
 
 
-def read(folder: Path, header: str, rows: Sequence[str], axis: Axis | None = None, layout: Layout = PAPER) -> Read:
+def read(
+    folder: Path, header: str, rows: Sequence[str], axis: Axis | None = None, layout: Layout = VIDEORAY.layout
+) -> Read:
     path = folder / "log.csv"
     path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
     return read_log(path, layout, axis)

@@ -3,14 +3,13 @@
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.c.compile import BuildError
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
 from tests.vehicles import sources_of
@@ -46,10 +45,17 @@ TABLE_9 = {
 
 def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
     assert vehicle.coefficients == TABLE_9
-    assert replace(vehicle.layout, thrusters=PAPER.thrusters) == PAPER
-    for one, other in zip(vehicle.layout.thrusters, PAPER.thrusters, strict=True):  # only their sources differ
-        assert one.model_copy(update={"direction": other.direction}) == other
-        assert one.direction.value == other.direction.value
+    layout, ahead = vehicle.layout, (1.0, 0.0, 0.0)
+    assert [*layout.kinds] == ["surge", "heave", "yaw"]
+    assert {curve.name: (curve.keys, curve.together) for curve in layout.curves} == {
+        "rear": (("a_t", "b_t"), 2),
+        "top": (("a_t", "b_t"), 1),
+    }
+    assert {t.name: (t.curve, t.direction.value, t.arm, t.position) for t in layout.thrusters} == {
+        "l": ("rear", ahead, "port", None),
+        "r": ("rear", ahead, "starboard", None),
+        "t": ("top", (0.0, 0.0, 1.0), None, None),
+    }
     assert set(vehicle.sources) == set(TABLE_9)
     assert all("Table 9" in source for source in vehicle.sources.values())
     assert {one.name: [*sources_of(one)] for one in vehicle.layout.thrusters} == {n: ["direction"] for n in "lrt"}

@@ -23,9 +23,9 @@ from rov_fmu.equation.catalogue import (
 )
 from rov_fmu.equation.layout import Curve, Layout, Thruster, ThrustTable, VehicleAxis, arm, effect_along
 from rov_fmu.fmu.variables import variables
-from rov_fmu.vehicle.shipped import PAPER, SHIPPED
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.vehicles import SIX, fin, thruster
+from tests.vehicles import SIX, VIDEORAY, fin, thruster
 
 WORDS = {
     "videoray": {
@@ -204,7 +204,7 @@ def test_a_thrust_table_is_a_cubic_with_the_forces_and_slopes_of_its_points() ->
 
 
 def test_a_layout_is_extended_by_the_names_of_its_further_coefficients() -> None:
-    extended = PAPER.extended(["m_a_u", "b_d_r_reverse", "c_0_top", "T_rear"])
+    extended = VIDEORAY.layout.extended(["m_a_u", "b_d_r_reverse", "c_0_top", "T_rear"])
     assert {form.axis.name: form.keys for form in extended.axes} == {
         "surge": ("m_a", "a_d", "b_d"),
         "heave": ("a_d", "b_d"),
@@ -212,7 +212,7 @@ def test_a_layout_is_extended_by_the_names_of_its_further_coefficients() -> None
     }
     assert [curve.keys for curve in extended.curves] == [("a_t", "b_t", "T"), ("a_t", "b_t", "c_0")]
     assert (extended.has_arm, _layout(*PAIR).has_arm) == (True, False)
-    assert [curve.name for curve in PAPER.turning_curves] == ["rear"]
+    assert [curve.name for curve in VIDEORAY.layout.turning_curves] == ["rear"]
 
 
 def test_the_rates_stand_between_the_states_and_the_thrust() -> None:

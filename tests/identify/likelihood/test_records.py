@@ -10,8 +10,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.log import Channel, Log
 from rov_fmu.tank.quality import unwrapped
-from rov_fmu.vehicle.shipped import PAPER
 from tests.tank.logs import channel, commands, log
+from tests.vehicles import VIDEORAY
 
 TIME: Array = np.linspace(0.0, 19.9, 200)
 STEP: Array = np.where(TIME > 5.0, 0.4, 0.0)
@@ -89,14 +89,14 @@ CASES: Mapping[str, tuple[Log, list[str], list[str]]] = {
 @pytest.mark.parametrize("case", CASES)
 def test_a_log_tests_the_axes_that_it_pushes_and_measures(case: str) -> None:
     one, axes, told = CASES[case]
-    tested, findings = driven_axes(one, PAPER)
+    tested, findings = driven_axes(one, VIDEORAY.layout)
     assert [axis.name for axis in tested] == axes
     assert [line.removeprefix("a.csv: ") for line in sentences(findings, SENTENCES)] == told
-    assert (recorded(one, PAPER) is None) is (not axes)
+    assert (recorded(one, VIDEORAY.layout) is None) is (not axes)
 
 
 def test_the_channels_of_an_axis_that_is_not_pushed_still_tell_how_the_vehicle_moved() -> None:
-    one = recorded(dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)), PAPER)
+    one = recorded(dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)), VIDEORAY.layout)
     assert one
     assert [sensor.axis.name for sensor in one.record.sensors] == ["surge", "heave", "yaw"]
 
@@ -107,7 +107,7 @@ def test_a_heading_is_unwrapped_as_an_inspection_does(turn: float) -> None:
     there = (TIME < 8.0) | (TIME > 13.0)
     heading = 0.7 * TIME[there]
     compass = channel("heading", TIME[there], heading % turn if turn else heading)
-    one = recorded(dive(STEP, -STEP, STEP, compass), PAPER)
+    one = recorded(dive(STEP, -STEP, STEP, compass), VIDEORAY.layout)
     assert one
     (measured,) = one.measured
     assert (measured.channel.values == unwrapped(compass)).all()
