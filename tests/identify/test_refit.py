@@ -2,6 +2,7 @@
 
 import re
 from math import hypot, nan
+from math import sqrt
 from pathlib import Path
 
 import pytest
