@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -46,6 +46,10 @@ class Dive:
     velocity: Array
     """N x 3: in surge, sway and heave."""
     voltage: Array
+    time: Array = field(default_factory=lambda: TIME)
+    """N: since the start, s."""
+    noise: float | Array = 0.0
+    """That of the depth, m."""
 
     @property
     def rotation(self) -> Array:
@@ -61,8 +65,9 @@ class Dive:
     def position(self) -> Array:
         """N x 3: north, east, down."""
         rate = self.over_ground
-        steps = 0.5 * np.diff(TIME)[:, None] * (rate[1:] + rate[:-1])
+        steps = 0.5 * np.diff(self.time)[:, None] * (rate[1:] + rate[:-1])
         travelled = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        travelled[:, 2] += self.noise
         return np.asarray(np.array([3.0, -2.0, 5.0]) + travelled)
 
 
@@ -87,7 +92,7 @@ def dives(draw: st.DrawFn) -> Dive:
 
 def columns(dive: Dive) -> list[Array]:
     moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity[:, :2].T, dive.voltage]
-    return [dive.start + TIME, *dive.pulses.T, *moved]
+    return [dive.start + dive.time, *dive.pulses.T, *moved]
 
 
 def csv(folder: Path, dive: Dive) -> Path:
@@ -105,7 +110,7 @@ def mat(folder: Path, dive: Dive) -> Path:
 
 def _mavlink(dive: Dive) -> Iterator[tuple[float, str, dict[str, float]]]:
     """Yield the time, the name and the fields of each message."""
-    for n, time in enumerate(dive.start + TIME):
+    for n, time in enumerate(dive.start + dive.time):
         servos = {f"servo{k}_raw": int(pulse) for k, pulse in enumerate(dive.pulses[n], start=1)}
         yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6), "port": 0, **servos}
         boot = {"time_boot_ms": round(time * 1e3)}
@@ -143,7 +148,7 @@ def blueos(folder: Path, dive: Dive) -> Path:
 
 def flash(folder: Path, dive: Dive) -> Path:
     messages = []
-    for n, time in enumerate(dive.start + TIME):
+    for n, time in enumerate(dive.start + dive.time):
         degrees, stamp = np.degrees(dive.euler[n]), round(time * 1e6)
         heading = degrees[2] % 360.0
         messages += [rcou(time, *dive.pulses[n].astype(int).tolist())]
@@ -155,7 +160,7 @@ def flash(folder: Path, dive: Dive) -> Path:
 
 def ulog(folder: Path, dive: Dive) -> Path:
     log = ULogWriter()
-    for n, time in enumerate(TIME):
+    for n, time in enumerate(dive.time):
         log.message("actuator_outputs", time, 6, *[0] * 4, *dive.pulses[n], *[0.0] * 10)
         log.message("vehicle_attitude", time, 0, *motion.quaternion(dive.rotation[n]))
         log.message("vehicle_local_position", time, *dive.position[n], *dive.over_ground[n], True)
@@ -166,7 +171,7 @@ def ulog(folder: Path, dive: Dive) -> Path:
 def bag(version: int) -> Callable[[Path, Dive], Path]:
     def write(folder: Path, dive: Dive) -> Path:
         ros, messages = Ros(version), []
-        for n, time in enumerate(TIME):
+        for n, time in enumerate(dive.time):
             header, R = ros.header(time, "map"), dive.rotation[n]
             place, attitude = ros.vector("Point", ENU @ dive.position[n]), ros.quaternion(ENU @ R @ FLU)
             pose = ros.message("geometry_msgs/msg/Pose", position=place, orientation=attitude)
