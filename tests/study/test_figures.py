@@ -1,11 +1,13 @@
 """Figures of responses for which they are known in closed form, and the reasons for missing ones."""
 
+import sys
 from math import exp, log, nan, pi, sqrt
+from types import FrameType
 
 import numpy as np
 import pytest
 
-from rov_fmu.study.plan.expression import ExpressionError
+from rov_fmu.study.plan.expression import Expression, ExpressionError, Function
 from rov_fmu.study.plan.figures import Figures, read_expression, unusable
 
 T = np.linspace(0.0, 40.0, 4001)
@@ -33,6 +35,7 @@ KNOWN = {
     "out['der(y)'][-1]": 1.0,
     "y[t >= 10][0]": 3.0 * (1.0 - exp(-8.0 / 1.5)),
     "1 if m > 6 else 2": 1.0,
+    "(m < 6.5) + 2 * (m <= 6.5) + 4 * (m > 6.5) + 8 * (m >= 6.5)": 10.0,
     "z[-1] > 0.5": 1.0,
     "t[where(y > 3*(1 - e**-1))[0][0]]": 3.5,
     "y[where(y > 3*(1 - e**-1))[0][0] + 0]": 3.0 * (1.0 - exp(-1.0)),
@@ -110,6 +113,17 @@ def test_an_expression_has_at_most_100_levels() -> None:
         with pytest.raises(ExpressionError, match="is nested too deeply: at most 100 levels"):
             read_expression(text)
     assert Figures({"f": "m" + "+1" * 99}, T).of({"m": 6.5}) == ([105.5], "")
+
+
+def test_the_code_of_an_expression_has_no_builtins() -> None:
+    def builtins(_: float) -> float:
+        frame: FrameType | None = sys._getframe()
+        while frame and frame.f_code.co_filename != "<figure>":
+            frame = frame.f_back
+        assert frame
+        return float(len(frame.f_builtins))
+
+    assert Expression("f(1)", {"f": Function(builtins)}).value({}) == 0.0
 
 
 def test_functions_and_variables_of_the_same_name_are_distinguished() -> None:

@@ -137,6 +137,7 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
 # ---- Hardware tables -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     tables = {"thrust_t200.csv": pulled(30.0, 20.0)}
     known = {"m_rov": 6.57, "I_r": 0.105, "m_a_v": 7.1, "a_t_t200": 30.0, "b_t_t200": 20.0}
