@@ -1,8 +1,7 @@
 """The refit of the VideoRay that ships: the result of the command from the paper's measurements, and its errors."""
 
 import re
-from math import hypot, nan
-from math import sqrt
+from math import hypot, nan, sqrt
 from pathlib import Path
 
 import pytest
