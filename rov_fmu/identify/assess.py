@@ -356,7 +356,8 @@ def verdict(
     elif min(widths) > 2.0 * _WIDEST["good"]:
         lower("usable", f"The steady velocities are known to no better than {_WIDEST['good']:.0%}.")
     for slip in slips:
-        lower("do not use", f"Another unit or sign would explain the {slip.quantity} in {slip.file}.")
+        where = f"{slip.quantity} in {slip.file}, to which all axes are fitted"
+        lower("do not use", f"The {where}, seems to have another unit or sign.")
     if difference > DISAGREEMENT:
         lower("do not use", "Two starts of the fit led to different vehicles.")
     if not reasons:

@@ -50,8 +50,8 @@ _MOST_OUTLIERS = 0.005
 SHARES = (0.3, 0.5, 1.0)
 """The commands of the answers that are told first: weak, half and full."""
 STOPPING = (
-    "The time is that from rest to 63% of the speed at 50%, without the lag of the thrusters. The way is that from "
-    "this speed to a tenth of it without thrust."
+    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop begins "
+    "at the steady speed, and ends at a tenth of it. There is no thrust on it."
 )
 _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""
@@ -285,19 +285,22 @@ def error_in_words(p: Prediction) -> str:
     )
 
 
-def next_tests(axes: Sequence[AxisResult]) -> list[str]:
+def next_tests(identification: Identification) -> list[str]:
     """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
 
-    If no test is useful, the sentence names the widest interval; without any test there is none.
+    If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
+    any test there is none.
     """
-    tests = sorted((r.next_test for r in axes if r.next_test), key=lambda test: -test.now)
+    tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
         f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
         for test in tests
         if test.is_useful
     ]
-    nothing = "no test would narrow an interval by a tenth. The widest is that of {} of {}, ±{:.0%}."
-    return useful or [nothing.format(test.target, test.axis.name, test.now) for test in tests[:1]]
+    nothing = "no single test would make an interval a tenth narrower. The widest is that of {}: {}, ±{:.0%}."
+    if not useful and repairs(identification):
+        return ["first repair what disagrees, and identify again: these logs cannot tell which test is useful."]
+    return useful or [nothing.format(test.axis.name, test.target, test.now) for test in tests[:1]]
 
 
 def repairs(identification: Identification) -> list[str]:
@@ -339,9 +342,10 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         most = max((float(np.sqrt(np.mean(force**2))) for force in forces), default=inf)
         if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
             size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
-            pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (others at most {other})")
+            pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")
     for file, forces_of in pushed.items():
-        yield file, f"An unknown slow force acts in it: {listed(forces_of)}. Check its thrusters and its tether."
+        acting = f"An unknown slow force acts in this log: {listed(forces_of)}."
+        yield file, f"{acting} Check the thrusters and the tether of that dive."
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:

@@ -84,7 +84,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     yield from (f"- {warning}" for warning in groups["Warnings"])
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")):
         yield f"The report has {rest} more doubts and facts." if rest > 1 else "The report has one more doubt or fact."
-    yield from (f"To measure next: {test}" for test in next_tests(identification.axes))
+    yield from (f"To measure next: {test}" for test in next_tests(identification))
 
 
 def _against(value: float, measured: float) -> tuple[str, str]:

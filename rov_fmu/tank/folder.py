@@ -383,8 +383,9 @@ def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
     return "", ""
 
 
-def file_hash(path: Path) -> str:
-    found = hashlib.sha3_256()
+def file_hash(path: Path, kind: str = "sha3_256") -> str:
+    """Return the hash of a file, of a kind that hashlib has. Raises DataFileError."""
+    found = hashlib.new(kind)
     try:
         with path.open("rb") as file:  # in pieces, because a bag may be larger than the memory
             while piece := file.read(2**20):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.messages import FileError
 
@@ -62,11 +63,12 @@ BAD: dict[str, tuple[Callable[..., None], str]] = {
 
 @pytest.fixture
 def bad(request: pytest.FixtureRequest, videoray_fmu: Path, tmp_path: Path) -> tuple[Path, str]:
-    """Return an FMU with a further member that it must not have, and the error message about it."""
+    """Return an FMU without hashes but with a member that it must not have, and the error message about it."""
     add, message = BAD[request.param]
     path = tmp_path / "bad.fmu"
-    path.write_bytes(videoray_fmu.read_bytes())
-    with zipfile.ZipFile(path, "a") as archive:
+    with zipfile.ZipFile(videoray_fmu) as good, zipfile.ZipFile(path, "w") as archive:
+        for name in {*good.namelist()} - {META_DATA}:
+            archive.writestr(name, good.read(name))
         add(archive)
     return path, message
 

@@ -330,13 +330,16 @@ def test_the_next_tests_begin_with_the_widest_interval() -> None:
         for n, (axis, now) in enumerate(((SURGE, 0.2), (HEAVE, 0.5), (YAW, 0.1)))
     ]
     axes = [replace(one, next_test=test) for one, test in zip(example().axes, tests, strict=True)]
-    assert next_tests(axes) == [
+    assert next_tests(replace(example(), axes=tuple(axes))) == [
         "heave: do 1. V_ss at 50%, now ±50%, becomes ±10%.",
         "surge: do 0. V_ss at 50%, now ±20%, becomes ±10%.",
     ]
-    (only,) = next_tests(axes[2:])
-    assert only == "no test would narrow an interval by a tenth. The widest is that of V_ss at 50% of yaw, ±10%."
-    assert next_tests([replace(axes[0], next_test=None)]) == []
+    only = three(), replace(three(), slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),))
+    fine, odd = (replace(one, axes=(replace(one.axes[0], next_test=tests[2]),)) for one in only)
+    widest = "no single test would make an interval a tenth narrower. The widest is that of yaw: V_ss at 50%, ±10%."
+    assert next_tests(fine) == [widest]
+    assert next_tests(odd)[0].startswith("first repair what disagrees, and identify again")
+    assert next_tests(three()) == []
 
 
 def three(**changes: Any) -> Identification:
@@ -387,8 +390,8 @@ ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the othe
         (
             three(**slow_forces(0.5, 0.4, 3.3)),
             [
-                f"{ODD}An unknown slow force acts in it: 3.3 N in surge (others at most 0.50 N). Check its thrusters "
-                "and its tether."
+                f"{ODD}An unknown slow force acts in this log: 3.3 N in surge (at most 0.50 N in the other logs). "
+                "Check the thrusters and the tether of that dive."
             ],
         ),
         (three(**slow_forces(0.5, 1.4, 3.3)), []),

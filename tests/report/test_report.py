@@ -126,10 +126,11 @@ def test_the_first_screen_has_verdicts_answers_the_worst_prediction_and_the_data
     words = unfolded(page)
     for part in (
         "Yaw: do not useThe bands contain only 40 % of the unseen data. Two starts disagree.",
-        "the heading (anew every 10 s) of log_2.csv, predicted from the commands alone by a fit to the other log",
+        "the heading (started again every 10 s) of log_2.csv, predicted from the commands alone by a fit to the other "
+        "log",
         "The bands should contain 95 % of the samples; they contain 95 % for surge, 90 % for heave and 40 % for yaw.",
         "Identification from two dive logs · 2026-11-23",
-        "2 logs of together 120 s (log_1.csv, log_2.csv), 3 forces, 9 points, commands of 20 % to 70 %.",
+        "2 logs with 120 s in total (log_1.csv, log_2.csv), 3 forces, 9 points, commands of 20 % to 70 %.",
         "The tests had commands of 20 % to 70 %: the speed at 100 % is extrapolated.",
         "Yaw: hold 0.6 for 8 s, then −0.6 for 8 s. V_ss at 50 %, now ±60 %, becomes ±30 %.",
         "Yaw: the prediction of the heading in log_2.csv is off by 52 ° (RMS)",
@@ -150,7 +151,7 @@ def test_ten_questions_of_an_owner_are_answered_before_anything_is_unfolded(monk
     key = {
         "can I trust yaw": "Yaw: do not use",
         "can I trust surge": "Surge: good",
-        "from which data": "2 logs of together 120 s (log_1.csv, log_2.csv)",
+        "from which data": "2 logs with 120 s in total (log_1.csv, log_2.csv)",
         "what is wrong with log_2": "it disagrees with the other log. Check the depth: is it in cm?",
         "what to do first": "First: Repair log_2.csv or take it out of the folder",
         "what to measure next": "Yaw: hold 0.6 for 8 s",
@@ -238,7 +239,7 @@ def test_the_first_screen_names_the_base(tmp_path: Path) -> None:
     rov_file.write_text(f'base = "bluerov2"\n{HEAD}', encoding="utf-8")
     result = example()
     based = replace(result, folder=replace(result.folder, rov_file=read_description(rov_file)))
-    assert "commands of 20 % to 70 %. Its base was bluerov2." in unfolded(report_page(based))
+    assert "commands of 20 % to 70 %. The fit began from the vehicle bluerov2." in unfolded(report_page(based))
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -356,12 +357,12 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
         "What else acts: lag of the thrusters (top 0.12 s)",
         *(f"- {warning}" for warning in made.warnings),
         "The report has 4 more doubts and facts.",
-        *(f"To measure next: {words}" for words in next_tests(example().axes)),
+        *(f"To measure next: {words}" for words in next_tests(example())),
     ]
     places = [text.index(part) for part in parts]
     assert places == sorted(places)
     shown = unfolded(page).casefold()
-    for sentence_ in (STOPPING, *made.warnings, *next_tests(example().axes), *example().axes[2].verdict.reasons):
+    for sentence_ in (STOPPING, *made.warnings, *next_tests(example()), *example().axes[2].verdict.reasons):
         assert readable(sentence_).casefold() in shown
 
 

@@ -136,8 +136,8 @@ PLANTED = {
     ),
     "drag pushes a motion": (
         "step.c",
-        "s->c[1][i] = m->settled & bit ? 0.0 : unit * rate[i];",
-        "s->c[1][i] = m->settled & bit ? 0.0 : 1.0001 * unit * rate[i];",
+        "        s->c[1][i] = unit * rate[i];",
+        "        s->c[1][i] = 1.0001 * unit * rate[i];",
         "beyond its equilibrium|a step and its parts|at no more than",
     ),
     "a long step stops at low order": (
@@ -170,8 +170,8 @@ PLANTED_IN_HEAVY = {
     ),
     "a quaternion grows": (
         "equation.h",
-        "const double next_eta = row_0 / divisor;",
-        "const double next_eta = 1.001 * row_0 / divisor;",
+        "const real next_eta = row_0 / divisor;",
+        "const real next_eta = 1.001 * row_0 / divisor;",
         "a quaternion of the length",
     ),
     "a turn is counted too much": (

@@ -87,7 +87,7 @@ class Recorded:
     def _found(self, data: Path, file: str, expected: str) -> Path:
         """Return the file with this name and this SHA-256 anywhere in a folder."""
         paths = sorted(data.rglob(file)) or [data / file]
-        found = {file_hash(path): path for path in paths}
+        found = {file_hash(path, "sha256"): path for path in paths}
         if expected not in found:
             wrong = f"has the SHA-256 {next(iter(found))[:12]}... and must have {expected[:12]}..."
             raise DataFileError(f"{paths[0]}: {wrong}, that of the file of {self.origin}")

@@ -14,6 +14,7 @@ from rov_fmu.fmu.claims import measures
 from rov_fmu.fmu.claims.claims import CLAIMS, Proof, prove_claims
 from rov_fmu.fmu.claims.measures import Evidence
 from rov_fmu.fmu.claims.subject import Subject, opened
+from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.io.messages import ProofError
 from rov_fmu.report.proof_page import proof_page
@@ -60,9 +61,9 @@ def slave(step: str, folder: Path, *, ours: bool = False) -> Path:
 
 
 def altered(fmu: Path, changes: Mapping[str, Callable[[bytes], bytes]], path: Path) -> Path:
-    """Write a copy of an FMU in which some files are changed, and return its path."""
+    """Write a copy of an FMU without hashes, in which some files are changed, and return its path."""
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
-        for name in old.namelist():
+        for name in {*old.namelist()} - {META_DATA}:
             content = old.read(name)
             new.writestr(name, changes[name](content) if name in changes else content)
     return path
@@ -242,10 +243,12 @@ def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytes
     ],
 )
 def test_one_changed_byte_is_found(name: str, version: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    fmu = altered(
-        request.getfixturevalue(version), {name: lambda old: old.replace(b"the ", b"teh ", 1)}, tmp_path / "other.fmu"
-    )
-    with pytest.raises(ProofError, match=rf"other.fmu: {re.escape(name)}: was altered after the FMU was built"):
+    fmu = tmp_path / "other.fmu"
+    with zipfile.ZipFile(request.getfixturevalue(version)) as old, zipfile.ZipFile(fmu, "w") as new:
+        for member in old.namelist():
+            content = old.read(member)
+            new.writestr(member, content.replace(b"the ", b"teh ", 1) if member == name else content)
+    with pytest.raises(ProofError, match=f"other.fmu: '{name}': was altered after the FMU was built"):
         measured(measures.integrity, fmu)
 
 
