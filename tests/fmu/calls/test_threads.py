@@ -58,7 +58,7 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
 @pytest.mark.parametrize(
     ("sanitizers", "file", "line", "fault", "report"),
     [
-        ("thread", "step.c", "    motion m;\n", "    static motion m;\n", "data race"),
+        ("thread", "step.c", "pieces = 0;\n    motion m;\n", "pieces = 0;\n    static motion m;\n", "data race"),
         ("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
     ],
     ids=["shared variable", "lost instance"],
