@@ -155,7 +155,11 @@ def _predicted(
     for span in (inf, AHEAD):
         try:
             off_all, deviations = ahead(objective, part.log, z, covariance, begin, span)
-            compared = objective.run(z, part.log, table=other, begin=begin, span=span) if other else None
+            compared = (
+                objective.run(_usual_noise(objective, z), part.log, table=other, begin=begin, span=span)
+                if other
+                else None
+            )
         except DivergedError:
             continue
         later = inside & (record.time >= record.time[0] + begin)
@@ -183,6 +187,15 @@ def _predicted(
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 compared=measured - compared.innovations[at] if compared else None,
             )
+
+
+def _usual_noise(objective: Objective, z: Array) -> Array:
+    """Return the parameters with the noise that is usual: that of a fit is too small for a vehicle that was not fitted.
+
+    With a small noise, the filter would explain what the other vehicle does wrong by a thrust that fades to 0.
+    """
+    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    return np.where(of_motion, z, objective.mean)
 
 
 def ahead(

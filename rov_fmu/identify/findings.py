@@ -50,8 +50,8 @@ _MOST_OUTLIERS = 0.005
 SHARES = (0.3, 0.5, 1.0)
 """The commands of the answers that are told first: weak, half and full."""
 STOPPING = (
-    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop begins "
-    "at the steady speed, and ends at a tenth of it. There is no thrust on it."
+    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop is "
+    "that without thrust, from the steady speed to a tenth of it."
 )
 _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""

@@ -64,7 +64,7 @@ USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
 """The usual time constant of the lag of thrusters, s."""
-_MOTION_STEP = 1e-5
+_MOTION_STEP = 1e-7
 """The relative change of z for the derivatives of the motion. Much larger ones make the common scale of all forces,
 which the motion does not tell, look determined."""
 LEAST_LAG = 0.02

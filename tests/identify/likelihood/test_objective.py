@@ -69,10 +69,11 @@ def test_derivatives_are_those_of_other_differences(objective: Objective, place:
         for one, above, below in zip(data, up, down, strict=False):
             slopes = (above.innovations - below.innovations) / (2.0 * h)
             log_slopes = np.log(above.variances / below.variances) / (2.0 * h)
-            for found, expected in ((one.slopes, slopes), (one.log_slopes, log_slopes)):
+            # Steps of 1e-7 leave rounding errors of 1e-12 in the logarithm of a variance.
+            for found, expected, rounding in ((one.slopes, slopes, 1e-9), (one.log_slopes, log_slopes, 1e-4)):
                 largest, errors = np.abs(expected).max(), np.abs(found[:, n] - expected)
-                assert np.quantile(errors, 0.85) <= (0.1 if p.kind == "logging width" else 0.03) * largest + 1e-9, p
-                assert errors.max() <= 0.2 * largest + 1e-9, p
+                assert np.quantile(errors, 0.85) <= (0.1 if p.kind == "logging width" else 0.03) * largest + rounding, p
+                assert errors.max() <= 0.2 * largest + rounding, p
 
 
 def check_gradient(objective: Objective, z: Array) -> None:
