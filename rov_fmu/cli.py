@@ -697,8 +697,8 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     written = [page]
     write_whole(page)
     print_summary(results, spent)
-    if vehicle:
-        if not results.outputs or (motion := results.trajectories([run or 0])).empty:
+    if vehicle and run is not None:
+        if not results.outputs or (motion := results.trajectories([run])).empty:
             raise FileError(f"{output}: --mcap {run}: there is no such run with outputs, which [keep] names")
         content = load(vehicle_file("vehicle", vehicle, plan)).to_mcap(motion)
         written.append(Output(output / f"run-{run}.mcap", content))

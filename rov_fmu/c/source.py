@@ -384,8 +384,7 @@ def unused_sources(layout: Layout) -> list[str]:
 
 def sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    names = {"real.h", "series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"} - {
-        *unused_sources(layout)
-    }
-    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in sorted(names)}
+    names = {"real.h", "series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"}
+    used = sorted(names - {*unused_sources(layout)})
+    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in used}
     return generated_sources(layout) | shared

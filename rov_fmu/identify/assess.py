@@ -155,11 +155,8 @@ def _predicted(
     for span in (inf, AHEAD):
         try:
             off_all, deviations = ahead(objective, part.log, z, covariance, begin, span)
-            compared = (
-                objective.run(_usual_noise(objective, z), part.log, table=other, begin=begin, span=span)
-                if other
-                else None
-            )
+            usual = _usual_noise(objective, z)
+            compared = objective.run(usual, part.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
         later = inside & (record.time >= record.time[0] + begin)
@@ -190,9 +187,9 @@ def _predicted(
 
 
 def _usual_noise(objective: Objective, z: Array) -> Array:
-    """Return the parameters with the noise that is usual: that of a fit is too small for a vehicle that was not fitted.
+    """Return the parameters with the means of the priors of the noise, for a vehicle that was not fitted.
 
-    With a small noise, the filter would explain what the other vehicle does wrong by a thrust that fades to 0.
+    The noise of a fit is too small for it: the filter would explain its errors by a thrust that fades to 0.
     """
     of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
     return np.where(of_motion, z, objective.mean)
@@ -369,8 +366,8 @@ def verdict(
     elif min(widths) > 2.0 * _WIDEST["good"]:
         lower("usable", f"The steady velocities are known to no better than {_WIDEST['good']:.0%}.")
     for slip in slips:
-        where = f"{slip.quantity} in {slip.file}, to which all axes are fitted"
-        lower("do not use", f"The {where}, seems to have another unit or sign.")
+        wrong = f"The {slip.quantity} in {slip.file} seems to have another unit or sign"
+        lower("do not use", f"{wrong}, and all axes are fitted to this log.")
     if difference > DISAGREEMENT:
         lower("do not use", "Two starts of the fit led to different vehicles.")
     if not reasons:

@@ -1,11 +1,23 @@
-"""Reading whole files; if one cannot be read, the error names it and says why."""
+"""Reading and hashing whole files; if one cannot be read, the error names it and says why."""
 
+import hashlib
 from collections.abc import Callable
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
-from typing import TextIO
+from typing import IO, TextIO
 
 from rov_fmu.io.messages import NO_FILE, FileError
+
+_PIECE = 2**20
+"""The number of bytes that are hashed at a time: a file may be larger than the memory."""
+
+
+def hash_of(file: IO[bytes], kind: str) -> bytes:
+    """Return the hash of the content of an open file, of a kind that hashlib has."""
+    found = hashlib.new(kind)
+    while piece := file.read(_PIECE):
+        found.update(piece)
+    return found.digest()
 
 
 def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> bytes:

@@ -14,7 +14,6 @@ A bag of ROS 2 may be in a folder of its own. The files of the tables [dives] of
 A command is that of an axis, or, in a test of a thrust curve, that of all thrusters that were tested together.
 """
 
-import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed
+from rov_fmu.io.reading import hash_of
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
@@ -385,11 +385,8 @@ def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
 
 def file_hash(path: Path, kind: str = "sha3_256") -> str:
     """Return the hash of a file, of a kind that hashlib has. Raises DataFileError."""
-    found = hashlib.new(kind)
     try:
-        with path.open("rb") as file:  # in pieces, because a bag may be larger than the memory
-            while piece := file.read(2**20):
-                found.update(piece)
+        with path.open("rb") as file:
+            return hash_of(file, kind).hex()
     except OSError as error:
         raise DataFileError(f"{path}: cannot be read: {error.strerror or error}") from error
-    return found.hexdigest()

@@ -1,6 +1,5 @@
 """The claims about an FMU that `rov-fmu prove --report` checks: each with its measurement and where to look."""
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.proof import TIME_LIMIT
 from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.messages import Progress, ProofError, silent
+from rov_fmu.io.reading import hash_of
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,9 @@ def prove_claims(
         for n, claim in enumerate(CLAIMS):
             on_progress(claim.name.lower(), n / len(CLAIMS))
             evidence.append((claim, _checked(claim, subject)))
-        digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
-        return Proof(fmu, digest, subject.description, measures.card_of(subject), evidence)
+        with fmu.open("rb") as file:
+            sha256 = hash_of(file, "sha256").hex()
+        return Proof(fmu, sha256, subject.description, measures.card_of(subject), evidence)
 
 
 def _checked(claim: Claim, subject: Subject) -> Evidence:

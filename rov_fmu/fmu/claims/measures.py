@@ -164,11 +164,12 @@ def cost(subject: Subject) -> Evidence:
     """Measure how long a communication step takes."""
     if subject.obstacle:
         return _not(subject.obstacle)
-    plan, h = subject.plan, subject.step
-    steps = max(1, round((plan.stop - plan.start) / len(plan.pieces) / h))
+    plan = subject.plan
+    piece = (plan.stop - plan.start) / len(plan.pieces)
+    steps = max(1, round(piece / subject.step))
+    h = piece / steps
     with subject.runs() as child:
         seconds = np.array(child.call("durations", plan, steps, _COST_SECONDS))
-    h = (plan.stop - plan.start) / len(plan.pieces) / steps
     low, median, high = np.quantile(seconds, (0.05, 0.5, 0.95)).tolist()
     words = f"The median of {len(seconds):,} communication steps of {h:.3g} s is {_time(median)}; 90 % take "
     words += f"{_time(low)} to {_time(high)}, with the call from Python. "

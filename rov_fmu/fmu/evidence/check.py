@@ -4,7 +4,6 @@ import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from hashlib import sha3_256
 from pathlib import Path
 
 from lxml import etree
@@ -14,11 +13,10 @@ from rov_fmu.fmu.evidence.signature import check_signature
 from rov_fmu.fmu.unpacking import refusal
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.messages import NO_FILE, FileError, ProofError, brief, shown
+from rov_fmu.io.reading import hash_of
 
 _MOST_BYTES = 20_000_000
 """The largest size of the meta-data."""
-_PIECE = 2**20
-"""The number of bytes that are hashed at a time."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +98,8 @@ def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str
 
 def _hash(archive: zipfile.ZipFile, name: str) -> str:
     """Return the SHA3-256 of a file in the archive, or an empty text if it cannot be unpacked."""
-    found = sha3_256()
     try:
         with archive.open(name) as file:
-            while piece := file.read(_PIECE):
-                found.update(piece)
+            return hash_of(file, "sha3_256").hex()
     except Exception:  # zipfile raises many kinds on damaged archives
         return ""
-    return found.hexdigest()

@@ -101,14 +101,16 @@ def _is_as_in_file(vehicle: Vehicle, path: Path) -> bool:
 def _tables(vehicle: Vehicle) -> Iterator[tuple[Path, str, str]]:
     """Yield the tables that the vehicle file names, with their roles and in words."""
     for curve in vehicle.layout.curves:
-        yield from (
-            (table.path, "model", f"Measured thrust, curve {curve.name}") for table in curve.tables if table.path
-        )
+        for table in curve.tables:
+            if table.path:
+                yield table.path, "model", f"Measured thrust, curve {curve.name}"
         if curve.electric_current:
             yield curve.electric_current.path, "model", f"Measured electric current, curve {curve.name}"
-    for axis, names in TABLES.items() if vehicle.data else ():
+    if not vehicle.data:
+        return
+    for axis, names in TABLES.items():
         for name, words in zip(names, ("response", "steady velocities"), strict=True):
-            if vehicle.data and (path := vehicle.data / name).is_file():
+            if (path := vehicle.data / name).is_file():
                 yield path, "result", f"Published table: {words} in {axis}, printed and measured"
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rov_fmu.io.messages import FileError, InputError, ProofError
-from rov_fmu.io.reading import read_bytes
+from rov_fmu.io.reading import hash_of, read_bytes
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -26,8 +26,6 @@ _VERSION = (1).to_bytes(4, "big")
 _BEGIN, _END = "-----BEGIN SSH SIGNATURE-----", "-----END SSH SIGNATURE-----"
 _MOST_BYTES = 100_000
 """The largest size of a key or a signature."""
-_PIECE = 2**20
-"""The number of bytes that are hashed at a time."""
 _MAKE_ONE = "must be an Ed25519 key, which `ssh-keygen -t ed25519 -f KEY` makes"
 
 
@@ -110,12 +108,10 @@ def check_signature(fmu: Path, key: Path | None = None) -> str:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     public, signature = _read(path)
-    digest = hashlib.sha512()
     with fmu.open("rb") as file:
-        while piece := file.read(_PIECE):
-            digest.update(piece)
+        found = hash_of(file, _HASH.decode())
     try:
-        Ed25519PublicKey.from_public_bytes(public).verify(signature, _message(digest.digest()))
+        Ed25519PublicKey.from_public_bytes(public).verify(signature, _message(found))
     except (InvalidSignature, ValueError) as error:
         reason = "the FMU was altered or built again after it was signed"
         raise ProofError(f"{fmu}: the signature {path} does not fit: {reason}") from error

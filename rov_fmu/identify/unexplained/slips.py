@@ -104,7 +104,7 @@ def _words(channel: Channel, scale: float) -> str:
     unit, axis = channel.quantity.unit, channel.quantity.axis
     if scale < 0.0:
         assert axis
-        return f"is its sign right ({axis.positive} is positive), and are those of the commands right"
+        return f"is its sign right ({axis.positive} is positive), and are the signs of the commands right"
     meaning = (_ANGLES if unit.startswith("rad") else _LENGTHS)[scale].format(unit)
     return f"is it {meaning}" if meaning else f"are its numbers {1.0 / scale:g} times too small for its unit"
 
