@@ -53,7 +53,9 @@ def tables() -> dict[str, Table]:
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors()}
     plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
     found |= {name: _plan_table(of) for name, of in plans.items()}
-    return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
+    found |= {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
+    as_thruster = {row[0] for row in found["thruster"][2:]}
+    return found | {"fin": [row for row in found["fin"] if row[0] not in as_thruster]}
 
 
 def _priors() -> Table:
@@ -66,13 +68,34 @@ def _axis() -> Table:
     """Return the coefficients of an axis, with their units along an axis and about one."""
     words = axis_words(SURGE) | {"axis": "the axis", "velocity": "i", "what": "mass or moment of inertia"}
     words |= {"push": "thrust", "positive": "as its velocity", "negative": "for negative velocities"}
-    rows = []
+    rows: Table = []
     for key, kind in (AXIS | TUNING).items():
         units = dict.fromkeys(kind.filled(**axis_words(axis)).unit for axis in (SURGE, ROLL))
         bounds = f"{number(kind.minimum, 6)}\xa0…\xa0{number(kind.maximum, 6)}"
         value = ", ".join([*(["needed"] if kind.needed else []), " or ".join(units), bounds])
-        rows.append((f"`{key}`", value, kind.filled(**words).description))
+        _add(rows, key, value, kind.filled(**words).description)
     return [_KEYS, ("---",) * 3, *rows]
+
+
+def _add(rows: Table, key: str, value: str, words: str) -> None:
+    """Add a row for a key, or the key to the row before, if it is the same quantity in reverse or along the next axis.
+
+    The symbol of a coefficient and its owner, which the key and the heading say, are left out of its words.
+    """
+    if re.fullmatch(r"[A-Za-z](_\w+)?", key):
+        words = re.sub(rf" {key}(?![\w^)])", "", words, count=1).replace(" of the curve", "")
+    words = re.sub(r" (?:of|in) the axis", "", words)
+    of_last = rows[-1][0].split("`")[-2] if rows else ""
+    of_same = (f"`{key.removesuffix('_reverse')}`", *(f"`{first}{key[1:]}`" for first in "xy"))
+    if rows and rows[-1][1] == value.replace("needed, ", "") and (f"`{of_last}`" in of_same and of_last != key):
+        keys, _, before = rows[-1]
+        place = words.partition(", ")[2]
+        rows[-1] = (f"{keys}, `{key}`", value, f"{before}, {place}" if place else before)
+    elif rows and key.endswith("_reverse"):
+        base = next(n for n, row in enumerate(rows) if row[0] == f"`{key.removesuffix('_reverse')}`")
+        rows[base] = (f"{rows[base][0]}, `{key}`", *rows[base][1:])
+    else:
+        rows.append((f"`{key}`", value, words))
 
 
 def _columns() -> Table:
@@ -182,15 +205,15 @@ def _terminals() -> Table:
 
 
 def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
-    """A row a key."""
-    rows = []
+    """A row a key; keys of one quantity share a row."""
+    rows: Table = []
     for key, entry in table["properties"].items():
         found = _resolved(entry, schema)
         of_value = found.get("properties", {}).get("value")
         unit = found["properties"].get("unit", {}).get("const", "") if of_value else ""
         needed = "needed" if key in table.get("required", ()) else ""
         value = ", ".join(filter(None, (needed, unit, _allowed(of_value or found))))
-        rows.append((f"`{key}`", value, _words(found)))
+        _add(rows, key, value, _words(found))
     return [_KEYS, ("---",) * 3, *rows]
 
 

@@ -220,8 +220,8 @@ _Vector = Annotated[
 
 
 class Direction(Strict):
-    """The direction of the force at a positive command, and of a fin's lift while the vehicle moves ahead: forward,
-    starboard, down. It has any length except zero."""
+    """The direction of the force at a positive command, or of a fin's lift ahead: forward, starboard, down. It has any
+    length except zero."""
 
     value: Annotated[_Vector, AfterValidator(_unit_vector)]
     """Three numbers: forward, starboard, down."""
@@ -230,9 +230,8 @@ class Direction(Strict):
 
 
 class Position(Strict):
-    """The position from the origin of the body frame, which is the centre of mass unless [body] says otherwise:
-    forward, starboard, down. It is needed for roll, pitch and yaw, unless the thruster has the key `arm`, or only turns
-    in yaw and acts straight up or down."""
+    """The position from the origin of the body frame: forward, starboard, down. It is needed for roll, pitch and yaw,
+    unless the thruster has the key `arm`, or only turns in yaw and acts straight up or down."""
 
     value: Annotated[_Vector, AfterValidator(_near)]
     """Three numbers: forward, starboard, down."""
@@ -245,9 +244,9 @@ class Driven(Strict):
     """A thruster or a fin: a part that commands drive, without its numbers."""
 
     name: Symbol
-    """The name. The FMU's variables contain it: `u_<name>` for the command, and `F_<name>` for a thruster's force."""
+    """The name in the FMU: the command is `u_<name>`, and the force of a thruster `F_<name>`."""
     description: Name = ""
-    """A short description, for example "left thruster" or "rudder"."""
+    """For example "left thruster" or "rudder"."""
     direction: Direction
     position: Position | None = None
 
@@ -263,7 +262,7 @@ class Thruster(Driven):
     curve: str
     """The name of the thrust curve."""
     arm: Literal["port", "starboard"] | None = None
-    """The side of a thruster that pushes ahead with the arm R sin γ, (4). This key replaces a position."""
+    """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
 
     @property
     def side(self) -> float:

@@ -37,13 +37,13 @@ class Head(Strict):
     name: Name
     """The name for people; at most 100 characters."""
     identifier: Annotated[str, AfterValidator(_identifier)]
-    """A C identifier that Windows does not reserve: modelIdentifier and modelName of the FMU, and its file name."""
+    """A C identifier that Windows does not reserve: the name of the FMU."""
     version: Name
-    """The version of the vehicle; goes into the FMU."""
+    """The version of the vehicle."""
     description: Text
-    """A description in one sentence; goes into the FMU."""
+    """One sentence."""
     source: Text
-    """Who identified the vehicle, and where it is published; the FMU's author."""
+    """Who identified the vehicle, and where; the FMU's author."""
 
 
 TABLES = {
@@ -83,15 +83,13 @@ _NAME_OF_REPORT = WithJsonSchema({"type": "string", "minLength": 1, "maxLength":
 
 
 class FileHead(Head):
-    """The names of a vehicle, where it comes from, and the folders beside its file."""
+    """Names, source, and folders beside the file."""
 
     data: Annotated[Path, _folder([*chain(*TABLES.values())]), _STRING] | None = None
-    """A folder beside the file with the published tables, which `rov-fmu tables` prints, or one that ships
-    (`videoray/tables`). Its files have the names and headers of those in `models/videoray/tables`."""
+    """A folder with the published tables that `rov-fmu tables` prints, in the form of `models/videoray/tables`."""
     pictures: Annotated[Path, _folder(PICTURES), _STRING] | None = None
-    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, or one that
-    ships (`videoray/pictures`). Drawings are shown on a light background. The icon and the thrusters are always drawn
-    from their geometry."""
+    """A folder with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, for a light background. The
+    icon and the thrusters are always drawn from their geometry."""
 
 
 _Sentences = Annotated[tuple[Text, ...], BeforeValidator(as_tuple)]
@@ -137,17 +135,17 @@ def _with_their_units(ranges: dict[str, IdentifiedRange]) -> dict[str, Identifie
 
 
 class Validity(Strict):
-    """The range of thruster commands in which the model holds, and what it leaves out."""
+    """Where the model holds, and what it leaves out."""
 
     command_max: _Command
-    """The strongest thruster command for which the model was identified, as a fraction of the full command."""
+    """The strongest command for which the model was identified."""
     command_min: Annotated[_Command, AfterValidator(_below_maximum)]
-    """The weakest thruster command for which the model was identified."""
+    """The weakest such command."""
     identified: Annotated[dict[str, IdentifiedRange], AfterValidator(_with_their_units)] = Field(default={})
-    """The ranges over which the vehicle was identified: velocities u, v, w, p, q, r, roll phi, pitch theta and depth z.
-    `rov-fmu identify` writes them. With them, the FMU has the output `outside`."""
+    """The identified ranges of the velocities u, v, w, p, q, r, of roll phi, pitch theta and depth z, which
+    `rov-fmu identify` writes. With them, the FMU has the output `outside`."""
     limits: _Sentences = ()
-    """Known effects on this vehicle that the model leaves out, in sentences. They appear in the FMU's documentation."""
+    """Known effects that the model leaves out, in sentences, for the FMU's documentation."""
 
     @property
     def command_range(self) -> tuple[float, float]:
@@ -176,7 +174,7 @@ def _report(name: object, info: ValidationInfo) -> Path:
 
 
 class Provenance(Strict):
-    """What made the file. `rov-fmu identify` writes this table; a file written by hand needs none."""
+    """What made the file, as `rov-fmu identify` writes it."""
 
     tool: Text
     """The tool that made the file."""

@@ -88,15 +88,14 @@ def _coefficient_keys(table: Strict, kinds: Mapping[str, Declaration]) -> tuple[
 
 
 class Body(_coefficients("Body", BODY | RESTORING, needed=False)):  # type: ignore[misc]
-    """The mass, needed for surge, sway and heave; the moments of inertia about the origin, needed for roll, pitch and
-    yaw; weight and buoyancy with their centres, which act in roll and pitch."""
+    """Mass and moments of inertia, weight and buoyancy with their centres."""
 
     model_config = DOCUMENTED
 
     coupling: bool = False
-    """True if the forces include the Coriolis and Munk terms of the mass matrix, which couple the axes: a vehicle that
-    turns while it moves is pushed sideways. Set it for a vehicle that moves along several axes at once. Without roll
-    and pitch, the terms act in surge, sway and yaw, and the vehicle needs all three."""
+    """True if the Coriolis and Munk terms of the mass matrix couple the axes: a vehicle that turns while it moves is
+    pushed sideways. Set it for a vehicle that moves along several axes at once. Without roll and pitch, the vehicle
+    needs surge, sway and yaw."""
 
 
 _PULSES = (500.0, 2500.0)
@@ -117,7 +116,7 @@ def _pulses(given: object) -> tuple[float, ...]:
 
 
 class Commands(_coefficients("Commands", COMMANDS)):  # type: ignore[misc]
-    """The form of the commands, and their way to the thrusters and fins."""
+    """The dead time and the form of the commands."""
 
     model_config = DOCUMENTED
 
@@ -129,8 +128,8 @@ class Commands(_coefficients("Commands", COMMANDS)):  # type: ignore[misc]
         ]
         | None
     ) = None
-    """The pulse widths of full reverse, neutral and full thrust ahead, in µs: `[1100, 1500, 1900]`. With this key, the
-    commands of the FMU are pulse widths in µs instead of fractions from -1 to 1."""
+    """Pulse widths of full reverse, neutral and full thrust ahead, µs: `[1100, 1500, 1900]`. With this key, the
+    commands of the FMU are pulse widths."""
 
 
 class Arm(_coefficients("Arm", ARM)):  # type: ignore[misc]
@@ -172,9 +171,9 @@ class TableAtVoltage(Strict):
 
 
 class ElectricCurrent(Strict):
-    """The electric current of one thruster over its command: `voltage` in V, at which it was measured, and `table`, the
-    name of a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it, or none.
-    The motion does not depend on it; `rov-fmu sitl` tells ArduSub the sum over all thrusters."""
+    """The electric current of one thruster, which only `rov-fmu sitl` uses: the `voltage` (V) at which it was measured,
+    and the `table`, a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it,
+    or none."""
 
     voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
     """The voltage, V."""
@@ -196,16 +195,16 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     model_config = DOCUMENTED
 
     description: Name = ""
-    """A short description of the thrusters with this curve, for example "rear pair"."""
+    """The thrusters with this curve, for example "rear pair"."""
     equation: Name = ""
-    """The equation or table in which the curve is published. A bare number, (9), is of Enevoldsen et al. 2018."""
+    """Where the curve is published. A bare number, (9), is an equation of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
-    """The number of thrusters that gave the force together when the curve was measured."""
+    """Number of thrusters that gave the measured force together."""
     table: _Thrust | None = None
-    """The name of a CSV file beside this one, or of one that ships (`bluerov2/t200/t200_16_v.csv`), with the columns
-    `command [1]`, `[%]` or `[us]`, and `thrust [N]`, `[kgf]` or `[lbf]`. It replaces a_t, b_t and c_0."""
+    """A CSV file with the columns `command [1]`, `[%]` or `[us]`, and `thrust [N]`, `[kgf]` or `[lbf]`. It replaces
+    a_t, b_t and c_0."""
     tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
-    """Tables at several voltages, which replace `table`. Between two voltages, the thrust is interpolated linearly."""
+    """Tables at several voltages, which replace `table`."""
 
     electric_current: ElectricCurrent | None = None
 
@@ -267,7 +266,7 @@ class Fin(_coefficients("Fin", _FIN, base=Driven)):  # type: ignore[misc]
 
 
 class Battery(Strict):
-    """The battery, on whose voltage the thrust depends."""
+    """The battery, if thrust depends on its voltage."""
 
     voltage: quantity("Battery_voltage", Declaration("V", "Voltage of the battery", 0.1, 1000.0))  # type: ignore[valid-type]
     """The value of the FMU's input `voltage` that holds unless it is set."""
@@ -299,10 +298,9 @@ class Estimated(Strict):
     """The standard error and the correlations of an identified coefficient, from which a study draws vehicles."""
 
     error: Annotated[Finite, Field(ge=0.0)]
-    """The standard error of a normal distribution, in the unit of the coefficient."""
+    """The standard error, in the unit of the coefficient."""
     correlation: dict[str, Annotated[Finite, Field(ge=-1.0, le=1.0)]] = Field(default={}, max_length=_MOST_COEFFICIENTS)
-    """The correlations with other coefficients of this table, by their names in the FMU. Each pair is given once; the
-    correlation of a pair that is not given is 0."""
+    """The correlations with other coefficients. Each pair is given once; without it, the correlation is 0."""
 
 
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
@@ -319,19 +317,18 @@ class Tables(Strict):
     body: Body | None = None
     arm: Arm | None = None
     curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
-    """The thrust curves by name. The names of their coefficients in the FMU contain it: `a_t_<name>`."""
+    """The thrust curves by name."""
     thruster: list[Thruster] = Field(default=[], max_length=MOST)
-    """The thrusters, one table [[thruster]] each, in the order of their variables in the FMU."""
+    """The thrusters, in the order of their variables in the FMU."""
     fin: list[Fin] = Field(default=[], max_length=MOST)
-    """The control surfaces, one table [[fin]] each."""
+    """The control surfaces."""
     battery: Battery | None = None
     commands: Commands | None = None
     axes: Axes | None = None
     cross: dict[CrossSymbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
-    """Coefficients of two or three axes by their names in the FMU: added mass `m_a_uq`, damping `b_d_uq` and `a_d_uq`,
-    lift `Y_ur`."""
+    """Added mass, damping and lift that couple axes."""
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
-    """Commands that drive several thrusters. Each has a table of the thrusters that it drives, with their gains."""
+    """Commands that drive several thrusters, with gains."""
 
     @property
     def axis_tables(self) -> dict[Axis, Any]:
@@ -407,10 +404,9 @@ class File(Tables, _Head, json_schema_extra=_needed_in_file):
     # Any table may be missing, so that others are read where one has a mistake. read_tables tells what lacks.
 
     alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
-    """Other sets of published coefficients, by a name for each set."""
+    """Other published coefficients."""
     estimates: dict[str, Estimated] = Field(default={}, max_length=_MOST_COEFFICIENTS)
-    """Standard errors and correlations of identified coefficients, by their names in the FMU. Each such coefficient has
-    an `interval`."""
+    """Standard errors and correlations of identified coefficients."""
     provenance: Provenance | None = None
 
 
