@@ -5,20 +5,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache
-from math import degrees, hypot, radians
+from math import degrees
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import TransferFunction, step
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE
-from rov_fmu.equation.layout import Layout, Thruster, VehicleAxis
+from rov_fmu.equation.catalogue import AXES, PITCH, ROLL, SURGE
+from rov_fmu.equation.layout import Layout
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from verification.references.rigid_body import Body, euler_angles, integrate, quaternion_of, rotation, zeros
 
 Table = list[tuple[str, ...]]
 
@@ -26,8 +24,6 @@ NEWTON = 9.80665
 """In 1 kgf."""
 OWN_THRUST = 30.4
 """Newton, of a thruster at full command by (18) of von Benzon et al."""
-TRANSFER = (6136.0, 108700.0), (1.0, 89.0, 9258.0, 108700.0)
-"""(19) of von Benzon et al., from commanded to actual thrust."""
 
 
 @dataclass(frozen=True)
@@ -44,25 +40,6 @@ class Publication:
     buoyancy: float
     above: float
     """The centre of buoyancy above the centre of mass, m."""
-
-    def body(self, load: tuple[float, ...]) -> Body:
-        """The vehicle in the reference, without thrusters."""
-        M, D, D_q = zeros(), zeros(), zeros()
-        for i in range(6):
-            M[i][i] = self.mass[i] + self.added_mass[i]
-            D[i][i], D_q[i][i] = self.linear[i], self.quadratic[i]
-        return Body(
-            self.axes,
-            mass=M,
-            linear=D,
-            linear_astern=D,
-            ahead=D_q,
-            astern=D_q,
-            load=load,
-            weight=self.weight,
-            buoyancy=self.buoyancy,
-            centre_of_buoyancy=(0.0, 0.0, -self.above),
-        )
 
 
 WU = Publication(
@@ -96,12 +73,9 @@ def tables() -> dict[str, Table]:
         "videoray_printed": _printed(ships["videoray"]),
         "videoray_measured": _measured(ships["videoray"], ships["videoray_refit"]),
         "t200": _t200(six),
-        "t200_lag": _lag(six),
         "sticks": _sticks(eight.layout),
         "top_speeds": _top_speeds(six, eight),
-        "published_motion": _published_motion(six, eight),
-        "tilting": _tilting(six, eight),
-        "left_out": _left_out(eight),
+        "tilting": _tilting(eight),
     }
 
 
@@ -129,10 +103,11 @@ def _printed(vehicle: Vehicle) -> Table:
 
 def _measured(paper: Vehicle, refit: Vehicle) -> Table:
     found = _table("", "V_ss, the paper's", "V_ss, refit", "Tau, the paper's", "Tau, refit")
+    quantities: list[Callable[[Response], Decimal | None]] = [lambda r: r.V_ss.measured, lambda r: r.Tau.measured]
     for t in load_tables(paper):
         cells = [
-            _furthest(_off(t.response(v, row.command)[n], measured(row)) for row in t.rows)
-            for n, measured in enumerate((lambda row: row.scaled.V_ss.measured, lambda row: row.scaled.Tau.measured))
+            _furthest(_off(t.response(v, row.command)[n], measured(row.scaled)) for row in t.rows)
+            for n, measured in enumerate(quantities)
             for v in (paper, refit)
         ]
         found.append((t.axis.name, *cells))
@@ -177,16 +152,6 @@ def _t200(vehicle: Vehicle) -> Table:
     return found
 
 
-def _lag(vehicle: Vehicle) -> Table:
-    t = np.array([0.0, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.4])
-    _, rise = step(TransferFunction(*TRANSFER), T=np.linspace(0.0, 0.4, 401))
-    lag = 1.0 - np.exp(-t / vehicle["T_t200"])
-    found = _table("after", *(f"{x * 1e3:.0f} ms" for x in t[1:]))
-    found.append(("published, third order", *(f"{rise[round(x * 1e3)]:.0%}" for x in t[1:])))
-    found.append(("shipped, first order", *(f"{x:.0%}" for x in lag[1:])))
-    return found
-
-
 # ---- BlueROV2 --------------------------------------------------------------------------------------------------------
 
 
@@ -214,39 +179,6 @@ def _top_speeds(six: Vehicle, eight: Vehicle) -> Table:
     return found
 
 
-MANOEUVRE = [
-    (5.0, (0.6, 0.0, 0.0, 0.0)),
-    (3.0, (0.4, 0.0, 0.2, 0.3)),
-    (4.0, (0.0, 0.5, 0.0, 0.0)),
-    (3.0, (0.5, 0.0, -0.25, 0.0)),
-    (4.0, (-0.5, 0.0, 0.0, -0.4)),
-    (3.0, (0.0, -0.4, 0.15, 0.0)),
-    (5.0, (0.7, 0.0, 0.0, 0.0)),
-    (3.0, (0.0, 0.0, 0.0, 0.0)),
-]
-"""Seconds, and the sticks held: surge, sway, yaw, heave."""
-
-
-LEVEL = -1.0
-"""The z_B of a vehicle that stays level, as if an autopilot held it."""
-
-
-def fly(rov: Vehicle) -> tuple[dict[str, float], float]:
-    """Return where the manoeuvre ends, and the length of the track in the plane (m)."""
-    layout = rov.layout
-    sticks = [layout.signs(AXES[name]) for name in ("surge", "sway", "yaw", "heave")]
-    inputs: dict[str, list[float]] = {name: [] for name in layout.commands}
-    for seconds, held in MANOEUVRE:
-        for name in inputs:
-            value = sum(signs.get(name, 0.0) * stick for signs, stick in zip(sticks, held, strict=True))
-            inputs[name] += round(seconds * 10.0) * [value]
-    steps = len(inputs[next(iter(inputs))])
-    times = 0.1 * np.arange(steps + 1)
-    found = run(rov, times, {name: [*command, 0.0] for name, command in inputs.items()})
-    way = np.sum(np.hypot(np.diff(found["x"]), np.diff(found["y"])))
-    return {name: float(values[-1]) for name, values in found.items()}, float(way)
-
-
 def run(rov: Vehicle, times: np.ndarray, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Return the states and the attitude over time."""
     layout = rov.layout
@@ -254,116 +186,16 @@ def run(rov: Vehicle, times: np.ndarray, values: Mapping[str, Any]) -> dict[str,
     return dict(zip(record, simulate(rov, times, values, record).values[:, 0], strict=True))
 
 
-def without(rov: Vehicle, *, coupling: bool = False, lag: bool = False, shape: bool = False) -> Vehicle:
-    """The vehicle without its coupling, without its lag, with one symmetric quadratic for its thrust."""
-    (curve,) = rov.layout.curves
-    values = dict(rov.coefficients)
-    keys = curve.keys
-    if shape:
-        keys = tuple(key for key in keys if key in {"a_t", "b_t", "T"})
-        values |= zip((curve.coefficient("a_t"), curve.coefficient("b_t")), symmetric(), strict=True)
-    if lag:
-        keys = tuple(key for key in keys if key != "T")
-    layout = replace(rov.layout, curves=(replace(curve, keys=keys),), coupled=rov.layout.coupled and not coupling)
-    return Vehicle(layout, {name: values[name] for name in layout.coefficients})
-
-
-def _left_out(vehicle: Vehicle) -> Table:
-    level = vehicle.replaced({"z_B": LEVEL})
-    whole, way = fly(level)
-    found = _table("left out", "position", "heading", "depth")
-    cases = {
-        "asymmetry and dead band of the thrust": without(level, shape=True),
-        "Coriolis and Munk terms": without(level, coupling=True),
-        "lag of the thrust": without(level, lag=True),
-        "all three": without(level, coupling=True, lag=True, shape=True),
-        "the autopilot, with buoyancy 5 cm above the centre of mass": vehicle.replaced({"z_B": -0.05}),
-        "the autopilot": vehicle,
-    }
-    for name, rov in cases.items():
-        end, _ = fly(rov)
-        x, y, z, psi = (end[key] - whole[key] for key in ("x", "y", "z", "psi"))
-        found.append((name, f"{hypot(x, y):.2f} m", f"{degrees(psi):+.1f}°", f"{z:+.2f} m"))
-    found.append((f"length of the track: {way:.1f} m", "", "", ""))
-    return found
-
-
-# ---- Roll and pitch --------------------------------------------------------------------------------------------------
-
-AFTER = (0.5, 1.0, 2.0, 5.0)
-"""Seconds at which motions are compared."""
-ROUNDING = 1e-12
-"""Motions that differ by less, in rad or m/s, are the same."""
-
-
-def _published_motion(six: Vehicle, eight: Vehicle) -> Table:
-    """Motions without thrust, by the published numbers in the reference and by the C of the vehicle that ships."""
-    found = _table("", "", *(f"{t:g} s" for t in AFTER), "furthest")
-    pushed = {"X_ext": 10.0, "Y_ext": 5.0, "N_ext": 0.3}
-    cases: list[tuple[str, Vehicle, Publication, tuple[float, float], Mapping[str, float], str]] = [
-        ("BlueROV2, pushed ahead, aside and around", six, WU, (0.0, 0.0), pushed, "v"),
-        ("Heavy, pushed likewise", eight, VON_BENZON, (0.0, 0.0), pushed, "v"),
-        ("Heavy, let go at 30° of roll", eight, VON_BENZON, (radians(30.0), 0.0), {}, "phi"),
-        ("Heavy, let go at 30° of pitch", eight, VON_BENZON, (0.0, radians(30.0)), {}, "theta"),
-        ("Heavy, 1 N.m bow up", eight, VON_BENZON, (0.0, 0.0), {"M_ext": 1.0}, "theta"),
-    ]
-    for title, vehicle, published, (phi, theta), loads, name in cases:
-        load = tuple(loads.get(axis.external, 0.0) for axis in AXES.values())
-        state = [*(6 * [0.0]), *map(float, quaternion_of(phi, theta, 0.0)), *(3 * [0.0])]
-        wanted, at = [], 0.0
-        for t in AFTER:
-            state, at = list(integrate(published.body(load), state, t - at)), t
-            angles = dict(zip(("phi", "theta", "psi"), euler_angles(rotation(state[6:10])), strict=True))
-            wanted.append(float({**dict(zip("uvwpqr", state, strict=False)), **angles}[name]))
-        start = {"phi_0": phi, "theta_0": theta} if vehicle.layout.has_attitude else {}
-        moved = run(vehicle, np.array([0.0, *AFTER]), {**loads, **start})[name][1:]
-        scale, unit = (degrees(1.0), "°") if name in ("phi", "theta") else (1.0, " m/s")
-        cells = [f"{scale * value:.3f}{unit}" for value in wanted]
-        furthest = max(
-            abs(a - b) for a, b in zip(moved, wanted, strict=True)
-        )  # rounding errors, which differ by machine
-        below = f"below {ROUNDING:g}" if furthest < ROUNDING else f"{furthest:.0e}"
-        found.append((title, {"v": "sway v", "phi": "roll φ", "theta": "pitch θ"}[name], *cells, below))
-    return found
-
-
-def _at_depth(thruster: Thruster, z: float) -> Thruster:
-    """Return a thruster at another height relative to the centre of mass (m)."""
-    assert thruster.position
-    position = thruster.position.model_copy(update={"value": (*thruster.place[:2], z)})
-    return thruster.model_copy(update={"position": position})
-
-
-def of_wu(rov: Vehicle, below: float, above: float) -> Vehicle:
-    """The BlueROV2 with Wu's roll and pitch: thrusters below, and buoyancy above the centre of mass (m)."""
-    layout = rov.layout
-    forms = {form.axis: replace(form, keys=tuple(key for key in form.keys if key != "F_0")) for form in layout.axes}
-    forms |= {axis: VehicleAxis(axis, forms[HEAVE].keys) for axis in (ROLL, PITCH)}
-    thrusters = tuple(_at_depth(t, below) if t.position and not t.direction.value[2] else t for t in layout.thrusters)
-    axes = tuple(forms[axis] for axis in AXES.values())
-    layout = replace(layout, axes=axes, thrusters=thrusters, restoring=("W", "B", "z_B"))
-    values = {**rov.coefficients, "W": WU.weight, "B": WU.buoyancy, "z_B": -above}
-    for axis in (ROLL, PITCH):
-        i = list(AXES.values()).index(axis)
-        values[axis.inertia] = WU.mass[i]
-        rows = {"m_a": WU.added_mass, "b_d": WU.linear, "a_d": WU.quadratic, "alpha": 6 * (1.0,), "beta": 6 * (1.0,)}
-        values |= {axis.coefficient(key): row[i] for key, row in rows.items()}
-    return Vehicle(layout, {name: values[name] for name in layout.coefficients})
-
-
 AHEAD = (0.1, 0.2, 0.3, 0.5, 1.0)
 """Commands."""
 
 
-def _tilting(six: Vehicle, eight: Vehicle) -> Table:
+def _tilting(eight: Vehicle) -> Table:
     """How far vehicles without control tilt under thrust ahead."""
     found = _table("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))
     cases = {
         "Heavy": eight,
         "Heavy, buoyancy 5 cm above": eight.replaced({"z_B": -0.05}),
-        "Wu's roll and pitch: thrusters 8.5 cm below, buoyancy 2 cm above": of_wu(six, 0.085, WU.above),
-        "the same with thrusters at the centre of mass": of_wu(six, 0.0, WU.above),
-        "the same with the heights of bluerov2_gz: 1.1 cm below, 4.9 cm above": of_wu(six, 0.011, 0.049),
     }
     for title, rov in cases.items():
         cells = []

@@ -48,10 +48,17 @@ def tables() -> dict[str, Table]:
     named |= {
         name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
     }
-    categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
-    found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
+    categories: Table = [("category", "what"), ("---",) * 2]
+    categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
+    found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors()}
-    plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
+    plans: dict[str, type[Strict]] = {
+        "plan": Plan,
+        "varied": Varied,
+        "signal": Signal,
+        "input_file": InputFile,
+        "keep": Keep,
+    }
     found |= {name: _plan_table(of) for name, of in plans.items()}
     found |= {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
     as_thruster = {row[0] for row in found["thruster"][2:]}

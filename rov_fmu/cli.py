@@ -170,26 +170,26 @@ def _commands(context: click.Context) -> None:
     "--output",
     type=_FILE,
     metavar="FILE.fmu",
-    help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0, in the current folder.",
+    help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0.",
 )
 @click.option(
     "--backend",
     type=_Choice(["native", "pythonfmu"], {"python": "pythonfmu", "c": "native"}),
     default="native",
     show_default=True,
-    help="Compiled C, or pure Python with PythonFMU (FMI 2.0 only).",
+    help="Compiled C, or Python with PythonFMU (FMI 2.0 only).",
 )
 @click.option(
     "--fmi",
     type=_Choice([2, 3], {"2.0": "2", "3.0": "3"}),
     default=2,
     show_default=True,
-    help="Version of FMI: 2.0 or 3.0.",
+    help="Version of FMI.",
 )
 @click.option(
     "--interface",
     type=_Choice([*INTERFACES], {"co-simulation": "cs", "model-exchange": "me"}),
-    help="What the FMU offers: Co-Simulation, Model Exchange or both. The default is both, or cs for pure Python.",
+    help="Co-Simulation, Model Exchange or both. The default is both, or cs for Python.",
 )
 @click.option(
     "--platform",
@@ -202,13 +202,13 @@ def _commands(context: click.Context) -> None:
 @click.option(
     "--osp",
     is_flag=True,
-    help="Also write <identifier>_OspModelDescription.xml beside the FMU (OSP-IS 1.0.1; FMI 2.0 only).",
+    help="Also write <identifier>_OspModelDescription.xml (OSP-IS 1.0.1; FMI 2.0 only).",
 )
 @click.option(
     "--sign",
     type=_FILE,
     metavar="KEY",
-    help="File of a private key (Ed25519, by ssh-keygen or in PEM) that signs the FMU. The signature is FILE.fmu.sig.",
+    help="Private key (Ed25519, by ssh-keygen or in PEM) that signs the FMU. The signature is FILE.fmu.sig.",
 )
 def _build(
     vehicle: Path,
@@ -276,17 +276,16 @@ def _print_built(built: "Built", seconds: float) -> None:
     multiple=True,
     type=_setting,
     metavar="NAME=VALUE",
-    help="Set an input that is held, a coefficient, or a state at the start, in SI units. The name of an axis is a "
-    "command to all thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
+    help="Set an input, a coefficient, or a state at the start, in SI units. The name of an axis commands all "
+    "thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
 )
 @click.option(
     "--input",
     "commands",
     type=_FILE,
     metavar="FILE",
-    help="Inputs over time. In a table without units (.csv), the first column is the time (s), and the others have the "
-    "names of inputs and their values (0.3 is a command of 30 %). Any log that identify reads gives its commands. Each "
-    "row is held up to the next one.",
+    help="Inputs over time: any log that identify reads, or a table (.csv) of the time (s) and of inputs (0.3 is a "
+    "command of 30 %). Each row is held up to the next one.",
 )
 @click.option(
     "--stop",
@@ -296,14 +295,14 @@ def _print_built(built: "Built", seconds: float) -> None:
 @click.option(
     "--step",
     type=_seconds("1e-6"),
-    help="Time between two results, s. The default is 0.01. It does not change the motion.",
+    help="Time between two results, s, which does not change the motion. The default is 0.01.",
 )
 @click.option(
     "-o",
     "--output",
     type=_FILE,
     metavar="RESULT.csv",
-    help="Results to write: a table (.csv, .parquet), or .mcap for Foxglove and PlotJuggler.",
+    help="Results to write (.csv, .parquet, or .mcap for Foxglove and PlotJuggler).",
 )
 @click.option(
     "--plot",
@@ -311,9 +310,7 @@ def _print_built(built: "Built", seconds: float) -> None:
     flag_value=Path(),
     type=_FILE,
     metavar="[FILE.png]",
-    help=(
-        "Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, the plot opens in a browser."
-    ),
+    help=("Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, a browser shows the plot."),
 )
 def _simulate(
     vehicle: Path,
@@ -326,8 +323,8 @@ def _simulate(
 ) -> None:
     """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
 
-    Inputs that are not set have their usual values, and states that are not set are 0. Without -o and --plot the values
-    at the end are printed.
+    Inputs that are not set have their usual values, and states are 0. Without -o and --plot the values at the end are
+    printed.
     """
     from rov_fmu.interface.model import load
     from rov_fmu.interface.simulate_command import (
@@ -384,27 +381,23 @@ def _warn(message: str) -> None:
     "--against",
     callback=lambda _, __, given: given and find_vehicle(given),
     metavar="OTHER.toml",
-    help=(
-        "Another vehicle, which is shown as a ghost and gets the same commands. You can choose a recording on the page."
-    ),
+    help=("Another vehicle, which is shown as a ghost and gets the same commands."),
     shell_complete=_complete_vehicle,
 )
 @click.option(
     "--recording",
     type=_FILE,
     metavar="LOG",
-    help="A log in any format that identify reads: the vehicle flies its commands beside what was measured. A rov.toml "
-    "beside it is obeyed.",
+    help="A log that identify reads, with the rov.toml beside it: the vehicle flies its commands beside what was "
+    "measured.",
 )
 @click.option(
     "--identified",
     type=_FILE,
     metavar="LOGS.mcap",
-    help="What `identify --mcap` wrote: the bands of the errors and the unknown forces of the recording are shown.",
+    help="What `identify --mcap` wrote: bands of the errors and unknown forces are shown.",
 )
-@click.option(
-    "-o", "--output", type=_FILE, metavar="PAGE.html", help="Write the page to this file; do not open a browser."
-)
+@click.option("-o", "--output", type=_FILE, metavar="PAGE.html", help="Page to write; no browser is opened.")
 def _fly(
     vehicle: Path, against: Path | None, recording: Path | None, identified: Path | None, output: Path | None
 ) -> None:
@@ -480,37 +473,36 @@ def _open(path: Path, option: str) -> None:
     multiple=True,
     type=_setting,
     metavar="NAME=VALUE",
-    help="Set an input that is held (a current: V_N, V_E), a coefficient, or a state at the start, in SI units.",
+    help="Set an input (a current: V_N, V_E), a coefficient, or a state at the start, in SI units.",
 )
 @click.option(
     "--bottom",
     type=_number("a number from -1e6 to 1e6 (m)", -1e6, 1e6),
     default="20",
     show_default=True,
-    help="Depth of the bottom, m, to which a range is measured.",
+    help="Depth of the bottom, m.",
 )
 @click.option(
     "--log",
     type=_FILE,
     metavar="LOG.csv",
-    help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. If the autopilot is restarted, "
-    "the next log is LOG_2.csv, or the next free name. A run writes at most 20 logs, and 1,000,000 rows in all.",
+    help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. Each restart of the autopilot "
+    "begins another log: LOG_2.csv, or the next free name.",
 )
-@click.option("--force", is_flag=True, help="Replace logs that exist, also those with a number in their name.")
+@click.option("--force", is_flag=True, help="Replace logs that exist.")
 @click.option(
     "--log-rate",
     type=_number("a number from 1 to 100 (Hz)", 1.0, 100.0),
     default="10",
     show_default=True,
-    help="Rows of the log in a second.",
+    help="Rows of the log per second.",
 )
 @click.option(
     "--duration",
     type=_seconds("0.001"),
-    help="End this time after the start, s. It is the time of the simulation; without packets it is real time. "
-    "Without this option, end with Ctrl-C.",
+    help="End after this time of the simulation, s (real time without packets). Without this option, end with Ctrl-C.",
 )
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all of them.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all.")
 @click.option(
     "--port",
     type=_number("a whole number from 0 to 65535", 0, 65535, int),
@@ -540,13 +532,13 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
     metavar="FILE.sdf|.urdf",
     help="File to write. The default is <identifier>.sdf. URDF has the hydrodynamics for ROS 2.",
 )
-@click.option("--world", "in_world", is_flag=True, help="Put the model into a world with water, which Gazebo can run.")
+@click.option("--world", "in_world", is_flag=True, help="Add a world with water, which Gazebo can run.")
 @click.option(
     "--added-mass",
     type=_Choice(["link", "plugin"]),
     default="link",
     show_default=True,
-    help="Added mass in the link (physics engine DART), or in the Hydrodynamics plugin (any engine; may diverge).",
+    help="Added mass in the link (engine DART), or in the Hydrodynamics plugin (any engine; may diverge).",
 )
 def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) -> None:
     """Write a vehicle as a model for Gazebo (gz-sim). The default is the VideoRay Pro 4."""
@@ -572,19 +564,19 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
 @click.option(
     "--interface",
     type=_Choice(["co-simulation", "model-exchange"], {"cs": "co-simulation", "me": "model-exchange"}),
-    help="Interface to use. The default is the first of these that the FMU has.",
+    help="Interface to use. The default is the first that the FMU has.",
 )
 @click.option(
     "--tolerance",
     type=_number("a number above 0", nextafter(0.0, 1.0)),
-    help="Tolerance to use instead of that of each experiment.",
+    help="Tolerance instead of that of each experiment.",
 )
 @click.option(
     "--time-limit",
     type=_number("a number of seconds above 0, at most 1e6", nextafter(0.0, 1.0), 1e6),
     metavar="SECONDS",
     default=60.0,
-    help="Time that the FMU may take for each experiment. The default is 60 s.",
+    help="Time for each experiment. The default is 60 s.",
 )
 @click.option(
     "--key",
@@ -596,15 +588,15 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     "--report",
     type=_FILE,
     metavar="FILE",
-    help="Measure everything else, too, and write a page (HTML) with the evidence: step size, repeatability, "
-    "conservation, cost, limits, hashes, errors on unseen data.",
+    help="Page (HTML) to write with more evidence: step size, repeatability, conservation, cost, limits, hashes, "
+    "errors on unseen data.",
 )
 def _prove(
     fmu: Path, interface: str | None, tolerance: float | None, time_limit: float, key: Path | None, report: Path | None
 ) -> None:
-    """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do.
+    """Run the experiments that an FMU of any exporter contains (FMI-LS-REF), and compare the results.
 
-    Before, the hashes in the FMU and the signature beside it are checked, if there are any.
+    Before, hashes in the FMU and a signature beside it are checked.
     """
     _refuse_vehicle(fmu, f"must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
     from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
@@ -648,16 +640,15 @@ def _prove(
     "--workers",
     type=_number("a whole number from 1 to 1024", 1, 1024, int),
     metavar="N",
-    help="Number of processes on this machine. The default is its number of cores.",
+    help="Number of processes. The default is the number of cores.",
 )
-@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use instead of this machine: tcp://host:8786.")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use, tcp://host:8786.")
 @click.option(
     "--mcap",
     "run",
     type=_number("the number of a run, from 0", 0, 10**9, int),
     metavar="RUN",
-    help="Run whose kept outputs to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a "
-    "vehicle.",
+    help="Run to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a vehicle.",
 )
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None) -> None:
     """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
@@ -718,27 +709,27 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     "--report",
     type=_FILE,
     metavar="REPORT.html",
-    help="Report to write. A build from the vehicle file puts it into the FMU.",
+    help="Report to write, which a build puts into the FMU.",
 )
 @click.option(
     "--mcap",
     type=_FILE,
     metavar="LOGS.mcap",
-    help="File for Foxglove and PlotJuggler to write: of each log the commands, what was measured and predicted, the "
-    "bands, and the unknown force.",
+    help="File to write for Foxglove and PlotJuggler: what was commanded, measured and predicted, bands, and the "
+    "unknown force.",
 )
 @click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
 @click.option(
     "--inspect",
     "inspects",
     is_flag=True,
-    help="Only list what the log FOLDER, or each log in it, contains, and write a draft of rov.toml if there is none.",
+    help="Only list what each log in FOLDER contains, and write a draft of rov.toml if there is none.",
 )
 @click.option(
     "--draft",
     "drafts",
     is_flag=True,
-    help="Write a draft of rov.toml as --inspect does. It is an error if there is one already.",
+    help="The same, but it is an error if there is a rov.toml already.",
 )
 def _identify(
     folder: Path,

@@ -81,13 +81,13 @@ def test_every_figure_has_its_caption_beside_it_and_the_folder_is_created(
         assert (folder / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
 
 
-def test_the_readme_shows_every_figure_that_is_drawn_with_its_caption() -> None:
+def test_the_readme_shows_every_figure_that_is_drawn() -> None:
     page = " ".join((EXAMPLE / "README.md").read_text(encoding="utf-8").split())
     assert {path.name for path in SHIPPED.iterdir()} == {
         f"{name}.{suffix}" for name in FIGURES for suffix in ("svg", "txt")
     }
     for name, figure in FIGURES.items():
-        assert f"(../../docs/figures/{name}.svg) {figure.caption}" in page
+        assert f"(../../docs/figures/{name}.svg)" in page
         assert (SHIPPED / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
         shown, shipped = figure.content("svg", "double"), (SHIPPED / f"{name}.svg").read_bytes()
         assert size_of(shipped, "svg") == size_of(shown, "svg")

@@ -149,8 +149,8 @@ class Signal(Strict):
     steps: Points | None = None
     """[[time, value], ...]: each value is held until the next time. The times are communication points."""
     ramps: Points | None = None
-    """[[time, value], ...]: straight lines between the points; two points with the same time make a jump, which must be
-    at a communication point. An FMU holds an input over a step, so it gets the value at the middle of the step."""
+    """[[time, value], ...]: straight lines between the points; two points with the same time make a jump, at a
+    communication point. The FMU gets the value at the middle of each step."""
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -187,7 +187,7 @@ _Beside = Annotated[str, AfterValidator(_beside)]
 
 
 class InputFile(Strict):
-    """Inputs in a CSV file: the column `time` holds the time (s), each other column a variable of the FMU."""
+    """A CSV file with the column `time` (s) and one for each input."""
 
     path: _Beside
     """A file in the folder of the plan, or in a folder inside it."""
@@ -208,7 +208,7 @@ def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
 
 
 class Keep(Strict):
-    """The trajectories that are kept. Without this table none are kept, and only the figures remain."""
+    """The trajectories that are kept; none without this table."""
 
     outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_some), AfterValidator(_once)]
     """Names of variables."""
@@ -239,9 +239,9 @@ class Plan(Strict):
     """A study: many runs of one FMU."""
 
     title: Name | None = None
-    """The heading of the page. Without it, that is the name of the model."""
+    """The heading of the page."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
-    """An FMU for Co-Simulation in the folder of the plan, or in a folder inside it. A plan has this or `vehicle`."""
+    """An FMU for Co-Simulation in the folder of the plan. A plan has this or `vehicle`."""
     vehicle: _Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
     start_time: Finite = 0.0
@@ -255,15 +255,15 @@ class Plan(Strict):
     time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
     """The time that a run may take, s; a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
-    """The number of runs. A grid has one for each of its points. For the sampler saltelli it is rounded up to a
-    multiple of (number of varied variables + 2), where variables that are correlated with each other count as one."""
+    """The number of runs. A grid has one for each of its points. saltelli rounds it up to a multiple of (varied
+    variables + 2), where correlated ones count as one."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """The parameters of a run depend only on this and on the run's number."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
     """The method by which the values are drawn. Sobol indices need saltelli."""
     vary_from: _Beside | None = None
-    """A vehicle file beside the plan, or the name of a vehicle that ships. Its coefficients vary with the errors and
-    correlations that identification wrote there, except for those in [vary] and [set]."""
+    """A vehicle file or name. Its coefficients vary with their errors and correlations, except for those in [vary] and
+    [set]."""
     vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
     """The variables that differ from run to run. An input that varies is held during a run."""
     set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({}, max_length=_MOST_NAMED)
