@@ -323,8 +323,8 @@ def _simulate(
 ) -> None:
     """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
 
-    Inputs that are not set have their usual values, and states are 0. Without -o and --plot the values at the end are
-    printed.
+    Inputs that are not set have their usual values, and states start at 0. Without -o and --plot the values at the end
+    are printed.
     """
     from rov_fmu.interface.model import load
     from rov_fmu.interface.simulate_command import (
@@ -723,13 +723,13 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     "--inspect",
     "inspects",
     is_flag=True,
-    help="Only list what each log in FOLDER contains, and write a draft of rov.toml if there is none.",
+    help="Only list what the log FOLDER, or each log in it, contains, and draft a rov.toml if there is none.",
 )
 @click.option(
     "--draft",
     "drafts",
     is_flag=True,
-    help="The same, but it is an error if there is a rov.toml already.",
+    help="Draft a rov.toml as --inspect does. It is an error if there is one already.",
 )
 def _identify(
     folder: Path,
