@@ -84,7 +84,7 @@ FIGURES = {
     'end = "V_ss(u, 0, 100)"': "figures.end = 'V_ss(u, 0, 100)': there is no time 100 s in a run from 0 to 1 s",
     'end = "open(1)"': "figures.end = 'open(1)': 'open' is neither a function nor a",
     'end = "final(alpha_u)"': "figures.end = 'final(alpha_u)': TypeError: 'float' object is not subscriptable; alpha_u",
-    'end = "u"': "figures.end = 'u': must be one number, and not array(",
+    'end = "u"': "figures.end = 'u': must be one number, and not an array",
     'end = "V_ss()"': "figures.end = 'V_ss()': V_ss takes 1 to 3 values (y, start, end), each once, and not 0",
     'end = "(lambda: 1)()"': (
         "figures.end = '(lambda: 1)()': lambda: 1 is not allowed; an expression has numbers, variables, operators, ind"

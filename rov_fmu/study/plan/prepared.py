@@ -221,7 +221,7 @@ def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
         if strange := sorted(read_expression(text).names - CONSTANTS.keys() - {TIMES} - has.keys()):
             reason = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
             yield key_line(f"figures.{name}", meaning(strange[0]) or reason, text)
-        elif reason := unusable(text, has, varied, times):
+        elif times.size and (reason := unusable(text, has, varied, times)):
             yield key_line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
         yield key_line("keep.outputs", f"the results have another column {taken.pop()}")

@@ -1,13 +1,11 @@
-"""The plots of a study's page, and their arrangement in rows that fill the page."""
+"""The plots of a study's page."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import shorten, wrap
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -17,9 +15,7 @@ from rov_fmu.report.plots.svg import LIGHT, LINES, Draw, inline_svg, with_even_t
 from rov_fmu.report.templates import number, pretty_unit
 from rov_fmu.study.results.results import Results, scale_of
 
-_WIDTHS = {3: 3.7, 2: 5.68, 1: 11.6}
-"""The width of a plot in inches by the number of plots in its row. The widths make the text equally large in all plots
-on a wide page."""
+_WIDTH = 3.7  # inches
 _HEIGHT = 2.6  # inches
 _BINS = 40
 _MARKED = 40
@@ -36,50 +32,19 @@ _BAR = 0.34
 """The height of a bar, as a share of the distance between two variables."""
 
 
-@dataclass(frozen=True)
-class Plot:
-    """A plot: a label for screen readers, the function that draws it, its height in inches, and the title above it."""
-
-    label: str
-    draw: Draw
-    name: str
-    text: str
-    height: float = _HEIGHT
+def plot(label: str, draw: Draw, name: str, text: str = "", height: float = _HEIGHT) -> dict[str, Any]:
+    """Return a plot with the name and the text above it. `label` is for screen readers; the height is in inches."""
+    return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(draw), (_WIDTH, height), marked=True)}
 
 
-def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
-    """Return the plots for a grid whose rows are full: `name`, `text`, `row` (the number of plots in its row) and
-    `svg`.
-
-    A plot in a row of fewer than three is drawn twice: broad for a wide page, and as narrow as the others for a phone.
-    """
-    found = []
-    for plot, count in zip(plots, _counts(len(plots)), strict=True):
-        draw = with_even_text(plot.draw)
-        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height), marked=True)
-        if count < 3:
-            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad", marked=True)
-            narrow = Markup('<div class="broad">{}</div><div class="narrow">{}</div>').format(broad, narrow)
-        found.append({"name": plot.name, "text": plot.text, "row": count, "svg": narrow})
-    return found
-
-
-def _counts(plots: int) -> list[int]:
-    """Return how many plots stand in the row of each plot: three, except in the last rows, where two avoid a gap."""
-    if plots == 1:
-        return [1]
-    pairs = -plots % 3
-    return [3] * (plots - 2 * pairs) + [2] * (2 * pairs)
-
-
-def axis_label(name: str, unit: str, scale: float = 1.0) -> str:
+def axis_label(name: str, unit: str = "1", scale: float = 1.0) -> str:
     """Return a name with its unit, in which values are a power of ten smaller; either of them may be missing."""
     parts = [number(scale) if scale != 1.0 else "", "" if unit == "1" else pretty_unit(unit)]
     words = " ".join(filter(None, parts))
     return f"{name} ({words})" if name and words else name or words
 
 
-def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit: str) -> None:
+def draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
     """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
     ax = figure.subplots()
     scale = scale_of(values)
@@ -91,7 +56,7 @@ def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit:
     _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
     bars.set_label("share")  # type: ignore[union-attr]
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(xlabel=axis_label("", unit, scale), ylabel="runs (%)")
+    ax.set(xlabel=axis_label("", scale=scale), ylabel="runs (%)")
     _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 
 
@@ -112,8 +77,7 @@ def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str])
     for other in others:
         title = axis_label(other, results.units[other])
         figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    label = axis_label("", results.figure_units[name], scale)
-    ax.set(xlabel=axis_label(along, results.units[along], across), ylabel=label)
+    ax.set(xlabel=axis_label(along, results.units[along], across), ylabel=axis_label("", scale=scale))
     _set_ticks(ax)
 
 

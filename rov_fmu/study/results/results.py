@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import floor, log10
+from math import floor, log10, nan
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,6 @@ import pandas as pd
 import pyarrow.dataset as ds
 
 from rov_fmu.io.messages import FileError, shown
-from rov_fmu.study.plan.figures import read_expression
 from rov_fmu.study.results.store import RUNS, TRAJECTORIES, Store
 from rov_fmu.study.run.worker import FAILED, INCOMPLETE, RUN, STATUS, TIME
 
@@ -46,10 +45,6 @@ class Results:
         """The part of the plan that the results depend on."""
         self.units: dict[str, str] = study["units"]
         """The units of parameters and outputs."""
-        self.figure_units: dict[str, str] = {
-            name: read_expression(text, self.units).unit for name, text in self.plan["figures"].items()
-        }
-        """The units of figures; an empty text where it does not follow from the expression."""
         self.descriptions: dict[str, str] = study["descriptions"]
         """The FMU's descriptions of parameters and outputs."""
         self.model: str = study["model"]
@@ -152,11 +147,13 @@ def scale_of(values: Any) -> float:
     return float(10.0 ** max(floor(log10(largest)), -300))
 
 
-def statistics(values: Any, quantiles: Sequence[float]) -> tuple[list[float], float, float | None]:
-    """Return the quantiles, the mean, and the standard deviation (None for a single value) of finite numbers."""
+def statistics(values: Any, quantiles: Sequence[float]) -> tuple[list[float], float, float]:
+    """Return the quantiles, the mean, and the standard deviation of finite numbers; NaN where there are too few."""
+    if not values.size:
+        return [nan] * len(quantiles), nan, nan
     scale = scale_of(values)
     scaled = values / scale
-    sd = scale * float(scaled.std(ddof=1)) if scaled.size > 1 else None
+    sd = scale * float(scaled.std(ddof=1)) if scaled.size > 1 else nan
     return [scale * q for q in np.quantile(scaled, quantiles).tolist()], scale * float(scaled.mean()), sd
 
 
