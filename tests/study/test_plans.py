@@ -217,5 +217,5 @@ def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_
     for text, values in expected.items():
         path = tmp_path / "plan.toml"
         path.write_text(head + text)
-        manoeuvre = prepare(load_plan(path), path, read_model(foreign())).job.manoeuvre
-        assert manoeuvre.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text
+        job = prepare(load_plan(path), path, read_model(foreign())).job
+        assert job.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text
