@@ -12,7 +12,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output
 from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
-from rov_fmu.study.results.results import QUANTILES, Results, scale_of, statistics
+from rov_fmu.study.results.results import QUANTILES, Results, statistics
 from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
@@ -122,8 +122,8 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
 
 def _is_constant(values: Any) -> bool:
     """True when values are practically constant."""
-    scaled = values / scale_of(values)
-    return bool(np.ptp(scaled) <= _CONSTANT * np.abs(scaled).max())
+    with np.errstate(over="ignore"):
+        return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
 def _band(results: Results, output: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from rov_fmu.report.plots.steps import evenly
 from rov_fmu.report.plots.svg import LIGHT, LINES, Draw, inline_svg, with_even_text, with_formulas
 from rov_fmu.report.templates import number, pretty_unit
-from rov_fmu.study.results.results import Results, scale_of
+from rov_fmu.study.results.results import Results
 
 _WIDTH = 3.7  # inches
 _HEIGHT = 2.6  # inches
@@ -37,26 +37,23 @@ def plot(label: str, draw: Draw, name: str, text: str = "", height: float = _HEI
     return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(draw), (_WIDTH, height), marked=True)}
 
 
-def axis_label(name: str, unit: str = "1", scale: float = 1.0) -> str:
-    """Return a name with its unit, in which values are a power of ten smaller; either of them may be missing."""
-    parts = [number(scale) if scale != 1.0 else "", "" if unit == "1" else pretty_unit(unit)]
-    words = " ".join(filter(None, parts))
+def axis_label(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    words = "" if unit == "1" else pretty_unit(unit)
     return f"{name} ({words})" if name and words else name or words
 
 
 def draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
     """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
     ax = figure.subplots()
-    scale = scale_of(values)
-    values = values / scale
-    low, median, high = (quantiles[n] / scale for n in (0, len(quantiles) // 2, -1))
+    low, median, high = (quantiles[n] for n in (0, len(quantiles) // 2, -1))
     ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     shares = np.full(len(values), 100.0 / len(values))
     bins = min(_BINS, max(5, round(len(values) ** 0.5)))
     _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
     bars.set_label("share")  # type: ignore[union-attr]
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(xlabel=axis_label("", scale=scale), ylabel="runs (%)")
+    ax.set(ylabel="runs (%)")
     _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 
 
@@ -65,19 +62,17 @@ def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str])
     ax = figure.subplots()
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
-    scale, across = scale_of(runs[name]), scale_of(runs[along])
     lines = [("", runs)]
     for other in others:
         some = evenly(np.unique(runs[other]).tolist())
         lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
     for (label, line), color in zip(lines, LINES, strict=False):
         marker = "o" if len(line) <= _MARKED else ""
-        x, y = line[along] / across, line[name] / scale
-        ax.plot(x, y, color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
+        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
     for other in others:
         title = axis_label(other, results.units[other])
         figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    ax.set(xlabel=axis_label(along, results.units[along], across), ylabel=axis_label("", scale=scale))
+    ax.set_xlabel(axis_label(along, results.units[along]))
     _set_ticks(ax)
 
 
@@ -86,14 +81,13 @@ def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     ax = figure.subplots()
     t = bands.index.to_numpy()
     values = bands.to_numpy(float)
-    scale = scale_of(values)
-    low, below, median, above, high = np.where(np.isfinite(values), values / scale, np.nan).T
+    low, below, median, above, high = np.where(np.isfinite(values), values, np.nan).T
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
     for edge, label in ((low, "5 %"), (high, "95 %")):
         ax.plot(t, edge, color=LIGHT["blue"], linewidth=0.5, alpha=0.5, label=label)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6, label="median")
-    ax.set(xlabel="time (s)", ylabel=axis_label("", unit, scale))
+    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
     _set_ticks(ax)
 
 
