@@ -6,10 +6,6 @@ No result is stored, because the mathematics library differs between machines. O
 Each run begins with random states and parameters. Before each step it gets random commands, loads and currents, and now
 and then tunable parameters or a saved state. The length of a step is between 0.1 ms and 1000 s. After each step all
 variables of OLD and a directional derivative are compared.
-
-`--allow attitude` is for a change of how a vehicle follows its attitude. In a vehicle with a quaternion, it allows that
-`psi` differs by whole turns, that the whole quaternion has the other sign together with its rates, and that a step
-succeeds which failed in OLD; a run is then compared only until that step.
 """
 
 import os
@@ -34,8 +30,6 @@ from numpy.typing import NDArray
 from verification.new_tests import environment, worktree
 
 ROOT = Path(__file__).parents[1]
-ATTITUDE = "attitude"
-QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
 STEPS = 30
 """The number of steps of a run."""
 _SHORTEST, _LONGEST = -4.0, 3.0
@@ -211,27 +205,12 @@ def fly(fmu: str, like: str, runs: str, target: str) -> None:
 # ---- The comparison --------------------------------------------------------------------------------------------------
 
 
-def _is_allowed(names: Sequence[str], old: Floats, new: Floats) -> NDArray[np.bool_]:
-    """Return where psi differs by whole turns, and where the whole quaternion with its rates has the other sign."""
-    allowed = np.zeros(old.shape, dtype=bool)
-    signed = [n for n, name in enumerate(names) if any(part in name for part in QUATERNION)]
-    allowed[..., signed] = (new[..., signed] == -old[..., signed]).all(axis=-1, keepdims=True)
-    a, b, turn = old[..., names.index("psi")], new[..., names.index("psi")], 2.0 * np.pi
-    rounding = 4.0 * np.finfo(float).eps * np.maximum(np.maximum(abs(a), abs(b)), turn)
-    allowed[..., names.index("psi")] = abs(b - a - turn * np.round((b - a) / turn)) <= rounding
-    return allowed
-
-
-def differences(names: Sequence[str], old: Any, new: Any, allow: Sequence[str] = ()) -> tuple[list[str], int]:
-    """Return a line for each variable that differs and may not, and the number of runs whose bits are all equal."""
+def differences(names: Sequence[str], old: Any, new: Any) -> tuple[list[str], int]:
+    """Return a line for each variable that differs, and the number of runs whose bits are all equal."""
     (old_points, old_values), (new_points, new_values) = old, new
     differ = old_values.view(np.uint64) != new_values.view(np.uint64)
     length = old_points != new_points
     equal = int((~(differ.any(axis=(1, 2)) | length)).sum())
-    if ATTITUDE in allow and {*QUATERNION} <= {*names}:
-        differ &= ~_is_allowed(names, old_values, new_values)
-        differ &= (np.arange(old_values.shape[1]) < old_points[:, np.newaxis])[..., np.newaxis]
-        length = new_points < old_points
     lines = [f"  the failing step differs in {length.sum()} runs, first in {length.argmax()}"] if length.any() else []
     for n in np.flatnonzero(differ.any(axis=(0, 1))).tolist():
         where = differ[..., n]
@@ -250,8 +229,8 @@ def _python(tree: Path, *arguments: str | Path) -> None:
         raise click.ClickException(f"exit code {done.returncode} of {arguments}\n{done.stdout}{done.stderr}")
 
 
-def compare(old: Path, new: Path, runs: int, allow: Sequence[str]) -> tuple[list[str], bool]:
-    """Compare two FMUs. Return the lines of the report, and whether everything that differs is allowed."""
+def compare(old: Path, new: Path, runs: int) -> tuple[list[str], bool]:
+    """Compare two FMUs. Return the lines of the report, and whether nothing differs."""
     made = []
     for fmu in (old, new):
         target = fmu.with_suffix(".npz")
@@ -261,12 +240,11 @@ def compare(old: Path, new: Path, runs: int, allow: Sequence[str]) -> tuple[list
             made.append((file["points"], file["values"]))
         target.unlink()
     _, names, unknowns = _names(old)
-    lines, equal = differences([*names, *(f"change of {name}" for name in unknowns)], made[0], made[1], allow)
+    lines, equal = differences([*names, *(f"change of {name}" for name in unknowns)], *made)
     if 2 * (made[0][0] <= STEPS).sum() > runs:
         lines.append("  more than half of the runs fail in OLD, so they show nothing")
     failed = " and ".join(f"{(points <= STEPS).sum()}" for points, _ in made)
-    note = f", the others differ as allowed ({', '.join(allow)})" if equal < runs and not lines else ""
-    return [f"{runs} runs, {equal} with equal bits{note}; a call fails in {failed} runs", *lines], not lines
+    return [f"{runs} runs, {equal} with equal bits; a call fails in {failed} runs", *lines], not lines
 
 
 @contextmanager
@@ -282,14 +260,11 @@ def _checkout(commit: str, folder: Path) -> Iterator[Path]:
 @click.command()
 @click.argument("old")
 @click.argument("new")
-@click.option("--allow", type=click.Choice([ATTITUDE]), multiple=True, help="A kind of difference that is allowed.")
 @click.option("--vehicle", "vehicles", multiple=True, help="A vehicle (default: all that ship in OLD).")
 @click.option("--fmi", "versions", type=click.Choice(["2", "3"]), multiple=True, default=["2", "3"], help="Of FMI.")
 @click.option("--runs", type=click.IntRange(1), default=1000, show_default=True, help="The number of runs.")
 @click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, help="Processes at once.")
-def main(
-    old: str, new: str, allow: Sequence[str], vehicles: Sequence[str], versions: Sequence[str], runs: int, jobs: int
-) -> None:
+def main(old: str, new: str, vehicles: Sequence[str], versions: Sequence[str], runs: int, jobs: int) -> None:
     """Compare random runs of the shipped vehicles of two commits; exit with 1 when their bits differ."""
     with ExitStack() as stack, ThreadPoolExecutor(jobs) as pool:
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="same-bits-"))).resolve()
@@ -300,7 +275,7 @@ def main(
             fmus = [scratch / f"{vehicle}-{fmi}-{name}.fmu" for name in ("old", "new")]
             for tree, fmu in zip(trees, fmus, strict=True):
                 _python(tree, "-m", "rov_fmu", "build", vehicle, "--fmi", fmi, "--platform", "host", "-o", fmu)
-            return compare(fmus[0], fmus[1], runs, allow)
+            return compare(fmus[0], fmus[1], runs)
 
         cases = [(vehicle, fmi) for vehicle in vehicles or shipped for fmi in versions]
         same = True

@@ -69,9 +69,9 @@ def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there
     assert found == pytest.approx([nan, nan, nan, nan, 6.5], nan_ok=True)
     far, others, zero, late = reason.split("; ")
     assert far == "far: IndexError: index 9999 is out of bounds for axis 0 with size 4001"
-    assert others.startswith("all: must be one number, and not array(")
+    assert others == "all: must be one number, and not an array"
     assert zero == "zero: ZeroDivisionError: division by zero"
-    assert late == "late: ValueError: there is no time 50 s in a run from 0 to 40 s"
+    assert late == "late: there is no time 50 s in a run from 0 to 40 s"
     found, reason = figures.of({"y": np.full(10_000, 2.0), "m": 1.0})
     assert found[0] == 2.0, "the next run has nothing of this one's errors"
 
@@ -130,28 +130,3 @@ def test_functions_and_variables_of_the_same_name_are_distinguished() -> None:
     assert Figures({"f": "max(max) + t + pi + out['at']"}, T).of({"max": T, "t": 1.0, "pi": 2.0, "at": 3.0})[0] == [
         46.0
     ]
-
-
-UNITS = {"u": "m/s", "v": "m/s", "x": "m", "der(u)": "m/s2", "a": "1"}
-
-
-@pytest.mark.parametrize(
-    ("expression", "unit"),
-    [
-        ("x[-1] - at(x, 10)", "m"),
-        ("max(abs(u - v))", "m/s"),
-        ('final(out["der(u)"])', "m/s2"),
-        ("Tau(u, 0)", "s"),
-        ("overshoot(u)", "1"),
-        ("-u[0]", "m/s"),
-        ("t[u > 0.3][0]", "s"),
-        ("final(a)", "1"),
-        ("final(u) * 3.6", ""),
-        ("final(u) - final(x)", ""),
-        ("final(u) + 1.0", ""),
-        ("sqrt(final(x))", ""),
-        ("1.0", ""),
-    ],
-)
-def test_the_unit_follows_from_the_variables_or_is_left_out(expression: str, unit: str) -> None:
-    assert read_expression(expression, UNITS).unit == unit

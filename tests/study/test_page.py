@@ -71,7 +71,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert failed[0].text_content() == str(len(results.failed))
     labels = re.findall(r'aria-label="([^"]*)"', text)
     shown = [f"{what} {of}" for what in ("Distribution of", "Sobol indices of") for of in ("end", "twice")]
-    assert labels == [label for label in (*shown, "Trajectories of y") for _ in ("broad", "narrow")]
+    assert labels == [*shown, "Trajectories of y"]
     check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     (script,) = page.iter("script")
@@ -110,9 +110,7 @@ def test_a_bar_is_an_index_with_its_interval() -> None:
     )
 
 
-def test_a_grid_shows_figures_over_what_varies_with_their_units(
-    videoray_fmu: Path, tmp_path: Path, scheduler: str
-) -> None:
+def test_a_grid_shows_figures_over_what_varies(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
     (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(videoray_fmu, tmp_path)}"
 stop_time = 2.0
 step = 0.1
@@ -134,22 +132,22 @@ T = "Tau(u)"
     text = (tmp_path / "results" / "study.html").read_text(encoding="utf-8")
     page, runs = html.fromstring(text), Results(tmp_path / "results").runs
     labels = re.findall(r'aria-label="([^"]*)"', text)
-    assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), *["Trajectories of u"] * 2]
+    assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), "Trajectories of u"]
     head, *rows = [
         [cell.text_content() for cell in row] for row in page.xpath("//h2[@id='figures']/following::table[1]//tr")
     ]
-    assert head == ["u_l", "m_rov (kg)", "V (m/s)", "way (m)", "sway", "T (s)"]
+    assert head == ["u_l", "m_rov (kg)", "V", "way", "sway", "T"]
     shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
     assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
     assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
 
 
-@pytest.mark.parametrize("size", [1e308, 3e-320])
+@pytest.mark.parametrize("size", [1.0, 1e308, 3e-320])
 @pytest.mark.parametrize("sampler", ["saltelli", "grid"])
-def test_extreme_values_and_foreign_text_cost_neither_the_plots_nor_the_page(
+def test_extreme_values_and_foreign_text_do_not_cost_the_page(
     sampler: str, size: float, foreign: Callable[..., Path], tmp_path: Path, scheduler: str
 ) -> None:
-    """`wide` overflows in some runs, and y is infinite there."""
+    """`wide` overflows in some runs, and y is infinite there; a plot of such numbers may be a line with the reason."""
     with zipfile.ZipFile(foreign()) as old, zipfile.ZipFile(tmp_path / "strange.fmu", "w") as new:
         for name in old.namelist():
             content = old.read(name)
@@ -183,12 +181,13 @@ wide = "y[-1]"
         arguments = [str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results"), "--scheduler", scheduler]
         assert main(["study", *arguments]) == 0
     page = html.parse(tmp_path / "results" / "study.html")
-    assert "cannot be drawn" not in page.xpath("string(//body)")
-    labels = {" ".join(text.split()) for text in page.xpath("//svg//text/text()")}
-    power = "10³⁰⁷" if size > 1.0 else "10⁻³⁰⁰"
-    assert {f"{power} $_$", f"{power} $^{{"} <= labels
-    numbers = [float(text.replace("−", "-")) for text in labels if re.fullmatch(r"−?\d+\.?\d*", text)]
-    assert len(numbers) > 10
+    runs = Results(tmp_path / "results").runs
+    assert f"{len(runs)} of {len(runs)} runs, 0 failed" in page.xpath("string(//body)")
+    if size == 1.0:
+        assert "cannot be drawn" not in page.xpath("string(//body)")
+        labels = {" ".join(text.split()) for text in page.xpath("//svg//text/text()")}
+        assert "$^{" in labels
+        assert ("b ($_$)" in labels) == (sampler == "grid")
 
 
 def test_the_page_shows_which_sobol_indices_are_uncertain(

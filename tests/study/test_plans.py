@@ -84,7 +84,7 @@ FIGURES = {
     'end = "V_ss(u, 0, 100)"': "figures.end = 'V_ss(u, 0, 100)': there is no time 100 s in a run from 0 to 1 s",
     'end = "open(1)"': "figures.end = 'open(1)': 'open' is neither a function nor a",
     'end = "final(alpha_u)"': "figures.end = 'final(alpha_u)': TypeError: 'float' object is not subscriptable; alpha_u",
-    'end = "u"': "figures.end = 'u': must be one number, and not array(",
+    'end = "u"': "figures.end = 'u': must be one number, and not an array",
     'end = "V_ss()"': "figures.end = 'V_ss()': V_ss takes 1 to 3 values (y, start, end), each once, and not 0",
     'end = "(lambda: 1)()"': (
         "figures.end = '(lambda: 1)()': lambda: 1 is not allowed; an expression has numbers, variables, operators, ind"
@@ -217,5 +217,5 @@ def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_
     for text, values in expected.items():
         path = tmp_path / "plan.toml"
         path.write_text(head + text)
-        manoeuvre = prepare(load_plan(path), path, read_model(foreign())).job.manoeuvre
-        assert manoeuvre.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text
+        job = prepare(load_plan(path), path, read_model(foreign())).job
+        assert job.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text

@@ -24,8 +24,7 @@ from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
-from rov_fmu.study.run.separate_simulator import SeparateSimulator
-from rov_fmu.study.run.simulator import LoadError, RunError, Simulator
+from rov_fmu.study.run.simulator import LoadError, Simulator
 from tests.commands import start, without_progress
 from tests.folders import beside
 
@@ -173,28 +172,6 @@ def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(reset: int, for
     _harmful(_harmful_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2)
 
 
-@posix
-@pytest.mark.long
-def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continues(
-    foreign: Foreign, tmp_path: Path
-) -> None:
-    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 4]", limit=LIMIT)
-    model = read_model(foreign())
-    job = prepare(load_plan(path), path, model).job
-    model.unpack(tmp_path / "fmu")
-    simulator = SeparateSimulator(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
-    y = []
-    for mode in (0, 2, 4, 1, 0):
-        try:
-            y.append(simulator.run([1.0, 0.0, 0.0, mode])["y"][10])
-            simulator.reset()
-        except RunError as error:
-            y.append(str(error))
-    simulator.free()
-    end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
-    assert y == [end, HARMFUL[2], HARMFUL[4], "the step at 1 s: error; the FMU: the pump is blocked", end]
-
-
 def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Foreign, tmp_path: Path) -> None:
     """The working directory stays, also when many threads load at once."""
     path, model, here = _plan(tmp_path, foreign()), read_model(foreign()), Path.cwd()
@@ -205,7 +182,7 @@ def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Fo
     library.write_text("no library")
 
     def load(folder: Path) -> None:
-        Simulator(str(folder), description, model, job.manoeuvre).free()
+        Simulator(str(folder), description, job).free()
 
     try:
         with ThreadPoolExecutor(8) as threads:

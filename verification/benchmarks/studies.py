@@ -98,7 +98,7 @@ class Study:
         prepared = prepare(plan, path, model)
         with tempfile.TemporaryDirectory(dir=self._folder) as folder:
             description = model.unpack(Path(folder))
-            simulator = Simulator(folder, description, model, prepared.job.manoeuvre)
+            simulator = Simulator(folder, description, prepared.job)
             rows = prepared.design.rows(0, runs)
             processor, clock = time.process_time(), time.perf_counter()
             for values in rows:

@@ -10,10 +10,8 @@ given, so sizes and times are bounded by the length of the text.
 
 import ast
 import warnings
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import reduce
 from inspect import Parameter, signature
 from math import e, inf, nan, pi
@@ -22,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.io.messages import brief, shown
+from rov_fmu.io.messages import brief, did_you_mean, shown
 
 TIME = "t"
 """The times of the communication points, in an expression."""
@@ -37,16 +35,8 @@ _ALLOWED = "an expression has numbers, variables, operators, indices and the fun
 
 _Value = Any
 """A number or an array with one dimension."""
-_Part = tuple[ast.expr, str]
-"""A part of an expression: the code that computes it, and its unit, or an empty text where that does not follow."""
-NO_UNITS: Mapping[str, str] = MappingProxyType({})
-"""The units of variables, where nobody asks for that of an expression."""
 _VALUES = "_values"
 """The name that the values of variables and constants have in the code."""
-
-
-SAME = "same"
-"""The unit of a function whose result has the unit of its first value."""
 
 
 class ExpressionError(ValueError):
@@ -64,15 +54,13 @@ class Function:
     """The number of values that it takes."""
     parameters: tuple[str, ...] = ()
     """The names of all parameters, if values may be given by name."""
-    unit: str = ""
-    """The unit of the result: `SAME` is that of the first value, and an empty text is unknown."""
 
     @classmethod
-    def by_name(cls, compute: Callable[..., _Value], unit: str) -> "Function":
+    def by_name(cls, compute: Callable[..., _Value]) -> "Function":
         """Return a function whose values may be given by the names of its parameters."""
         parameters = signature(compute).parameters
         needed = sum(p.default is Parameter.empty for p in parameters.values())
-        return cls(compute, needed, len(parameters), tuple(parameters), unit)
+        return cls(compute, needed, len(parameters), tuple(parameters))
 
     def __call__(self, *values: _Value, **by_name: _Value) -> _Value:
         """Return the result, a number or an array with one dimension. Raises TypeError if it is neither."""
@@ -89,7 +77,7 @@ class Function:
 
 def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> Function:
     """Return a function that reduces one array as in NumPy, or several values as in Python."""
-    return Function(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100, unit=SAME)
+    return Function(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100)
 
 
 def _round(y: _Value, decimals: float = 0.0) -> _Value:
@@ -106,11 +94,10 @@ _OF_ONE_VALUE = (
 )
 """Functions of NumPy with one value. Their other parameters are not allowed, because `out`, for example, writes into an
 array."""
-_SAME_UNIT = ("abs", "mean", "median", "std", "ptp", "sum", "percentile")
 _OF_TWO_VALUES = ("arctan2", "hypot", "maximum", "minimum", "percentile", "searchsorted")
 FUNCTIONS: Mapping[str, Function] = MappingProxyType(
     {
-        name: Function(getattr(np, name), count, count, unit=SAME if name in _SAME_UNIT else "")
+        name: Function(getattr(np, name), count, count)
         for count, names in enumerate((_OF_ONE_VALUE, _OF_TWO_VALUES), 1)
         for name in names
     }
@@ -137,9 +124,6 @@ _CALLED: Mapping[str, Callable[..., _Value]] = {
     "BitXor": np.logical_xor,
     "Invert": np.logical_not,
     "Not": lambda value: np.bool_(not _truth(value)),
-}
-"""Functions in place of operators, by the name of the operator in the syntax tree."""
-_COMPARED: Mapping[str, Callable[[_Value, _Value], _Value]] = {
     "Lt": np.less,
     "LtE": np.less_equal,
     "Gt": np.greater,
@@ -147,53 +131,47 @@ _COMPARED: Mapping[str, Callable[[_Value, _Value], _Value]] = {
     "Eq": np.equal,
     "NotEq": np.not_equal,
 }
-"""NumPy's comparisons, because Python's True + True is an integer, and integers would grow without end."""
+"""Functions in place of operators, by the name of the operator in the syntax tree. Comparisons are NumPy's, because
+Python's True + True is an integer, and integers would grow without end."""
 
 
 # ---- Reading ---------------------------------------------------------------------------------------------------------
 
 
 class Expression:
-    """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not.
+    """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not."""
 
-    `units` are those of the variables, from which that of the value follows.
-    """
-
-    def __init__(self, text: str, functions: Mapping[str, Function], units: Mapping[str, str] = NO_UNITS) -> None:
-        reader = _Reader(functions, units)
+    def __init__(self, text: str, functions: Mapping[str, Function]) -> None:
+        reader = _Reader(functions)
         try:
             with warnings.catch_warnings():  # Python's own about the text, such as "1if" without a space
                 warnings.simplefilter("ignore")
                 tree = ast.parse(text.strip(), mode="eval")
-            code, self.unit = reader.read(tree.body)
-            """The unit of the value; an empty text where it does not follow, for example for a product."""
+            code = ast.Expression(reader.read(tree.body))
         except (RecursionError, MemoryError) as error:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels") from error
         except (SyntaxError, UnicodeError) as error:
             raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}") from error
         self.names = frozenset(reader.names)
         """The variables and constants that it names."""
-        self.constant_values = tuple(reader.constant_values)
-        """For each call of a function whose parameters have names: the numbers given in the text, by parameter."""
-        self._compute = _compiled(code, functions)
+        self._program = compile(ast.fix_missing_locations(code), "<figure>", "eval")
+        self._globals = {"__builtins__": {}, **_HELPERS, **functions}
 
     def value(self, values: Mapping[str, _Value]) -> _Value:
         """Return the value, a number or an array, for the values of all names. May raise any exception."""
-        return self._compute(values)
+        return eval(self._program, self._globals, {_VALUES: values})
 
 
 class _Reader:
-    """Turns the syntax tree of a text into code and its unit. Whatever is not listed here is refused."""
+    """Turns the syntax tree of a text into that of the code. Whatever is not listed here is refused."""
 
-    def __init__(self, functions: Mapping[str, Function], units: Mapping[str, str]) -> None:
-        self.names: list[str] = []
-        """The variables and constants, once for each time that they occur."""
-        self.constant_values: list[dict[str, _Value]] = []
-        self._functions, self._units = functions, {TIME: "s", **units}
+    def __init__(self, functions: Mapping[str, Function]) -> None:
+        self.names: set[str] = set()
+        self._functions = functions
         self._depth = 0
 
-    def read(self, node: ast.expr) -> _Part:
-        """Return the code of a node and its unit. Raises ExpressionError."""
+    def read(self, node: ast.expr) -> ast.expr:
+        """Return the code of a node. Raises ExpressionError."""
         if self._depth == _DEEPEST:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
         self._depth += 1
@@ -202,10 +180,10 @@ class _Reader:
         finally:
             self._depth -= 1
 
-    def _read(self, node: ast.expr) -> _Part:  # noqa: PLR0911, PLR0912 (a case for each kind of syntax)
+    def _read(self, node: ast.expr) -> ast.expr:  # noqa: PLR0911, PLR0912 (a case for each kind of syntax)
         match node:
             case ast.Constant(value=int() | float() as value):
-                return _constant(value), ""
+                return _constant(value)
             case ast.Name(id=name):
                 return self._variable(name)
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
@@ -213,39 +191,32 @@ class _Reader:
             case ast.Subscript(
                 value=ast.Call(func=ast.Name(id="where"), args=[condition], keywords=[]), slice=ast.Constant(value=0)
             ):
-                return _call("flatnonzero", self._code(condition)), ""
+                return _call("flatnonzero", self.read(condition))
             case ast.Subscript(value=value, slice=ast.Slice(lower=lower, upper=upper, step=step)):
-                array, unit = self.read(value)
-                ends = (ast.Constant(None) if part is None else self._code(part) for part in (lower, upper, step))
-                return _call("slice", array, *ends), unit
+                ends = (ast.Constant(None) if part is None else self.read(part) for part in (lower, upper, step))
+                return _call("slice", self.read(value), *ends)
             case ast.Subscript(value=value, slice=index):
-                array, unit = self.read(value)
-                return _call("index", array, self._code(index)), unit
-            case ast.UnaryOp(op=op, operand=operand):
-                code, unit = self.read(operand)
-                is_sign = isinstance(op, ast.UAdd | ast.USub)
-                return (ast.UnaryOp(op, code), unit) if is_sign else (_call(_kind(op), code), "")
-            case ast.BinOp(left=left, op=op, right=right) if isinstance(op, _KEPT) or _kind(op) in _CALLED:
-                (a, unit), (b, other) = self.read(left), self.read(right)
-                code = ast.BinOp(a, op, b) if isinstance(op, _KEPT) else _call(_kind(op), a, b)
-                return code, unit if isinstance(op, ast.Add | ast.Sub) and unit == other else ""
-            case ast.Compare(left=left, ops=ops, comparators=others) if all(
-                type(op).__name__ in _COMPARED for op in ops
-            ):
-                kinds = ast.Constant(" ".join(type(op).__name__ for op in ops))
-                return _call("compare", kinds, *map(self._code, (left, *others))), ""
+                return _call("index", self.read(value), self.read(index))
+            case ast.UnaryOp(op=ast.UAdd() | ast.USub() as op, operand=value):
+                return ast.UnaryOp(op, self.read(value))
+            case ast.UnaryOp(op=op, operand=value):
+                return _call(_kind(op), self.read(value))
+            case ast.BinOp(left=left, op=op, right=right) if isinstance(op, _KEPT):
+                return ast.BinOp(self.read(left), op, self.read(right))
+            case ast.BinOp(left=left, op=op, right=right) if _kind(op) in _CALLED:
+                return _call(_kind(op), self.read(left), self.read(right))
+            case ast.Compare(left=left, ops=ops, comparators=others) if {*map(_kind, ops)} <= _CALLED.keys():
+                compared = ast.Tuple([_name(f"_{_kind(op)}") for op in ops], ast.Load())
+                return _call("compare", compared, *map(self.read, (left, *others)))
             case ast.BoolOp(op=op, values=values):
-                return ast.BoolOp(op, [_call("truth", self._code(value)) for value in values]), ""
+                return ast.BoolOp(op, [_call("truth", self.read(value)) for value in values])
             case ast.IfExp(test=test, body=body, orelse=otherwise):
-                return ast.IfExp(_call("truth", self._code(test)), self._code(body), self._code(otherwise)), ""
+                return ast.IfExp(_call("truth", self.read(test)), self.read(body), self.read(otherwise))
             case ast.Call(func=ast.Name(id=name)):
                 return self._function(name, node)
             case ast.Call(func=function):
                 raise self._refused(function)
         raise self._refused(node)
-
-    def _code(self, node: ast.expr) -> ast.expr:
-        return self.read(node)[0]
 
     def _refused(self, node: ast.expr) -> ExpressionError:
         text = brief(ast.unparse(node), 40)
@@ -253,43 +224,29 @@ class _Reader:
             return ExpressionError(f"{text} is an attribute, which is not allowed: write {node.attr}(...)")
         return ExpressionError(f"{text} is not allowed; {_ALLOWED}")
 
-    def _variable(self, name: str) -> _Part:
-        self.names.append(name)
-        return ast.Subscript(_name(_VALUES), ast.Constant(name), ast.Load()), self._units.get(name, "")
+    def _variable(self, name: str) -> ast.expr:
+        self.names.add(name)
+        return ast.Subscript(_name(_VALUES), ast.Constant(name), ast.Load())
 
-    def _function(self, name: str, node: ast.Call) -> _Part:
+    def _function(self, name: str, node: ast.Call) -> ast.expr:
         function = self._functions.get(name)
         if function is None:
-            near = get_close_matches(name, self._functions, 1, 0.7)
-            hint = f"; did you mean {near[0]}?" if near else ""
-            raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{hint}")
+            near = did_you_mean(name, self._functions)
+            raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{near}")
         if name == "where" and len(node.args) == 1:
             raise ExpressionError("where with one value gives a tuple of one array: write where(...)[0]")
-        if strange := [k.arg for k in node.keywords if k.arg not in function.parameters]:
+        by_name = [k.arg for k in node.keywords]
+        if strange := [key for key in by_name if key not in function.parameters]:
             raise ExpressionError(f"{name} has no parameter named {strange[0] or '**'}")
-        given = [*function.parameters[: len(node.args)], *(k.arg for k in node.keywords if k.arg)]
-        needed = set(function.parameters[: function.least]) - set(given)
-        count = len(node.args) + len(node.keywords)
-        if needed or len(set(given)) < len(given) or not function.least <= count <= function.most:
+        given = [*function.parameters[: len(node.args)], *by_name]
+        needed = {*function.parameters[: function.least]} - {*given}
+        count = len(node.args) + len(by_name)
+        if needed or len({*given}) < len(given) or not function.least <= count <= function.most:
             most = f" to {function.most}" if function.most > function.least else ""
             what = f" ({', '.join(function.parameters)})" if function.parameters else ""
             raise ExpressionError(f"{name} takes {function.least}{most} values{what}, each once, and not {count}")
-        codes, numbers, unit = [], {}, function.unit
-        for n, part in enumerate([*node.args, *(k.value for k in node.keywords)]):
-            named = len(self.names)
-            code, own = self.read(part)
-            codes.append(code)
-            if n == 0 and unit == SAME:
-                unit = own
-            if function.parameters and len(self.names) == named:
-                with suppress(Exception):  # the error is reported when the run is evaluated
-                    if not isinstance(value := _compiled(code, self._functions)({}), np.ndarray):
-                        numbers[given[n]] = value
-        if function.parameters:
-            self.constant_values.append(numbers)
-        places = len(node.args)
-        by_name = [ast.keyword(k.arg, code) for k, code in zip(node.keywords, codes[places:], strict=True)]
-        return ast.Call(_name(name), codes[:places], by_name), unit
+        keywords = [ast.keyword(k.arg, self.read(k.value)) for k in node.keywords]
+        return ast.Call(_name(name), [*map(self.read, node.args)], keywords)
 
 
 # ---- Code ------------------------------------------------------------------------------------------------------------
@@ -316,16 +273,9 @@ def _call(helper: str, *values: ast.expr) -> ast.Call:
     return ast.Call(_name(f"_{helper}"), [*values], [])
 
 
-def _compiled(code: ast.expr, functions: Mapping[str, Function]) -> Callable[[Mapping[str, _Value]], _Value]:
-    """Return a function that computes the value of the code from those of the variables and constants."""
-    program = compile(ast.fix_missing_locations(ast.Expression(code)), "<figure>", "eval")
-    names = {"__builtins__": {}, **_HELPERS, **functions}
-    return lambda values: eval(program, names, {_VALUES: values})
-
-
-def _compare(kinds: str, *values: _Value) -> _Value:
+def _compare(operators: Sequence[Callable[..., _Value]], *values: _Value) -> _Value:
     """Compare two values, or several element by element, as in 0 < y < 1."""
-    compared = map(lambda kind, a, b: _COMPARED[kind](a, b), kinds.split(), values, values[1:])
+    compared = map(lambda compare, a, b: compare(a, b), operators, values, values[1:])
     return reduce(np.logical_and, compared)
 
 

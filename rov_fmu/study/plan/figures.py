@@ -1,7 +1,7 @@
 """The figures of a run: expressions over its outputs, and the functions of time that they may call."""
 
 import warnings
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from math import isfinite, isnan, nan
 from typing import Any
 
@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
-from rov_fmu.io.messages import brief, shown
-from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, NO_UNITS, SAME, TIME, Expression, Function
+from rov_fmu.io.messages import brief
+from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, Expression, Function
 
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
@@ -20,6 +20,10 @@ _BAND = 0.05
 """The share of the whole change within which a response has settled."""
 
 
+class TimeError(ValueError):
+    """A call names a time that a run does not have."""
+
+
 class Responses:
     """The functions of an output over the times of a run (s) that an expression may call."""
 
@@ -27,14 +31,15 @@ class Responses:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
         self._windows: dict[tuple[float | None, float | None], tuple[slice, slice]] = {}
-        self.functions = {
-            "V_ss": Function.by_name(self.steady, SAME),
-            "Tau": Function.by_name(self.time_constant, "s"),
-            "overshoot": Function.by_name(self.overshoot, "1"),
-            "settling_time": Function.by_name(self.settling_time, "s"),
-            "at": Function.by_name(self.at, SAME),
-            "final": Function.by_name(self.final, SAME),
+        named: dict[str, Callable[..., Any]] = {
+            "V_ss": self.steady,
+            "Tau": self.time_constant,
+            "overshoot": self.overshoot,
+            "settling_time": self.settling_time,
+            "at": self.at,
+            "final": self.final,
         }
+        self.functions = {name: Function.by_name(function) for name, function in named.items()}
         """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
@@ -80,11 +85,11 @@ class Responses:
         """Return the points from one time to another, within rounding, and those of the last tenth of that time."""
         if (start, end) not in self._windows:
             t, slack = self._times, self._slack
-            self._check_times(*(time for time in (start, end) if time is not None))
             begin, finish = t[0] if start is None else start, t[-1] if end is None else end
+            self._check_times(begin, finish)
             first, last = int(np.searchsorted(t, begin - slack)), int(np.searchsorted(t, finish + slack))
             if first >= last:
-                raise ValueError(f"there is no communication point from {begin:g} to {finish:g}")
+                raise TimeError(f"there is no communication point from {begin:g} to {finish:g}")
             if len(self._windows) == _MOST_WINDOWS:  # times that vary from run to run would fill the memory
                 self._windows.clear()
             steady = t[last - 1] - _STEADY * (t[last - 1] - t[first]) - slack
@@ -92,20 +97,13 @@ class Responses:
         return self._windows[start, end]
 
     def _check_times(self, *times: float) -> None:
-        """Raise ValueError if a time is not in the run."""
+        """Raise TimeError if a time is not in the run, or else ValueError if it is NaN."""
         first, last = self._times[0], self._times[-1]
         for time in times:
-            if not first - self._slack <= time <= last + self._slack:
-                raise ValueError(f"there is no time {time:g} s in a run from {first:g} to {last:g} s")
-
-    def wrong_times(self, given: Mapping[str, Any]) -> str:
-        """Check the constant times of a call. Return the mistake, or an empty text."""
-        try:
-            self._window(given.get("time"), None)
-            self._window(given.get("start"), given.get("end"))
-        except ValueError as error:
-            return str(error)
-        return ""
+            if time < first - self._slack or time > last + self._slack:
+                raise TimeError(f"there is no time {time:g} s in a run from {first:g} to {last:g} s")
+        if isnan(sum(times)):
+            raise ValueError("a time is NaN")
 
     def _change(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
         """Return y scaled to 0 at the start and 1 when steady, or NaN if these are the same, and the times."""
@@ -120,9 +118,9 @@ def _functions(times: Array) -> dict[str, Function]:
     return {**FUNCTIONS, **Responses(times).functions}
 
 
-def read_expression(text: str, units: Mapping[str, str] = NO_UNITS) -> Expression:
-    """Read an expression without a run; `units` are those of the variables. Raises ExpressionError with the reason."""
-    return Expression(text, _functions(np.zeros(1)), units)
+def read_expression(text: str) -> Expression:
+    """Read an expression without a run. Raises ExpressionError with the reason."""
+    return Expression(text, _functions(np.zeros(1)))
 
 
 def meaning(name: str) -> str:
@@ -163,47 +161,41 @@ class _NoNumberError(Exception):
     """The value of an expression is not one finite number; the text is the reason."""
 
 
-class _ArrayError(_NoNumberError):
-    """The value of an expression is an array."""
-
-
 def _number(expression: Expression, values: Mapping[str, Any]) -> float:
     """Return the value of an expression. Raises _NoNumberError."""
     try:
         value = expression.value(values)
     except ZeroDivisionError as error:  # Python's message differs between versions
         raise _NoNumberError("ZeroDivisionError: division by zero") from error
+    except TimeError as error:
+        raise _NoNumberError(str(error)) from error
     except Exception as error:  # NumPy raises many kinds
         raise _NoNumberError(brief(f"{type(error).__name__}: {error}")) from error
     if isinstance(value, np.ndarray):
-        raise _ArrayError(f"must be one number, and not {shown(value)}")
+        raise _NoNumberError("must be one number, and not an array") from TypeError()
     number = float(value)
     if not isfinite(number):
         raise _NoNumberError(f"is {'NaN' if isnan(number) else 'infinite'}")
     return number
 
 
-def unusable(text: str, variables: Iterable[str], varied: Collection[str], run_times: Array) -> str:
-    """Return why an expression cannot be a figure of any run, or an empty text if that depends on the run.
+def unusable(text: str, variables: Iterable[str], varied: Collection[str], times: Array) -> str:
+    """Return why an expression cannot be a figure of any run at these times, or an empty text if that depends on the
+    run.
 
-    `run_times` is empty if the plan does not give valid times.
+    All values of the run are NaN here, so that a wrong type or a wrong time is found if it does not depend on them.
     """
-    if run_times.size:
-        responses = Responses(run_times)
-        for given in read_expression(text).constant_values:
-            if reason := responses.wrong_times(given):
-                return reason
-    times = np.linspace(0.0, 1.0, 11)
     expression = Expression(text, _functions(times))
-    values = {**CONSTANTS, TIME: times, **dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
+    none = np.full(len(times), nan)
+    values = {**CONSTANTS, TIME: times, **dict.fromkeys(variables, none), **dict.fromkeys(varied, nan)}
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # from NumPy, about values that do not come from the FMU
         try:
             _number(expression, values)
         except _NoNumberError as error:
-            is_wrong_type = isinstance(error.__cause__, TypeError)
-            if is_wrong_type and (numbers := expression.names.intersection(varied)):
+            numbers = expression.names.intersection(varied)
+            if numbers and isinstance(error.__cause__, TypeError):
                 return f"{error}; {min(numbers)} varies, and what varies is a number"
-            if is_wrong_type or isinstance(error, _ArrayError) or expression.names <= CONSTANTS.keys():
+            if isinstance(error.__cause__, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
                 return str(error)
     return ""

@@ -86,8 +86,6 @@ class Model:
     content: bytes
     version: int
     """The version of FMI, 2 or 3."""
-    once_per_process: bool
-    """True when a process can hold only one instance."""
     variables: Mapping[str, Variable]
     """The numeric variables, by name."""
 
@@ -109,8 +107,7 @@ def read_model(path: Path) -> Model:
     variables = {
         v.name: _variable(v) for v in description.modelVariables if v.type in TYPES[version] and not v.dimensions
     }
-    once = description.coSimulation.canBeInstantiatedOnlyOncePerProcess
-    return Model(path.name, content, version, bool(once), variables)
+    return Model(path.name, content, version, variables)
 
 
 def unsettable(name: str, has: Mapping[str, Variable]) -> str:

@@ -1,13 +1,14 @@
 """The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
 
-import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 from typing_extensions import Self
 
@@ -296,17 +297,36 @@ class Plan(Strict):
         return round(steps) if _whole(steps) and 0 <= round(steps) <= self.steps else None
 
     @property
+    def times(self) -> npt.NDArray[np.float64]:
+        """The times of the communication points, s."""
+        return self.start_time + self.step * np.arange(self.steps + 1, dtype=np.float64)
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """The outputs whose trajectories are kept."""
+        return self.keep.outputs if self.keep else ()
+
+    @property
+    def kept_points(self) -> Sequence[int]:
+        """The numbers of the communication points at which they are kept."""
+        if self.keep is None:
+            return ()
+        if self.keep.at:
+            return [n for time in self.keep.at if (n := self.step_at(time)) is not None]
+        return range(0, self.steps + 1, round(self.keep.every / self.step) if self.keep.every else 1)
+
+    @property
     def mark(self) -> dict[str, Any]:
         """The part of the plan that the results depend on, as JSON values.
 
         The number of runs is included only for a Latin hypercube. With other samplers, it does not change the values of
         a run.
         """
-        mark: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
-        runs = [] if self.sampler == "latin-hypercube" else ["runs"]
-        for key in ("title", "fmu", "vehicle", "vary_from", "time_limit", *runs):
-            mark.pop(key, None)
-        return mark
+        left_out = {"title", "fmu", "vehicle", "vary_from", "time_limit", "input_file"}
+        if self.sampler != "latin-hypercube":
+            left_out.add("runs")
+        mark = self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=left_out)
+        return mark | {"vary": [[*pair] for pair in mark["vary"].items()]}  # their order matters
 
 
 def _whole(steps: float) -> bool:

@@ -19,12 +19,14 @@ from rov_fmu.study.plan.figures import meaning, read_expression, unusable
 from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
 from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, check_plan
 from rov_fmu.study.plan.sampling import Design
-from rov_fmu.study.run.simulator import Manoeuvre
-from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME, Job
+from rov_fmu.study.run.simulator import Job
+from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Array = npt.NDArray[np.float64]
+_TRIALS = 8
+"""The number of runs that are tried until one ends, to find out whether the FMU can be reset."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         from_file, lines = _file_inputs(plan, path, model)
     except FileError as error:
         unread = [str(error)]
-    times = np.zeros(0) if own else plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
+    times = np.zeros(0) if own else plan.times
     words = [*own, *estimates.check(), *_check(plan, model, estimates.names, from_file, times)]
     wrong = lines_on(path, words) + unread
     if plan.input_file:
@@ -59,27 +61,14 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     if wrong:
         raise PlanError(*wrong)
     design = Design(plan, model.variables, estimates.known)
+    whole = plan.model_copy(update={"inputs": {**plan.inputs, **from_file}})
     middles = times[:-1] + 0.5 * plan.step
-    signals = {**plan.inputs, **from_file}
-    inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in signals.items()}
-    kept = plan.keep.outputs if plan.keep else ()
+    inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in whole.inputs.items()}
     named = {name for text in plan.figures.values() for name in read_expression(text).names} & model.variables.keys()
-    recorded = [*dict.fromkeys([*kept, *sorted(named - {*design.names})])]
-    manoeuvre = Manoeuvre(
-        plan.start_time, plan.step, plan.steps, plan.tolerance, plan.set, design.names, inputs, recorded
-    )
-    mark = {
-        **plan.mark,
-        **estimates.mark,
-        "vary": [
-            [name, varied.model_dump(by_alias=True, mode="json", exclude_none=True)]
-            for name, varied in plan.vary.items()
-        ],
-        "inputs": {name: signal.model_dump(mode="json", exclude_none=True) for name, signal in signals.items()},
-    }
-    mark.pop("input_file", None)
-    job = Job(f"rov-fmu-{uuid4().hex}", model, manoeuvre, plan.figures, kept, _kept_points(plan), plan.time_limit)
-    return Prepared(job, design, mark, [*estimates.warnings(), *design.warnings()])
+    recorded = [*dict.fromkeys([*plan.kept, *sorted(named - {*design.names})])]
+    trials = design.rows(0, min(_TRIALS, design.runs))
+    job = Job(f"rov-fmu-{uuid4().hex}", model, plan, design.names, inputs, recorded, trials)
+    return Prepared(job, design, whole.mark | estimates.mark, [*estimates.warnings(), *design.warnings()])
 
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
@@ -140,7 +129,7 @@ def _check(
         if reason := unsettable(name, has) or has[name].wrong(value):
             yield key_line(f"set.{name}", reason, value)
     yield from _check_inputs(plan, has)
-    for name in plan.keep.outputs if plan.keep else ():
+    for name in plan.kept:
         if name not in has:
             yield key_line("keep.outputs", unknown(name, has))
     yield from _check_figures(plan, has, {*known, *plan.vary}, times)
@@ -221,23 +210,13 @@ def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
         if strange := sorted(read_expression(text).names - CONSTANTS.keys() - {TIMES} - has.keys()):
             reason = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
             yield key_line(f"figures.{name}", meaning(strange[0]) or reason, text)
-        elif reason := unusable(text, has, varied, times):
+        elif times.size and (reason := unusable(text, has, varied, times)):
             yield key_line(f"figures.{name}", reason, text)
-    if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
+    if taken := {RUN, TIME} & {*plan.kept}:
         yield key_line("keep.outputs", f"the results have another column {taken.pop()}")
 
 
 # ---- Over time -------------------------------------------------------------------------------------------------------
-
-
-def _kept_points(plan: Plan) -> Sequence[int]:
-    """Return the numbers of the communication points at which trajectories are kept."""
-    if plan.keep is None:
-        return ()
-    if plan.keep.at:
-        return [n for time in plan.keep.at if (n := plan.step_at(time)) is not None]
-    stride = round(plan.keep.every / plan.step) if plan.keep.every else 1
-    return range(0, plan.steps + 1, stride)
 
 
 def _sampled(signal: Signal, times: Array, before: float) -> Array:

@@ -11,16 +11,8 @@ import pandas as pd
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output
 from rov_fmu.report.templates import inline_script, number, page
-from rov_fmu.study.results.plots import (
-    Plot,
-    draw_band,
-    draw_distribution,
-    draw_indices,
-    draw_lines,
-    in_rows,
-    indices_height,
-)
-from rov_fmu.study.results.results import QUANTILES, Results, scale_of, statistics
+from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
+from rov_fmu.study.results.results import QUANTILES, Results, statistics
 from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
@@ -80,17 +72,20 @@ def study_page(results: Results) -> str:
         seed=plan["seed"],
         quantiles=QUANTILES,
         figures=figures,
-        plots=in_rows([figure["plot"] for figure in figures if figure["plot"]]),
+        plots=[figure["plot"] for figure in figures if figure["plot"]],
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
         no_indices={name: found for name, found in indices.items() if isinstance(found, str)},
         indices=tables,
-        index_plots=in_rows([_index_plot(name, found) for name, found in tables.items()]),
+        index_plots=[
+            plot(f"Sobol indices of {name}", partial(draw_indices, rows=rows), name, height=indices_height(len(rows)))
+            for name, rows in tables.items()
+        ],
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
         blocks=results.planned // (len(results.groups) + 2),
         few=_FEW,
-        bands=in_rows([_band(results, name) for name in outputs]),
+        bands=[_band(results, name) for name in outputs],
         warnings=results.warnings,
         script=inline_script("plots.js"),
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
@@ -109,45 +104,33 @@ def _grid(results: Results) -> Sequence[str]:
 def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
     """Return the row about a figure, with its plot unless all runs have the same value."""
     values = results.runs[name].to_numpy(float)
-    there, unit = values[np.isfinite(values)], results.figure_units[name]
-    found = {"name": name, "expression": results.plan["figures"][name], "unit": unit, "runs": there.size}
-    if not there.size:
-        return {
-            **found,
-            "quantiles": [None] * len(QUANTILES),
-            "mean": None,
-            "sd": None,
-            "plot": None,
-            "is_still": False,
-        }
+    there = values[np.isfinite(values)]
     quantiles, mean, sd = statistics(there, QUANTILES)
-    found |= {"quantiles": quantiles, "mean": mean, "sd": sd}
-    if _is_constant(there):
-        return {**found, "plot": None, "is_still": True}
-    if grid:
-        draw = partial(draw_lines, name=name, results=results, grid=grid)
-        label = f"{name} over {' and '.join(grid)}"
-    else:
-        draw = partial(draw_distribution, values=there, quantiles=quantiles, unit=unit)
-        label = f"Distribution of {name}"
-    return {**found, "plot": Plot(label, draw, name, found["expression"]), "is_still": False}
+    is_still = bool(there.size) and _is_constant(there)
+    expression = results.plan["figures"][name]
+    found = {"name": name, "expression": expression, "runs": there.size, "is_still": is_still, "plot": None}
+    if there.size and not is_still:
+        if grid:
+            draw = partial(draw_lines, name=name, results=results, grid=grid)
+            label = f"{name} over {' and '.join(grid)}"
+        else:
+            draw = partial(draw_distribution, values=there, quantiles=quantiles)
+            label = f"Distribution of {name}"
+        found["plot"] = plot(label, draw, name, expression)
+    return {**found, "quantiles": quantiles, "mean": mean, "sd": sd}
 
 
 def _is_constant(values: Any) -> bool:
     """True when values are practically constant."""
-    scaled = values / scale_of(values)
-    return bool(np.ptp(scaled) <= _CONSTANT * np.abs(scaled).max())
+    with np.errstate(over="ignore"):
+        return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
-def _band(results: Results, output: str) -> Plot:
+def _band(results: Results, output: str) -> dict[str, Any]:
     bands = results.bands(output)
     shown = bands.iloc[:: max(1, len(bands) // _POINTS)]
     draw = partial(draw_band, bands=shown, unit=results.units[output])
-    return Plot(f"Trajectories of {output}", draw, output, results.descriptions[output])
-
-
-def _index_plot(figure: str, rows: Sequence[dict[str, Any]]) -> Plot:
-    return Plot(f"Sobol indices of {figure}", partial(draw_indices, rows=rows), figure, "", indices_height(len(rows)))
+    return plot(f"Trajectories of {output}", draw, output, results.descriptions[output])
 
 
 def _sensitivities(results: Results) -> dict[str, Any]:

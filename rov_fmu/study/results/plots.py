@@ -1,13 +1,11 @@
-"""The plots of a study's page, and their arrangement in rows that fill the page."""
+"""The plots of a study's page."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import shorten, wrap
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -15,11 +13,9 @@ from matplotlib.patches import Patch
 from rov_fmu.report.plots.steps import evenly
 from rov_fmu.report.plots.svg import LIGHT, LINES, Draw, inline_svg, with_even_text, with_formulas
 from rov_fmu.report.templates import number, pretty_unit
-from rov_fmu.study.results.results import Results, scale_of
+from rov_fmu.study.results.results import Results
 
-_WIDTHS = {3: 3.7, 2: 5.68, 1: 11.6}
-"""The width of a plot in inches by the number of plots in its row. The widths make the text equally large in all plots
-on a wide page."""
+_WIDTH = 3.7  # inches
 _HEIGHT = 2.6  # inches
 _BINS = 40
 _MARKED = 40
@@ -36,62 +32,28 @@ _BAR = 0.34
 """The height of a bar, as a share of the distance between two variables."""
 
 
-@dataclass(frozen=True)
-class Plot:
-    """A plot: a label for screen readers, the function that draws it, its height in inches, and the title above it."""
-
-    label: str
-    draw: Draw
-    name: str
-    text: str
-    height: float = _HEIGHT
+def plot(label: str, draw: Draw, name: str, text: str = "", height: float = _HEIGHT) -> dict[str, Any]:
+    """Return a plot with the name and the text above it. `label` is for screen readers; the height is in inches."""
+    return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(draw), (_WIDTH, height), marked=True)}
 
 
-def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
-    """Return the plots for a grid whose rows are full: `name`, `text`, `row` (the number of plots in its row) and
-    `svg`.
-
-    A plot in a row of fewer than three is drawn twice: broad for a wide page, and as narrow as the others for a phone.
-    """
-    found = []
-    for plot, count in zip(plots, _counts(len(plots)), strict=True):
-        draw = with_even_text(plot.draw)
-        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height), marked=True)
-        if count < 3:
-            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad", marked=True)
-            narrow = Markup('<div class="broad">{}</div><div class="narrow">{}</div>').format(broad, narrow)
-        found.append({"name": plot.name, "text": plot.text, "row": count, "svg": narrow})
-    return found
-
-
-def _counts(plots: int) -> list[int]:
-    """Return how many plots stand in the row of each plot: three, except in the last rows, where two avoid a gap."""
-    if plots == 1:
-        return [1]
-    pairs = -plots % 3
-    return [3] * (plots - 2 * pairs) + [2] * (2 * pairs)
-
-
-def axis_label(name: str, unit: str, scale: float = 1.0) -> str:
-    """Return a name with its unit, in which values are a power of ten smaller; either of them may be missing."""
-    parts = [number(scale) if scale != 1.0 else "", "" if unit == "1" else pretty_unit(unit)]
-    words = " ".join(filter(None, parts))
+def axis_label(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    words = "" if unit == "1" else pretty_unit(unit)
     return f"{name} ({words})" if name and words else name or words
 
 
-def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit: str) -> None:
+def draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
     """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
     ax = figure.subplots()
-    scale = scale_of(values)
-    values = values / scale
-    low, median, high = (quantiles[n] / scale for n in (0, len(quantiles) // 2, -1))
+    low, median, high = (quantiles[n] for n in (0, len(quantiles) // 2, -1))
     ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     shares = np.full(len(values), 100.0 / len(values))
     bins = min(_BINS, max(5, round(len(values) ** 0.5)))
     _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
     bars.set_label("share")  # type: ignore[union-attr]
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(xlabel=axis_label("", unit, scale), ylabel="runs (%)")
+    ax.set(ylabel="runs (%)")
     _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 
 
@@ -100,20 +62,17 @@ def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str])
     ax = figure.subplots()
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
-    scale, across = scale_of(runs[name]), scale_of(runs[along])
     lines = [("", runs)]
     for other in others:
         some = evenly(np.unique(runs[other]).tolist())
         lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
     for (label, line), color in zip(lines, LINES, strict=False):
         marker = "o" if len(line) <= _MARKED else ""
-        x, y = line[along] / across, line[name] / scale
-        ax.plot(x, y, color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
+        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
     for other in others:
         title = axis_label(other, results.units[other])
         figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    label = axis_label("", results.figure_units[name], scale)
-    ax.set(xlabel=axis_label(along, results.units[along], across), ylabel=label)
+    ax.set_xlabel(axis_label(along, results.units[along]))
     _set_ticks(ax)
 
 
@@ -122,14 +81,13 @@ def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     ax = figure.subplots()
     t = bands.index.to_numpy()
     values = bands.to_numpy(float)
-    scale = scale_of(values)
-    low, below, median, above, high = np.where(np.isfinite(values), values / scale, np.nan).T
+    low, below, median, above, high = np.where(np.isfinite(values), values, np.nan).T
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
     for edge, label in ((low, "5 %"), (high, "95 %")):
         ax.plot(t, edge, color=LIGHT["blue"], linewidth=0.5, alpha=0.5, label=label)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6, label="median")
-    ax.set(xlabel="time (s)", ylabel=axis_label("", unit, scale))
+    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
     _set_ticks(ax)
 
 

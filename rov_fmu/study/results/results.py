@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import floor, log10
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +11,13 @@ import pandas as pd
 import pyarrow.dataset as ds
 
 from rov_fmu.io.messages import FileError, shown
-from rov_fmu.study.plan.figures import read_expression
 from rov_fmu.study.results.store import RUNS, TRAJECTORIES, Store
-from rov_fmu.study.run.worker import FAILED, INCOMPLETE, RUN, STATUS, TIME
+from rov_fmu.study.run.child import FAILED, INCOMPLETE
+from rov_fmu.study.run.worker import RUN, STATUS, TIME
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _AT_ONCE = 20_000_000
 """The number of trajectory values in memory at a time."""
-_USUAL = (1e-100, 1e100)
-"""The sizes of numbers whose squares, sums and differences neither overflow nor vanish."""
 
 
 class Results:
@@ -46,10 +44,6 @@ class Results:
         """The part of the plan that the results depend on."""
         self.units: dict[str, str] = study["units"]
         """The units of parameters and outputs."""
-        self.figure_units: dict[str, str] = {
-            name: read_expression(text, self.units).unit for name, text in self.plan["figures"].items()
-        }
-        """The units of figures; an empty text where it does not follow from the expression."""
         self.descriptions: dict[str, str] = study["descriptions"]
         """The FMU's descriptions of parameters and outputs."""
         self.model: str = study["model"]
@@ -93,9 +87,8 @@ class Results:
                 columns=[TIME, output], filter=(ds.field(TIME) >= low) & (ds.field(TIME) <= high)
             )
             values = part[output].to_numpy().reshape(ended, -1)  # each run has all times, one after another
-            scale = scale_of(values)
-            with np.errstate(invalid="ignore"):  # the difference of two infinities
-                found.append(scale * np.quantile(values / scale, quantiles, axis=0, overwrite_input=True).T)
+            with np.errstate(all="ignore"):  # about numbers that are infinite, or nearly so
+                found.append(np.quantile(values, quantiles, axis=0, overwrite_input=True).T)
         return pd.DataFrame(np.concatenate(found), pd.Index(times, name=TIME), pd.Index(quantiles, name="quantile"))
 
     def sensitivity(self, figure: str, seed: int = 1) -> pd.DataFrame:
@@ -121,7 +114,8 @@ class Results:
         if len(whole) < 2:
             raise FileError(f"{self.folder}: too few runs have {figure}")
         problem = {"num_vars": len(names), "names": names}
-        found = sobol.analyze(problem, whole.ravel() / scale_of(whole), calc_second_order=False, seed=seed)
+        with np.errstate(all="ignore"):
+            found = sobol.analyze(problem, whole.ravel(), calc_second_order=False, seed=seed)
         columns = {"S1": "S1", "S1_95": "S1_conf", "ST": "ST", "ST_95": "ST_conf"}
         return pd.DataFrame({name: found[key] for name, key in columns.items()}, pd.Index(names))
 
@@ -142,22 +136,13 @@ class Results:
         return ds.dataset(paths)
 
 
-def scale_of(values: Any) -> float:
-    """Return the power of ten in which numbers are computed with and drawn: 1, unless the largest one is extreme."""
-    numbers = np.asarray(values, float)
-    there = np.isfinite(numbers)
-    largest = float(max(numbers.max(where=there, initial=0.0), -numbers.min(where=there, initial=0.0)))
-    if largest == 0.0 or _USUAL[0] < largest < _USUAL[1]:
-        return 1.0
-    return float(10.0 ** max(floor(log10(largest)), -300))
-
-
-def statistics(values: Any, quantiles: Sequence[float]) -> tuple[list[float], float, float | None]:
-    """Return the quantiles, the mean, and the standard deviation (None for a single value) of finite numbers."""
-    scale = scale_of(values)
-    scaled = values / scale
-    sd = scale * float(scaled.std(ddof=1)) if scaled.size > 1 else None
-    return [scale * q for q in np.quantile(scaled, quantiles).tolist()], scale * float(scaled.mean()), sd
+def statistics(values: Any, quantiles: Sequence[float]) -> tuple[list[float], float, float]:
+    """Return the quantiles, the mean, and the standard deviation of finite numbers; NaN where there are too few."""
+    if not values.size:
+        return [nan] * len(quantiles), nan, nan
+    with np.errstate(all="ignore"):
+        sd = float(values.std(ddof=1)) if values.size > 1 else nan
+        return np.quantile(values, quantiles).tolist(), float(values.mean()), sd
 
 
 def _others(names: Sequence[str], table: str) -> str:

@@ -4,7 +4,6 @@ import numpy as np
 
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table, text
 from rov_fmu.report.progress import per_second
-from rov_fmu.study.results.plots import axis_label
 from rov_fmu.study.results.results import Results, statistics
 from rov_fmu.study.run.cluster import Spent
 from rov_fmu.study.run.worker import REASON
@@ -27,9 +26,8 @@ def print_summary(results: Results, spent: Spent) -> None:
         for name in results.figures:
             values = runs[name].to_numpy(float)
             there = values[np.isfinite(values)]
-            quantiles, mean, _ = statistics(there, _SHOWN) if there.size else ([np.nan] * len(_SHOWN), np.nan, None)
-            label = axis_label(name, results.figure_units[name])
-            shown.add_row(label, *(text(number, ".5g") for number in (*quantiles, mean)), str(there.size))
+            quantiles, mean, _ = statistics(there, _SHOWN)
+            shown.add_row(name, *(text(number, ".5g") for number in (*quantiles, mean)), str(there.size))
         print_table(shown)
     reasons = runs[REASON].value_counts()
     for reason, count in reasons.head(_FAILURES).items():

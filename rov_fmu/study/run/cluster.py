@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import sys
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -14,7 +14,7 @@ from time import perf_counter
 from typing import Any
 
 import dask
-from distributed import Client, KilledWorker, LocalCluster, Security, as_completed, rpc
+from distributed import Client, LocalCluster, Security, as_completed, rpc
 from distributed.comm.core import CommClosedError
 from distributed.utils import silence_logging_cmgr
 
@@ -23,8 +23,8 @@ from rov_fmu.io.messages import FileError, StudyError, brief
 from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.simulator import LoadError
-from rov_fmu.study.run.worker import Delivery, Job, Part, Trial, do_runs, lost_runs, try_out
+from rov_fmu.study.run.simulator import Job, LoadError
+from rov_fmu.study.run.worker import Delivery, Part, do_runs
 
 _TASK = 1.0
 """The seconds that a task should take."""
@@ -32,9 +32,6 @@ _LEAST = 0.2
 """The least seconds of a task, also when few runs remain."""
 _AHEAD = 3
 """The number of tasks submitted for each thread, so that no thread waits for the next one."""
-_CHANCES = 3
-"""After this many workers have died, new tasks run in child processes. A task in a child process is given up after the
-same number of failures."""
 _GONE = (CancelledError, CommClosedError)
 """Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
@@ -120,19 +117,14 @@ class _Runs:
         self._client, self._job, self._design, self._store = client, job, design, store
         self._missing, self._spent, self._on_progress = missing, spent, on_progress
         self._done_before = design.runs - sum(end - first for first, end in missing)
-        self._futures: dict[Any, tuple[int, int, bool]] = {}
-        """For each future: its first run, the run after its last one, and whether it uses a child process."""
-        self._lost: deque[tuple[int, int]] = deque()
-        """The runs whose worker died; they are repeated in a child process."""
-        self._deaths = 0
-        self._chances: Counter[int] = Counter()
-        self._resets, self._seconds = False, _TASK
+        self._futures: dict[Any, tuple[int, int]] = {}
+        """For each future: its first run, and the run after its last one."""
+        self._seconds = _TASK
+        """The time of a run, by the last task; the first tasks have one run each."""
 
     def do(self) -> None:
         """Do all missing runs."""
         self._report()
-        trial = self._trial()
-        self._resets, self._seconds = trial.resets, max(trial.seconds, 1e-6)
         coming = as_completed(loop=self._client.loop, raise_errors=False)
         try:
             self._submit_tasks(coming)
@@ -144,73 +136,38 @@ class _Runs:
             with suppress(Exception):  # a client that is closed raises
                 self._client.cancel(list(self._futures), force=True)
 
-    def _trial(self) -> Trial:
-        first = self._missing[0][0]
-        rows = self._design.rows(first, min(first + 8, self._design.runs))
-        for separate in (False, True):
-            try:
-                return self._client.submit(try_out, self._job.key, rows, separate, pure=False).result()
-            except LoadError as error:
-                raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
-            except KilledWorker:
-                self._deaths += 1
-        return Trial(False, _TASK)
-
     def _submit_tasks(self, coming: Any) -> None:
         """Submit tasks until every thread has enough."""
         try:
             threads = sum(self._client.nthreads().values()) or 1
         except OSError as error:
             raise CommClosedError("no answer") from error
-        while (self._lost or self._missing) and len(self._futures) < _AHEAD * threads:
-            if self._lost:
-                self._submit(coming, *self._lost.popleft(), separate=True)
-                continue
+        while self._missing and len(self._futures) < _AHEAD * threads:
             first, end = self._missing.popleft()
             remaining = sum(b - a for a, b in self._missing) + end - first
             size = max(min(ceil(_TASK / self._seconds), ceil(remaining / threads)), ceil(_LEAST / self._seconds))
             if end - first > size:
                 self._missing.appendleft((first + size, end))
                 end = first + size
-            self._submit(coming, first, end, separate=self._deaths >= _CHANCES)
-
-    def _submit(self, coming: Any, first: int, end: int, separate: bool) -> None:
-        rows = self._design.rows(first, end)
-        future = self._client.submit(do_runs, self._job.key, first, rows, self._resets, separate, pure=False)
-        self._futures[future] = first, end, separate
-        coming.add(future)
+            future = self._client.submit(do_runs, self._job.key, first, self._design.rows(first, end), pure=False)
+            self._futures[future] = first, end
+            coming.add(future)
 
     def _take(self, future: Any) -> None:
-        """Write the rows of a task, or submit it again if its worker died."""
-        first, end, separate = self._futures.pop(future)
+        """Write the rows of a task. Dask itself repeats a task whose worker died."""
+        first, end = self._futures.pop(future)
         try:
             part: Part = future.result()
-        except KilledWorker as error:
-            self._repeat(first, end, separate, error)
-            return
         except LoadError as error:
-            raise FileError(f"{self._job.model.name}: cannot be run on a worker: {error}") from error
+            raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
         except _GONE:
             raise
         except Exception as error:  # the cluster raises various exceptions
             raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
-        self._write(first, end, part)
-        self._seconds = max(part.seconds / (end - first), 1e-6)
-
-    def _repeat(self, first: int, end: int, separate: bool, error: KilledWorker) -> None:
-        """Repeat the runs of a worker that has died. In a child process, only the run that caused the crash fails."""
-        self._deaths += 1
-        self._chances[first] += separate
-        if self._chances[first] < _CHANCES:
-            self._lost.append((first, end))
-            return
-        rows = self._design.rows(first, end)
-        self._write(first, end, lost_runs(self._job, first, rows, f"its worker died: {brief(str(error))}"))
-
-    def _write(self, first: int, end: int, part: Part) -> None:
         self._store.write(first, end, part.runs, part.trajectories)
         self._spent.runs += end - first
         self._spent.failed += part.failed
+        self._seconds = max(part.seconds / (end - first), 1e-6)
         self._report()
 
     def _report(self) -> None:
@@ -233,7 +190,6 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     settings = {
-        "distributed.scheduler.allowed-failures": 0,  # its runs are repeated in child processes instead
         "distributed.worker.memory.terminate": False,
         "distributed.worker.profile.enabled": False,  # it interrupts the steps a hundred times a second
     }

@@ -58,14 +58,14 @@ def run_study(
         on_warning(warning)
     with store.held():
         job, design = prepared.job, prepared.design
-        named = [model.variables[name] for name in (*design.names, *job.manoeuvre.recorded)]
+        named = [model.variables[name] for name in (*design.names, *job.recorded)]
         store.belongs_to(
             prepared.mark,
             sha256(model.content).hexdigest(),
             plan.vehicle,
             design.runs,
-            columns={"parameters": design.names, "figures": [*job.figures], "outputs": job.kept},
-            points=len(job.kept_points),
+            columns={"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
+            points=len(plan.kept_points),
             model=model.name,
             title=plan.title,
             units={variable.name: variable.unit for variable in named},

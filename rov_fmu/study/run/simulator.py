@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from fmpy.fmi1 import FMICallException
+from fmpy.simulation import instantiate_fmu
 
 from rov_fmu.io.messages import brief
 from rov_fmu.study.plan.model import TYPES, Model, Variable
+from rov_fmu.study.plan.plan import Plan
 
 Array = npt.NDArray[np.float64]
 _WARNING = 1
-_FATAL = 4
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 """The name of each status, in every version of FMI."""
 
@@ -32,27 +34,21 @@ class LoadError(Exception):
 
 
 @dataclass(frozen=True)
-class Manoeuvre:
-    """The simulation that all runs have in common."""
+class Job:
+    """Everything that a worker must know about a study; it is sent to each worker once."""
 
-    start: float
-    step: float
-    """The communication step, s."""
-    steps: int
-    tolerance: float | None
-    set: Mapping[str, float]
-    """The start values, by variable."""
+    key: str
+    """Distinguishes this study from others on the same workers."""
+    model: Model
+    plan: Plan
     varied: Sequence[str]
     """The variables that get other values in each run."""
     inputs: Mapping[str, Array]
     """The values that are set at the beginning of each step, by variable."""
     recorded: Sequence[str]
     """The variables that are read before the first step and after every step."""
-
-    @property
-    def times(self) -> Array:
-        """The times of the communication points, s."""
-        return self.start + self.step * np.arange(self.steps + 1, dtype=np.float64)
+    trials: Array
+    """The values of the first runs, with which it is found out whether the FMU can be reset."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +70,16 @@ class _Group:
 class Simulator:
     """An instance of an unpacked FMU; for one thread at a time. Raises LoadError."""
 
-    def __init__(self, folder: str, description: Any, model: Model, manoeuvre: Manoeuvre) -> None:
-        self._folder, self._description, self._manoeuvre, self._version = folder, description, manoeuvre, model.version
-        self._variables = model.variables
+    def __init__(self, folder: str, description: Any, job: Job) -> None:
+        self._folder, self._description, self._job = folder, description, job
+        self._version, self._variables = job.model.version, job.model.variables
         self._logs = False
         self._fmu = self._instantiate()
-        self._functions = _functions(self._fmu.dll, model.version)
-        self._times: list[float] = manoeuvre.times.tolist()
-        self._start = self._groups({**manoeuvre.set, **dict.fromkeys(manoeuvre.varied, 0.0)}, 1)
-        self._inputs = self._groups(manoeuvre.inputs, manoeuvre.steps)
-        self._reads = self._groups(dict.fromkeys(manoeuvre.recorded, 0.0), manoeuvre.steps + 1)
+        self._functions = _functions(self._fmu.dll, self._version)
+        self._times: list[float] = job.plan.times.tolist()
+        self._start = self._groups({**job.plan.set, **dict.fromkeys(job.varied, 0.0)}, 1)
+        self._inputs = self._groups(job.inputs, job.plan.steps)
+        self._reads = self._groups(dict.fromkeys(job.recorded, 0.0), len(self._times))
         self._places = {name: (group, n) for group in self._start for n, name in enumerate(group.names)}
         self._changes = self._changing()
 
@@ -104,8 +100,10 @@ class Simulator:
 
     def reset(self) -> None:
         """Make ready for the next run, with a new instance if the FMU cannot be reset."""
-        reset, terminate = self._functions["Reset"], self._functions["Terminate"]
-        if terminate(self._fmu.component) > _WARNING or reset(self._fmu.component) > _WARNING:
+        try:
+            self._fmu.terminate()
+            self._fmu.reset()
+        except FMICallException:
             self.renew()
 
     def renew(self) -> None:
@@ -116,12 +114,12 @@ class Simulator:
     def free(self) -> None:
         """Free the instance. The library stays loaded, because loading one again has crashed processes."""
         if self._fmu.component is not None:
-            self._functions["FreeInstance"](self._fmu.component)
+            getattr(self._fmu, f"fmi{self._version}FreeInstance")(self._fmu.component)
             self._fmu.component = None
 
     def _run(self, values: Sequence[float]) -> None:
-        m, functions, component = self._manoeuvre, self._functions, self._fmu.component
-        for name, value in zip(m.varied, values, strict=True):
+        component, start = self._fmu.component, self._times[0]
+        for name, value in zip(self._job.varied, values, strict=True):
             group, column = self._places[name]
             group.table[0, column] = value
         for group in self._start:
@@ -130,9 +128,9 @@ class Simulator:
         self._initialize()
         reads = [(group.get, *group.call) for group in self._reads]
         for get, references, count, address, _ in reads:
-            _check(get(component, references, count, address), "reading", m.start)
-        do_step, times, step = functions["DoStep"], self._times, m.step
-        for n in range(m.steps):
+            _check(get(component, references, count, address), "reading", start)
+        do_step, times, step = self._functions["DoStep"], self._times, self._job.plan.step
+        for n in range(len(times) - 1):
             for put, references, count, address in self._changes.get(n, ()):
                 if (status := put(component, references, count, address)) > _WARNING:
                     _check(status, "setting the inputs", times[n])
@@ -143,18 +141,18 @@ class Simulator:
                     _check(status, "reading", times[n + 1])
 
     def _initialize(self) -> None:
-        m, component = self._manoeuvre, self._fmu.component
-        has_tolerance, tolerance = m.tolerance is not None, m.tolerance or 0.0
-        enter, leave = (self._functions[f"{verb}InitializationMode"] for verb in ("Enter", "Exit"))
-        if self._version == 2:
-            setup = self._functions["SetupExperiment"]
-            _check(setup(component, has_tolerance, tolerance, m.start, True, self._times[-1]), "setting it up")
-            _check(enter(component), "initialization")
-        else:
-            _check(enter(component, has_tolerance, tolerance, m.start, True, self._times[-1]), "initialization")
-        for put, references, count, address in self._changes.get(0, ()):
-            _check(put(component, references, count, address), "setting the inputs", m.start)
-        _check(leave(component), "initialization")
+        fmu, tolerance, start, end = self._fmu, self._job.plan.tolerance, self._times[0], self._times[-1]
+        try:
+            if self._version == 2:
+                fmu.setupExperiment(tolerance, start, end)
+                fmu.enterInitializationMode()
+            else:
+                fmu.enterInitializationMode(tolerance, start, end)
+            for put, references, count, address in self._changes.get(0, ()):
+                _check(put(fmu.component, references, count, address), "setting the inputs", start)
+            fmu.exitInitializationMode()
+        except FMICallException as error:
+            _check(error.status, "initialization")
 
     def _changing(self) -> dict[int, list[tuple[Callable[..., int], int, int, int]]]:
         """Return, by step, the calls that set the inputs which change at the beginning of this step."""
@@ -182,12 +180,10 @@ class Simulator:
         return groups
 
     def _instantiate(self) -> Any:
-        import fmpy.simulation
-
         _MESSAGES.last = ""
         try:
             with _loading():
-                return fmpy.simulation.instantiate_fmu(
+                return instantiate_fmu(
                     self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=_keep
                 )
         except Exception as error:  # FMPy raises that itself
@@ -247,32 +243,24 @@ def _check(status: int, what: str, time: float | None = None) -> None:
 
 
 def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
-    """Return the FMU's functions by name without the version. Unlike with FMPy, arrays are passed by address."""
-    pointer, number, size, whole = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
-    flag = whole if version == 2 else ctypes.c_bool
+    """Return the FMU's functions that are called at every step, by name without the version.
 
-    def typed(name: str, *arguments: Any, result: Any = whole) -> Any:
+    Unlike with FMPy, arrays are passed by address.
+    """
+    pointer, number, size = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t
+
+    def typed(name: str, *arguments: Any) -> Any:
         function = library[f"fmi{version}{name}"]  # each look-up gives a new object, so FMPy's prototype is not changed
-        function.argtypes, function.restype = (pointer, *arguments), result
+        function.argtypes, function.restype = (pointer, *arguments), ctypes.c_int
         return function
 
-    found = {name: typed(name) for name in ("Reset", "Terminate", "ExitInitializationMode")}
-    found["FreeInstance"] = typed("FreeInstance", result=None)
-    experiment = (flag, number, number, flag, number)
     if version == 2:
-        found["SetupExperiment"] = typed("SetupExperiment", *experiment)
-        found["EnterInitializationMode"] = typed("EnterInitializationMode")
-        found["DoStep"] = typed("DoStep", number, number, whole)
-        kinds = ("Real", "Integer", "Boolean")
-        return found | {
-            f"{verb}{kind}": typed(f"{verb}{kind}", pointer, size, pointer) for verb in ("Get", "Set") for kind in kinds
-        }
-    found["EnterInitializationMode"] = typed("EnterInitializationMode", *experiment)
-    found["DoStep"] = _step_of_3(typed("DoStep", number, number, flag, *[pointer] * 4))
-    for kind in TYPES[3].keys() - {"Enumeration"}:
-        for verb in ("Get", "Set"):
-            found[f"{verb}{kind}"] = _sized(typed(f"{verb}{kind}", pointer, size, pointer, size))
-    return found
+        names = [f"{verb}{kind}" for verb in ("Get", "Set") for kind in ("Real", "Integer", "Boolean")]
+        steps = {"DoStep": typed("DoStep", number, number, ctypes.c_int)}
+        return steps | {name: typed(name, pointer, size, pointer) for name in names}
+    names = [f"{verb}{kind}" for verb in ("Get", "Set") for kind in TYPES[3] if kind != "Enumeration"]
+    steps = {"DoStep": _step_of_3(typed("DoStep", number, number, ctypes.c_bool, *[pointer] * 4))}
+    return steps | {name: _sized(typed(name, pointer, size, pointer, size)) for name in names}
 
 
 def _sized(function: Callable[..., int]) -> Callable[..., int]:

@@ -1,0 +1,127 @@
+"""Runs in a child process: when the FMU ends the process, or does not return, only that run fails."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import fmpy
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.fmu.proof import DISK, MEMORY
+from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
+from rov_fmu.study.plan.figures import Figures
+from rov_fmu.study.run.simulator import Job, LoadError, RunError, Simulator
+
+Array = npt.NDArray[np.float64]
+DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
+"""The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
+_MANY = 10.0
+"""The seconds that the runs of a task may take in addition to the limit of one run. A task is made to take 1 s."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run gave."""
+
+    status: str
+    reason: str
+    """Why a figure is missing, or why the run did not end; otherwise empty."""
+    figures: Sequence[float]
+    kept: Sequence[npt.NDArray[Any]] = ()
+    """The values of each kept output, if the run ended."""
+
+
+class Child:
+    """An instance of the FMU in a child process, which is started again when it ends. Raises LoadError."""
+
+    def __init__(self, folder: str, job: Job) -> None:
+        self._folder, self._job = folder, job
+        self._process: ChildProcess | None = None
+        self._resets = self._can_be_reset()
+
+    def runs(self, rows: Array) -> list[Run]:
+        """Run once with each row of values. If the process ends, each row is run alone."""
+        limit = self._job.plan.time_limit
+        try:
+            found: list[Run] = self._call("runs", rows, self._resets, time=limit + (len(rows) > 1) * _MANY)
+        except ChildError as error:
+            if len(rows) > 1:
+                return [run for n in range(len(rows)) for run in self.runs(rows[n : n + 1])]
+            return [_failed(self._job, f"the FMU {_predicate(error, limit)}")]
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process:
+            self._process.close()
+
+    def _can_be_reset(self) -> bool:
+        """True if a run after a reset is bit-identical to one of a new instance, in the first trial that ends."""
+        for values in self._job.trials:
+            try:
+                return bool(self._call("can_be_reset", values, self._job.trials[-1], time=self._job.plan.time_limit))
+            except (RunError, ChildError):
+                continue
+        return False
+
+    def _call(self, method: str, *arguments: Any, time: float) -> Any:
+        limits = Limits(time=time, memory=MEMORY, disk=DISK)
+        if not self._process:
+            try:
+                self._process = ChildProcess(_Runner, self._folder, self._job, limits=limits)
+            except ChildError as error:
+                raise LoadError(f"the FMU {_predicate(error, time)}") from error
+        try:
+            return self._process.call(method, *arguments, limits=limits)
+        except ChildError:
+            self._process = None
+            raise
+
+
+def _predicate(error: ChildError, limit: float) -> str:
+    """Return what the FMU did."""
+    exceeds_time = isinstance(error, LimitError) and error.limit == "time"
+    return f"did not return within time_limit = {limit:g} s" if exceeds_time else str(error)
+
+
+def _failed(job: Job, reason: str) -> Run:
+    return Run(FAILED, reason, [np.nan] * len(job.plan.figures))
+
+
+class _Runner:
+    """The object in the child process: an instance of the FMU, and the figures."""
+
+    def __init__(self, folder: str, job: Job) -> None:
+        self._job = job
+        self._simulator = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
+        self._figures = Figures(job.plan.figures, job.plan.times)
+
+    def can_be_reset(self, values: Array, others: Array) -> bool:
+        """Repeat a run in the same instance, after a run with other values, and compare it. Raises RunError."""
+        self._simulator.renew()
+        first = {name: recorded.copy() for name, recorded in self._simulator.run(values.tolist()).items()}
+        for row in (others, values):
+            self._simulator.reset()
+            again = self._simulator.run(row.tolist())
+        self._simulator.renew()
+        return all(np.array_equal(first[name], again[name], equal_nan=True) for name in first)
+
+    def runs(self, rows: Array, resets: bool) -> list[Run]:
+        """Run once with each row of values."""
+        plan = self._job.plan
+        points = np.array(plan.kept_points, int)
+        return [self._run(values, points, resets) for values in rows.tolist()]
+
+    def _run(self, values: Sequence[float], points: npt.NDArray[Any], resets: bool) -> Run:
+        try:
+            run = self._simulator.run(values)
+        except RunError as error:
+            return _failed(self._job, str(error))
+        figures, reason = self._figures.of({**dict(zip(self._job.varied, values, strict=True)), **run})
+        kept = [run[name][points] for name in self._job.plan.kept]
+        if resets:
+            self._simulator.reset()
+        else:
+            self._simulator.renew()
+        return Run(INCOMPLETE if reason else DONE, reason, figures, kept)
