@@ -213,6 +213,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     assert "a_d_r" in found.intervals
 
 
+@pytest.mark.long
 def test_noisy_forces_leave_the_curve_uncertain(tmp_path: Path) -> None:
     """The intervals of a_t and b_t cover. Chance alone lets fewer than six of eight do so once in 3,000 times."""
     lines = [line.split(",") for line in FORCES["thrust_rear.csv"].splitlines()[1:]]

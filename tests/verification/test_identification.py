@@ -133,6 +133,7 @@ def test_models_beat_no_change_and_ours_is_near_the_noise(outcome: Outcome, spli
         assert len([*numbers(outcome)]) == 10
 
 
+@pytest.mark.long
 def test_the_neural_ode_passes_the_tests_of_every_method() -> None:
     pytest.importorskip("jax", reason="this method needs the extra [identification] with jax")
     program = [sys.executable, "-m", "tests.verification.neural_ode_checks"]
