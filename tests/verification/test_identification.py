@@ -27,8 +27,12 @@ from verification.identification.scores import Score, bands, from_csv, numbers, 
 
 NEEDS = {"_gaussian_process": "sklearn"}
 """The package of an extra that a method needs."""
-HERE = [make for make in command.METHODS if make.__name__ != "_neural_ode"]
-"""The methods that are tested in this process."""
+HERE = [
+    pytest.param(make, marks=pytest.mark.long if make.__name__ == "_gaussian_process" else ())
+    for make in command.METHODS
+    if make.__name__ != "_neural_ode"
+]
+"""The methods that are tested in this process. Of these, the Gaussian process takes longest."""
 
 
 @pytest.fixture(scope="module")
