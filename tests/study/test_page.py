@@ -197,7 +197,6 @@ wide = "y[-1]"
     assert len(numbers) > 10
 
 
-@pytest.mark.long
 def test_the_page_shows_which_sobol_indices_are_uncertain(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str
 ) -> None:
