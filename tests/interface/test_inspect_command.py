@@ -303,20 +303,6 @@ def test_thrusters_of_one_kind_have_its_curve(tables: Mapping[str, str | bytes],
     assert lines.count(f'curve = "{curve}"') == 2
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.bag", "a.db3", "a.mcap", "a.ulg", "a.tlog", "a.bin", "missing.csv"])
-@pytest.mark.parametrize("content", [b"", b"nonsense\n" * 50])
-def test_what_is_no_log_is_one_line(
-    name: str, content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if name != "missing.csv":
-        (tmp_path / name).write_bytes(content)
-    assert main(["identify", "--inspect", str(tmp_path / name)]) == 2
-    found = capsys.readouterr()
-    assert found.err.startswith(f"rov-fmu: {tmp_path / name}")
-    assert len(found.err.splitlines()) == 1
-    assert not (tmp_path / "rov.toml").exists()
-
-
 def test_thousands_of_columns_take_seconds_and_are_not_all_shown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
