@@ -17,6 +17,8 @@ ROOT = Path(__file__).parent.parent
 REFIT = SHIPPED["videoray_refit"]
 TESTS = REFIT.parent / "tank_tests"
 """The tank tests that ship."""
+FEW_TESTS = ROOT / "tests" / "frozen" / "tank_tests" / "tadpole"
+"""Tank tests of a single axis, which are identified in a second."""
 FROZEN_REFIT = ROOT / "tests" / "frozen" / "vehicles" / "videoray_refit" / "videoray_refit.toml"
 """The refit of an earlier version, whose numbers stay."""
 BARE = ROOT / "verification" / "fuzzing" / "bare.toml"
@@ -48,8 +50,8 @@ COMMANDS = {
     ),
     "the page that flies": Command("fly.html", lambda path: ["fly", str(BARE), "-o", str(path)]),
     "the model for Gazebo": Command("bare.sdf", lambda path: ["sdf", str(BARE), "-o", str(path)]),
-    "the vehicle": Command("rov.toml", lambda path: ["identify", str(TESTS), "--force", "-o", str(path)]),
-    "the report": Command("report.html", lambda path: ["identify", str(TESTS), "--force", "--report", str(path)]),
+    "the vehicle": Command("rov.toml", lambda path: ["identify", str(FEW_TESTS), "--force", "-o", str(path)]),
+    "the report": Command("report.html", lambda path: ["identify", str(FEW_TESTS), "--force", "--report", str(path)]),
     "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "-o", str(path)]),
 }
 

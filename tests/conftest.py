@@ -1,6 +1,7 @@
 """The FMUs under test, built for this machine once in a run, by the command line of the exporter."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -109,6 +110,15 @@ def videoray3_fmu(made_once: Made) -> Path:
 @pytest.fixture(scope="session")
 def videoray3_dir(videoray3_fmu: Path) -> Path:
     return videoray3_fmu.with_suffix("")
+
+
+@contextmanager
+def without_page() -> Iterator[None]:
+    """Let builds in this process leave out the FMU's page, which takes most of their time."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.build.web_module", lambda _: b"")
+        patched.setattr("rov_fmu.build.documentation", lambda *_, **__: {})
+        yield
 
 
 def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:

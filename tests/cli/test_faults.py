@@ -14,7 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ALONE, BARE, COMMANDS, ROOT, TESTS, start, without_progress
+from tests.commands import ALONE, BARE, COMMANDS, FEW_TESTS, ROOT, TESTS, start, without_progress
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
 OLD = b"the old one"
@@ -70,7 +70,8 @@ def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(number: int
 def test_a_killed_identification_leaves_whole_files(number: int, tmp_path: Path) -> None:
     def arguments(folder: Path) -> list[str]:
         folder.mkdir()
-        return ["identify", str(TESTS), "--force", "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
+        files = ["-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
+        return ["identify", str(FEW_TESTS), "--force", *files]
 
     started = time.monotonic()
     _succeeds(arguments(tmp_path / "reference"))

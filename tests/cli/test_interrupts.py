@@ -196,13 +196,15 @@ def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videor
         assert proof.press_ctrl_c() == LINE
 
 
-@pytest.mark.parametrize("moment", [b"heave", *(pytest.param(m, marks=pytest.mark.long) for m in (b"reading", b"dra"))])
+@pytest.mark.parametrize(
+    "moment", [b"start 1", *(pytest.param(m, marks=pytest.mark.long) for m in (b"reading", b"heave", b"dra"))]
+)
 def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_path: Path) -> None:
     """The moment is a word beside the bar; the last one is the drawing of the report."""
     folder, output = Path(shutil.copytree(TESTS, tmp_path / "tests")), tmp_path / "out" / "rov.toml"
     rov, random = load_vehicle(VIDEORAY), np.random.default_rng(0)
     for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
-        write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
+        write_log(folder, str(n), clean(rov, HEAVE, plan, 10.0).noisy(random))
     output.parent.mkdir()
     output.write_bytes(b"the old one")
     report = str(output.with_name("report.html"))

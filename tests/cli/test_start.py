@@ -63,16 +63,6 @@ def test_fly_opens_the_page_that_it_wrote(monkeypatch: pytest.MonkeyPatch, capsy
     shutil.rmtree(path.parent)
 
 
-@pytest.mark.parametrize("command", [["build"], ["fly", "--against"], ["tables"], ["tune", "--axis=yaw"]])
-def test_an_unknown_name_is_one_line_with_those_that_ship(
-    command: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([*command, "videorey"]) == 2
-    ships = ", ".join(SHIPPED)
-    line = f"rov-fmu: videorey: there is no such file, and no vehicle of this name ships, only {ships}"
-    assert capsys.readouterr() == ("", f"{line}; did you mean videoray?\n")
-
-
 # ---- Quickly ---------------------------------------------------------------------------------------------------------
 
 _SLOW = ("asyncio", "jinja2", "lxml", "matplotlib", "numpy", "pydantic", "rich", "scipy")
@@ -145,9 +135,6 @@ def test_the_shell_completes_commands_vehicles_platforms_and_axes(complete: Comp
     assert complete("build", "--backend", "p") == ["plain,pythonfmu"]
     assert complete("build", "--fmi", "") == ["plain,2", "plain,3"]
     assert complete("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
-
-
-# ---- Progress --------------------------------------------------------------------------------------------------------
 
 
 # ---- Not installed ---------------------------------------------------------------------------------------------------

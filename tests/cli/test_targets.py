@@ -14,7 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import BARE, COMMANDS, REFIT, TESTS, Command, run_elsewhere, without_progress
+from tests.commands import BARE, COMMANDS, FEW_TESTS, REFIT, TESTS, Command, run_elsewhere, without_progress
 from tests.folders import small_folder
 from tests.vehicles import THRUST_EFFECTS
 
@@ -156,7 +156,7 @@ def test_two_files_are_written_both_or_neither(
 
     def run() -> int:
         if command == "identify":
-            return main(["identify", str(TESTS), "--force", "-o", str(first), "--report", str(second)])
+            return main(["identify", str(FEW_TESTS), "--force", "-o", str(first), "--report", str(second)])
         return main(["build", str(BARE), "--platform", "host", "-o", str(first), "--osp"])
 
     with monkeypatch.context() as patched:

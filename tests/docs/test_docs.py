@@ -162,8 +162,12 @@ def test_commands_and_options_exist(page: Path) -> None:
         asked, rest = module_of(words)
         if asked[-1] in {"venv", "fmpy.webapp"}:
             continue
+        options = [word for word in rest if word.startswith("-")]
+        if not options and asked[1:2] != ("rov_fmu",):
+            assert asked == ("build_fmu.py",) or find_spec(asked[-1])
+            continue  # a program that needs no options may do all its work when it is asked for help
         help_text = usage(asked)
-        unknown = [word for word in rest if word.startswith("-") and not re.search(rf"(?<!\S){word}\b", help_text)]
+        unknown = [word for word in options if not re.search(rf"(?<!\S){word}\b", help_text)]
         assert not unknown, f"{' '.join(words)}: {unknown}"
 
 

@@ -29,7 +29,7 @@ from examples.station_keeping.system import (
 from examples.systems import PARAMETER_SET
 from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.conftest import Made
+from tests.conftest import Made, without_page
 from verification.references.fmpy_slave import keep_loaded
 
 SETS = tuple(parameter_sets())
@@ -37,7 +37,8 @@ SETS = tuple(parameter_sets())
 
 def _build(folder: Path) -> None:
     """Build the system into a folder, and unzip its FMUs there."""
-    build_system(folder)
+    with without_page():
+        build_system(folder)
     for name in ("Autopilot", "videoray"):
         fmpy.extract(str(folder / f"{name}.fmu"), unzipdir=str(folder / name))
 

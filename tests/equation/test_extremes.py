@@ -15,26 +15,26 @@ from tests.fmi2 import Fmu
 _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 
 
-def _cases() -> list[tuple[float, dict[str, float]]]:
-    """Return step sizes and values to set: motions without drag, forces that overflow, and random values."""
+def _cases(count: int) -> list[tuple[float, dict[str, float]]]:
+    """Return step sizes and values to set: motions without drag, forces that overflow, and some with random values."""
     ahead = {"u_l": 0.3}
-    cases = [(10.0**power, ahead | {a: 0.0, b: 0.0}) for power in (140, 160, 300) for a, b in _DRAG]
+    cases = [(10.0**power, ahead | {a: 0.0, b: 0.0}) for power in (140, 300) for a, b in _DRAG]
     cases += [(6e-6, {"N_ext": 1.1e118, "u": 1e90}), (2.0, {"N_ext": -2.4e108, "u": 1e100}), (1e308, ahead)]
     cases += [(1.0, {"r": 1e40}), (1.0, {"X_ext": 1e308}), (1e3, {"u": 1e154, "r": 1e154}), (5e-324, ahead)]
     random_ = random.Random(3)
     names = ("u_l", "u_r", "X_ext", "N_ext", "u", "r", "psi")
-    for _ in range(150):
+    for _ in range(count):
         power = 10.0 ** random_.uniform(0.0, 2.5)
         values = {name: random_.choice((-1.0, 0.0, 1.0)) * 10.0 ** random_.uniform(-power, power) for name in names}
         cases.append((10.0 ** random_.uniform(-power, power), {k: v for k, v in values.items() if math.isfinite(v)}))
     return cases
 
 
-def step_them_all(folder: str) -> None:
+def step_them_all(folder: str, count: int) -> None:
     """Step an instance for each case. An AssertionError names the case that fails."""
     fmu = Fmu(Path(folder))
     states = fmu.states
-    for h, values in _cases():
+    for h, values in _cases(count):
         with fmu.instance() as rov:
             rov.start(values)
             before = rov.get(states)
@@ -49,9 +49,10 @@ def step_them_all(folder: str) -> None:
             assert seconds < 10.0, case  # a million pieces take about a second
 
 
-def test_steps_of_absurd_size_end(videoray_dir: Path) -> None:
+@pytest.mark.parametrize("count", [12, pytest.param(150, marks=pytest.mark.long)])
+def test_steps_of_absurd_size_end(count: int, videoray_dir: Path) -> None:
     # in a separate process, because a step that does not end cannot be interrupted
-    code = f"from tests.equation.test_extremes import step_them_all; step_them_all({str(videoray_dir)!r})"
+    code = f"from tests.equation.test_extremes import step_them_all; step_them_all({str(videoray_dir)!r}, {count})"
     root = Path(__file__).parent.parent.parent
     try:
         result = subprocess.run(

@@ -1,14 +1,13 @@
 """Laws that the step of one axis obeys for every drag, force, velocity and time, tested without a reference."""
 
 from collections.abc import Callable, Sequence
-from math import e, inf
 from typing import Any
 
 import pytest
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from rov_fmu.equation.alone import steady_velocity, time_constant
+from rov_fmu.equation.alone import steady_velocity
 from tests.motions import (
     BOUNDARIES,
     CASES,
@@ -41,7 +40,7 @@ def for_every(
     return decorate
 
 
-# ---- Symmetry and semigroup ----
+# ---- Semigroup ----
 
 
 @for_every(CASES, st.just(0.5) | st.floats(0.5, 1.0), st.booleans(), at=[(case, 0.5, True) for case in BOUNDARIES])
@@ -85,18 +84,6 @@ def test_without_force_no_motion_gains_one_bit_of_speed_or_turns(case: Case) -> 
     assert 0.0 <= velocity <= v0 or v0 <= velocity <= 0.0
     assert abs(distance) <= abs(v0) * h
     assert distance * v0 >= 0.0
-
-
-@for_every(CASES, at=[(case,) for case in [*BOUNDARIES, (0.0, 1e-280, 1e-280, 0.0, 1.0)]])
-def test_after_the_time_constant_a_start_from_rest_has_63_percent_of_the_steady_velocity(case: Case) -> None:
-    """The rounding error of Tau is multiplied by the acceleration, which is at most C, and C Tau is at most V_ss."""
-    A, B, C, _, _ = case
-    V, Tau = steady_velocity(A, B, C), time_constant(A, B, C)
-    assume(0.0 < abs(V) < inf and 0.0 < Tau < inf)
-    assume(abs(C) > 1e-290 and abs(V) < 1e150)  # no subnormal numbers, and the square of V does not overflow
-    assume(abs(V) * Tau < inf)  # the distance does not overflow: such a step is refused
-    velocity = step_alone(A, B, C, 0.0, Tau)[0]
-    assert abs(velocity - (1.0 - 1.0 / e) * V) <= 2.0 * rounding_of_velocity(V)
 
 
 # ---- Energy ----

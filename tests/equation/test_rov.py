@@ -1,7 +1,7 @@
 """The mathematics of rov_fmu/vehicle/vehicle.py: thrust, signs, rates."""
 
 import random
-from math import copysign, cos, inf, pi, sin
+from math import copysign, inf, sin
 
 import pytest
 from mpmath import mp
@@ -205,10 +205,3 @@ def test_the_loss_of_thrust_is_that_of_the_thrusters_parts_along_the_axis() -> N
     }
     assert {axis: _loss(SIX, axis, inputs) for axis in expected} == pytest.approx(expected, rel=1e-12)
     assert _loss(HEAVY, SURGE, held(HEAVY, u_1=1.0)) == 0
-
-
-@pytest.mark.parametrize("turns", [0.0, 1.0, -3.0])
-def test_the_heading_counts_turns_from_the_one_before(turns: float) -> None:
-    state = at_rest(SIX) | {"eta": cos(0.25), "epsilon_3": sin(0.25)}
-    assert SIX.calculated(still(SIX), state | {"psi": 2.0 * pi * turns})["psi"] == pytest.approx(0.5 + 2.0 * pi * turns)
-    assert SIX.calculated(still(SIX), state)["psi"] == pytest.approx(0.5)

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import Step, in_fmu, in_python
 from tests.fmi2 import Fmu
 from tests.vehicles import (
-    EVERYTHING,
     HEAVY,
     VEHICLES,
     VIDEORAY,
@@ -149,22 +148,3 @@ def test_a_step_is_the_same_wherever_it_begins(step: Step, case: Case) -> None:
         # half a unit in the last place for each of two sums, in both steps
         largest = max(abs(start), abs(end), abs(moved), drift(i, h))
         assert abs(end - (start + moved)) <= 3.0 * ulp(largest)
-
-
-# ---- Semigroup ----
-
-
-@pytest.mark.parametrize(
-    "cases", [5, pytest.param(30, marks=pytest.mark.long), pytest.param(200, marks=pytest.mark.weekly)]
-)
-@pytest.mark.parametrize(("name", "rov"), [("videoray", VIDEORAY), ("everything", load_vehicle(EVERYTHING))])
-def test_parts_of_a_step_are_the_step(request: pytest.FixtureRequest, name: str, rov: Vehicle, cases: int) -> None:
-    """The parts have any length. The rounding error between them fades or adds up over the time."""
-    fmu, rng = Fmu(request.getfixturevalue(f"{name}_dir")), random.Random(13)
-    for _ in range(cases):
-        _, inputs, before, h = random_case(rng, rov, -4.0, 0.5)
-        first = h * rng.uniform(0.1, 0.9)
-        for step in (in_python, partial(in_fmu, fmu)):
-            whole = step(rov, inputs, before, h)
-            parts = step(rov, inputs, step(rov, inputs, before, first), h - first)
-            assert parts == pytest.approx(whole, rel=1e-13, abs=1e-13)

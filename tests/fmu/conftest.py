@@ -1,8 +1,11 @@
 """The VideoRay's FMU in either version of FMI, for tests that hold for both, and builds without the FMU's page."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests import conftest
 
 
 @pytest.fixture(scope="session", params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
@@ -24,7 +27,7 @@ def either_dir(fmi: int, request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture
-def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let builds in this process leave out the FMU's page, which takes most of their time."""
-    monkeypatch.setattr("rov_fmu.build.web_module", lambda _: b"")
-    monkeypatch.setattr("rov_fmu.build.documentation", lambda *_, **__: {})
+def without_page() -> Iterator[None]:
+    """Let builds leave out the FMU's page."""
+    with conftest.without_page():
+        yield

@@ -24,7 +24,7 @@ from rov_fmu.fmu.slave import Rov
 from rov_fmu.fmu.variables import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
-from tests.conftest import Made
+from tests.conftest import Made, without_page
 from tests.fmi import WARNING, Message
 from tests.fmi2 import recording_callbacks
 from tests.vehicles import SIX, a_vehicle
@@ -36,7 +36,8 @@ from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 def python_fmu(made_once: Made) -> Path:
     def fill(folder: Path) -> None:
         path = folder / "videoray-python.fmu"
-        assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
+        with without_page():
+            assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
         fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
 
     return made_once("python flavour", fill) / "videoray-python.fmu"

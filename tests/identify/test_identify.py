@@ -120,6 +120,7 @@ def test_steady_velocities_alone_leave_the_inertia_to_its_prior(tmp_path: Path) 
     assert high > 2.0 * low, "a time is hardly known without the inertia"
 
 
+@pytest.mark.long
 def test_forces_at_one_command_are_enough_where_motion_tells_the_shape(tmp_path: Path) -> None:
     found = identify(read(tmp_path, KNOWN, {"thrust_top.csv": FLAT, **responses(TRUTH, HEAVE)}))
     check_answers(found.axes[0], 0.06)
@@ -177,6 +178,7 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
     assert vehicle.command_range == (0.2, 0.8)
 
 
+@pytest.mark.long
 def test_axes_that_share_a_curve_are_correlated_in_the_file(tmp_path: Path) -> None:
     """Drag of surge and of yaw inherit the error of the curve's scale, so that V_ss is known much better than drag."""
     random, rows = np.random.default_rng(1), {**FORCES, **responses(TRUTH, SURGE), **responses(TRUTH, YAW)}
@@ -213,6 +215,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     assert "a_d_r" in found.intervals
 
 
+@pytest.mark.long
 def test_noisy_forces_leave_the_curve_uncertain(tmp_path: Path) -> None:
     """The intervals of a_t and b_t cover. Chance alone lets fewer than six of eight do so once in 3,000 times."""
     lines = [line.split(",") for line in FORCES["thrust_rear.csv"].splitlines()[1:]]
@@ -357,7 +360,14 @@ def test_a_table_joins_the_logs_and_contradictions_are_told(tmp_path: Path) -> N
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("key", [key for key in PRIORS if not key.endswith("noise")])
+@pytest.mark.parametrize(
+    "key",
+    [
+        pytest.param(key, marks=() if key in ("voltage", "slow_force") else pytest.mark.long)
+        for key in PRIORS
+        if not key.endswith("noise")
+    ],
+)
 def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> None:
     rov = f'base = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'
     folder = with_logs(tmp_path, HEAVE, 1, rov, {})
@@ -377,6 +387,7 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
 
 
+@pytest.mark.long
 def test_known_coefficients_are_kept(tmp_path: Path) -> None:
     known = KNOWN + 'beta_w = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
     tables = {**FORCES, "steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]}
@@ -398,23 +409,12 @@ def test_known_thrust_is_kept(tmp_path: Path) -> None:
 def test_a_vehicle_to_compare_with_is_loaded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tables = {**FORCES, **responses(TRUTH, HEAVE)}
     folder = folder_of(tmp_path / "tests", f'against = "videoray"\n{KNOWN}', tables)
-    found = identify(load_tests(folder))
-    assert found.against
-    assert found.against == VIDEORAY
+    path = load_tests(folder).given.description.tables.against
+    assert path
+    assert load_vehicle(path) == VIDEORAY
     with pytest.raises(VehicleFileError, match=r"rov\.toml: against = 'videoray2': must be a vehicle file"):
         load_tests(folder_of(folder, f'against = "videoray2"\n{KNOWN}', tables))
     assert not capsys.readouterr().out
-
-
-def test_progress_never_goes_back(tmp_path: Path) -> None:
-    told: list[tuple[str, float]] = []
-    tables = {**FORCES, **responses(TRUTH, HEAVE)}
-    identify(read(tmp_path, KNOWN, tables), lambda words, share: told.append((words, share)))
-    words, shares = zip(*told, strict=True)
-    assert words[0] == "reading the logs"
-    assert words[-1] == "what to measure next of heave"
-    assert list(shares) == sorted(shares)
-    assert (shares[0], shares[-1] < 1.0) == (0.0, True)
 
 
 # ---- Tests that cannot be used ---------------------------------------------------------------------------------------
@@ -433,6 +433,7 @@ def test_a_log_that_teaches_nothing_is_left_out(tmp_path: Path) -> None:
     assert {p.file for p in of_axis(found, HEAVE).predictions} == {"log_heave_0.csv"}
 
 
+@pytest.mark.long
 def test_an_axis_without_a_usable_test_goes(tmp_path: Path) -> None:
     still = STILL.replace("depth [m]", "heading [deg]")
     found = identify(read(tmp_path, KNOWN, {**FORCES, **responses(TRUTH, HEAVE), "log_yaw.csv": still}))

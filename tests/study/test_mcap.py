@@ -58,6 +58,7 @@ def test_a_run_is_written_by_its_number(plan: Path, scheduler: str) -> None:
         vehicle.to_mcap(Results(folder).trajectories())
 
 
+@pytest.mark.long
 def test_a_run_that_is_not_there_is_told(plan: Path, scheduler: str, capsys: pytest.CaptureFixture[str]) -> None:
     folder = plan.parent / "results"
     assert main(["study", str(plan), "-o", str(folder), "--scheduler", scheduler, "--mcap", "9"]) == 2

@@ -8,7 +8,7 @@ from rov_fmu.tank.readers.parsers import one_parser
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _one_parser() -> Iterator[None]:
+def one_process() -> Iterator[None]:
     """Start the process once, which takes half a second."""
     with one_parser():
         yield

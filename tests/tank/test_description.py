@@ -127,8 +127,6 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
         tests = read(folder, f'base = "old.toml"\n{HEAD}{also}', responses(k, SWAY))
         assert [*tests.given.vehicle.layout.kinds] == ["surge", "sway", "heave", "yaw"]
         assert tests.given.vehicle.layout.kinds["sway"].keys == keys
-    found = identify(tests).vehicle
-    assert found.response(SWAY, 0.5) == pytest.approx(k.response(SWAY, 0.5), rel=1e-3)
     inputs: list[Path] = []
     load_tests(folder, inputs.extend)
     assert folder / "old.toml" in inputs
@@ -245,7 +243,9 @@ def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
 GIVEN = {"a_d_w": 40.0, "F_0_w": -1.0, "T_t200": 0.3, "c_0_t200": 0.02}
 
 
-@pytest.mark.parametrize("name", GIVEN)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in ("a_d_w", "T_t200") else pytest.mark.long) for name in GIVEN]
+)
 def test_a_number_of_rov_toml_is_in_the_vehicle_as_it_is(name: str, tmp_path: Path) -> None:
     """Even where the log would rather have another one."""
     base = load_vehicle(SHIPPED["bluerov2"])

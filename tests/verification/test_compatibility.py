@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.vehicle.shipped import SHIPPED
+from tests.conftest import without_page
 from verification.compatibility import check, write
 
 
@@ -14,7 +15,8 @@ from verification.compatibility import check, write
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of one vehicle."""
     folder = tmp_path_factory.mktemp("compatibility")
-    write(folder, ["videoray"], "host")
+    with without_page():
+        write(folder, ["videoray"], "host")
     return folder
 
 

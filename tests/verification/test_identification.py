@@ -27,8 +27,12 @@ from verification.identification.scores import Score, bands, from_csv, numbers, 
 
 NEEDS = {"_gaussian_process": "sklearn"}
 """The package of an extra that a method needs."""
-HERE = [make for make in command.METHODS if make.__name__ != "_neural_ode"]
-"""The methods that are tested in this process."""
+HERE = [
+    pytest.param(make, marks=pytest.mark.long if make.__name__ == "_gaussian_process" else ())
+    for make in command.METHODS
+    if make.__name__ != "_neural_ode"
+]
+"""The methods that are tested in this process. Of these, the Gaussian process takes longest."""
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +137,7 @@ def test_models_beat_no_change_and_ours_is_near_the_noise(outcome: Outcome, spli
         assert len([*numbers(outcome)]) == 10
 
 
+@pytest.mark.long
 def test_the_neural_ode_passes_the_tests_of_every_method() -> None:
     pytest.importorskip("jax", reason="this method needs the extra [identification] with jax")
     program = [sys.executable, "-m", "tests.verification.neural_ode_checks"]

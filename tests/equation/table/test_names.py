@@ -267,7 +267,7 @@ def test_equal_names_get_a_number(name: str, tmp_path: Path) -> None:
 
 
 def test_random_names_change_nothing(tmp_path: Path) -> None:
-    check_random_names(8, 3, tmp_path, IN_TEXT)
+    check_random_names(8, 1, tmp_path, IN_TEXT)
 
 
 @pytest.mark.long

@@ -38,7 +38,13 @@ ROVS = {
 }
 
 
-@pytest.fixture(scope="module", params=ROVS)
+_SOME = ("videoray_dir", "heavy3_dir", "everything_dir")
+"""The FMUs of the default tests: each vehicle once, and both versions of FMI."""
+
+
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=() if name in _SOME else pytest.mark.long) for name in ROVS]
+)
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Return the FMU of the VideoRay, of a vehicle with sway, lag, coupling and dead band, or one with all effects."""
     return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))
