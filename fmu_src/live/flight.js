@@ -324,12 +324,16 @@ class Flight {
     );
   }
 
-  /** Ends the recording; the flight goes on from where it is shown. */
+  /** Ends the recording; the flight goes on from where it is shown, without the loads of the recording. */
   leave() {
     const n = placeOf(this.times, this.time) + 1;
     for (const list of [this.times, this.commands, this.pilot.states, this.ghost.states]) list.splice(n);
     this.pilot.model.turn();
+    const { variables, inputs, commands } = this.pilot.model.vehicle;
+    const loads = variables.slice(0, inputs).filter(([name]) => !commands.includes(name));
+    const own = loads.filter(([name]) => this.replay && name in this.replay.recording.commands);
     this.replay = null;
+    this.set(Object.fromEntries(own));
   }
 
   /** Flies a published step test: from rest, with all other inputs at their start values. @param {StepTest} test */

@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import NO_FILE, FileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
+from rov_fmu.tank.description import has_wrench
 from rov_fmu.tank.inspection.one_log import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import unwrapped
@@ -39,7 +41,10 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
     `identified` is the MCAP file that `rov-fmu identify --mcap` wrote: the bands of its predictions and its unknown
     forces are added. Warns of what is left out. Raises FileError if the log cannot be flown by this vehicle.
     """
-    log = one_log(path, vehicle.layout, description_beside(path))
+    rov_file, layout = description_beside(path), vehicle.layout
+    if has_wrench(rov_file.tables):
+        layout = Layout.of_wrench(layout.axes)
+    log = one_log(path, layout, rov_file)
     if not log.commands:
         raise DataFileError(f"{path}: no commands of thrusters were found, so it cannot be flown")
     start, end = float(log.commands.rows[0]), log.commands.end
@@ -62,11 +67,16 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
 
 
 def _commands(log: Log, layout: Layout) -> tuple[Array, dict[str, list[float]]]:
-    """Return the times at which commands change, and the commands of the vehicle that give those of the log best."""
+    """Return the times at which commands change, and the commands of the vehicle that give those of the log best.
+
+    Of a log of forces on the body, they are the loads.
+    """
     commands = log.commands
     assert isinstance(commands, Commands)
     times = np.unique([commands.rows[0], *commands.time, commands.rows[-1]])
     given = commands.at(times)
+    if {*commands.thrusters} <= {axis.external for axis in AXES.values()}:  # the forces of a wrench are loads
+        return times, {name: _rounded(column) for name, column in zip(commands.thrusters, given.T, strict=True)}
     if commands.thrusters == (COMMAND,) and log.axis:
         signs = layout.signs(log.axis)
         values = given @ np.array([[signs.get(name, 0.0) for name in layout.commands]])
