@@ -131,6 +131,8 @@ def _setting(text: str) -> str:
 
 
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
+_file_option = partial(click.option, type=_FILE)
+_set_option = partial(click.option, "--set", "settings", multiple=True, type=_setting, metavar="NAME=VALUE")
 
 
 class _Commands(click.Group):
@@ -165,10 +167,9 @@ def _commands(context: click.Context) -> None:
 
 @_commands.command("build")
 @_vehicle(default=str(VIDEORAY))
-@click.option(
+@_file_option(
     "-o",
     "--output",
-    type=_FILE,
     metavar="FILE.fmu",
     help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0.",
 )
@@ -204,22 +205,12 @@ def _commands(context: click.Context) -> None:
     is_flag=True,
     help="Also write <identifier>_OspModelDescription.xml (OSP-IS 1.0.1; FMI 2.0 only).",
 )
-@click.option(
+@_file_option(
     "--sign",
-    type=_FILE,
     metavar="KEY",
     help="Private key (Ed25519, by ssh-keygen or in PEM) that signs the FMU. The signature is FILE.fmu.sig.",
 )
-def _build(
-    vehicle: Path,
-    output: Path | None,
-    backend: str,
-    fmi: int,
-    interface: str | None,
-    platforms: tuple[str, ...],
-    osp: bool,
-    sign: Path | None,
-) -> None:
+def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **options: Any) -> None:
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
@@ -233,16 +224,13 @@ def _build(
     with compiling(chosen) as (begin, done):
         built = build(
             loaded,
-            output,
             platforms=chosen,
             backend=backend,
             fmi=fmi,
-            interface=interface,
-            osp=osp,
-            sign=sign,
             inputs=[vehicle],
             on_content=begin,
             on_compiled=done,
+            **options,
         )
     _print_built(built, perf_counter() - started)
 
@@ -270,19 +258,13 @@ def _print_built(built: "Built", seconds: float) -> None:
 
 @_commands.command("simulate")
 @_vehicle(default=str(VIDEORAY))
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    type=_setting,
-    metavar="NAME=VALUE",
+@_set_option(
     help="Set an input, a coefficient, or a state at the start, in SI units. The name of an axis commands all "
     "thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
 )
-@click.option(
+@_file_option(
     "--input",
     "commands",
-    type=_FILE,
     metavar="FILE",
     help="Inputs over time: any log that identify reads, or a table (.csv) of the time (s) and of inputs (0.3 is a "
     "command of 30 %). Each row is held up to the next one.",
@@ -297,18 +279,16 @@ def _print_built(built: "Built", seconds: float) -> None:
     type=_seconds("1e-6"),
     help="Time between two results, s, which does not change the motion. The default is 0.01.",
 )
-@click.option(
+@_file_option(
     "-o",
     "--output",
-    type=_FILE,
     metavar="RESULT.csv",
     help="Results to write (.csv, .parquet, or .mcap for Foxglove and PlotJuggler).",
 )
-@click.option(
+@_file_option(
     "--plot",
     is_flag=False,
     flag_value=Path(),
-    type=_FILE,
     metavar="[FILE.png]",
     help=("Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, a browser shows the plot."),
 )
@@ -384,20 +364,18 @@ def _warn(message: str) -> None:
     help=("Another vehicle, which is shown as a ghost and gets the same commands."),
     shell_complete=_complete_vehicle,
 )
-@click.option(
+@_file_option(
     "--recording",
-    type=_FILE,
     metavar="LOG",
     help="A log that identify reads, with the rov.toml beside it: the vehicle flies its commands beside what was "
     "measured.",
 )
-@click.option(
+@_file_option(
     "--identified",
-    type=_FILE,
     metavar="LOGS.mcap",
     help="What `identify --mcap` wrote: bands of the errors and unknown forces are shown.",
 )
-@click.option("-o", "--output", type=_FILE, metavar="PAGE.html", help="Page to write; no browser is opened.")
+@_file_option("-o", "--output", metavar="PAGE.html", help="Page to write; no browser is opened.")
 def _fly(
     vehicle: Path, against: Path | None, recording: Path | None, identified: Path | None, output: Path | None
 ) -> None:
@@ -467,12 +445,7 @@ def _open(path: Path, option: str) -> None:
     metavar="N=NAME",
     help="Servo N drives this thruster, fin or input; N=-NAME reverses it. It may be repeated.",
 )
-@click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    type=_setting,
-    metavar="NAME=VALUE",
+@_set_option(
     help="Set an input (a current: V_N, V_E), a coefficient, or a state at the start, in SI units.",
 )
 @click.option(
@@ -482,9 +455,8 @@ def _open(path: Path, option: str) -> None:
     show_default=True,
     help="Depth of the bottom, m.",
 )
-@click.option(
+@_file_option(
     "--log",
-    type=_FILE,
     metavar="LOG.csv",
     help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. Each restart of the autopilot "
     "begins another log: LOG_2.csv, or the next free name.",
@@ -525,10 +497,9 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
 
 @_commands.command("sdf")
 @_vehicle(default=str(VIDEORAY))
-@click.option(
+@_file_option(
     "-o",
     "--output",
-    type=_FILE,
     metavar="FILE.sdf|.urdf",
     help="File to write. The default is <identifier>.sdf. URDF has the hydrodynamics for ROS 2.",
 )
@@ -578,15 +549,13 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     default=60.0,
     help="Time for each experiment. The default is 60 s.",
 )
-@click.option(
+@_file_option(
     "--key",
-    type=_FILE,
     metavar="KEY.pub",
     help="Public key that must have signed the FMU. Without it, any key may have.",
 )
-@click.option(
+@_file_option(
     "--report",
-    type=_FILE,
     metavar="FILE",
     help="Page (HTML) to write with more evidence: step size, repeatability, conservation, cost, limits, hashes, "
     "errors on unseen data.",
@@ -635,7 +604,7 @@ def _prove(
 
 @_commands.command("study")
 @click.argument("plan", type=_FILE)
-@click.option("-o", "--output", type=_FILE, required=True, metavar="RESULTS", help="Folder of the results.")
+@_file_option("-o", "--output", required=True, metavar="RESULTS", help="Folder of the results.")
 @click.option(
     "--workers",
     type=_number("a whole number from 1 to 1024", 1, 1024, int),
@@ -704,16 +673,14 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
 
 @_commands.command("identify")
 @click.argument("folder", type=_FILE)
-@click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml", help="Vehicle file to write.")
-@click.option(
+@_file_option("-o", "--output", metavar="VEHICLE.toml", help="Vehicle file to write.")
+@_file_option(
     "--report",
-    type=_FILE,
     metavar="REPORT.html",
     help="Report to write, which a build puts into the FMU.",
 )
-@click.option(
+@_file_option(
     "--mcap",
-    type=_FILE,
     metavar="LOGS.mcap",
     help="File to write for Foxglove and PlotJuggler: what was commanded, measured and predicted, bands, and the "
     "unknown force.",
@@ -820,30 +787,23 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
 )
 @click.option(
     "--v-ss",
+    "V_ss",
     type=_number("a number (V_ss in m/s or rad/s)"),
     help="Wanted steady velocity at this command, m/s or rad/s.",
 )
 @click.option(
     "--tau",
+    "Tau",
     type=_number("a number (Tau in s)"),
     help="Wanted time constant at this command, s. Without it beta stays as it is.",
 )
-@click.option(
+@_file_option(
     "--points",
-    type=_FILE,
     metavar="POINTS.csv",
     help="Table of many wanted points instead, with columns for command, velocity and time constant.",
 )
-@click.option("-o", "--output", type=_FILE, metavar="TUNED.toml", help="Vehicle file to write.")
-def _tune(
-    vehicle: Path,
-    axis: str,
-    command: float | None,
-    v_ss: float | None,
-    tau: float | None,
-    points: Path | None,
-    output: Path | None,
-) -> None:
+@_file_option("-o", "--output", metavar="TUNED.toml", help="Vehicle file to write.")
+def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     """Find alpha and beta of an axis that give a wanted response."""
     from rov_fmu.identify.findings import sentences
     from rov_fmu.identify.tuning import implausible
@@ -851,7 +811,7 @@ def _tune(
     from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_results import print_tuning
 
-    tuning = tune_vehicle(vehicle, AXES[axis], command, v_ss, tau, points, output)
+    tuning = tune_vehicle(vehicle, AXES[axis], output=output, **wanted)
     print_tuning(tuning)
     for message in sentences(implausible(tuning)):
         _warn(message)

@@ -1,7 +1,7 @@
 // The page's controls (sliders, sticks, keys, a gamepad, step tests, recordings, links), and the loop that steps and draws.
 
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
-const SPAN = 20; // s, of the charts
+const [SPAN, SPAN_REPLAYED] = [20, 30]; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
 const HELD = "Depth, heading and attitude are held as by ArduSub.";
@@ -78,8 +78,6 @@ class Live {
     this.vehicle = pilot.vehicle;
     this.paused = false;
     this.speed = 1;
-    /** The time span of the charts, in s. */
-    this.span = SPAN;
     /** The axis and the direction of each key, which is known by its place on the keyboard. @type {Record<string, [string, number]>} */
     this.driving = { ...ARROWS };
     for (const { name, keys } of this.vehicle.axes) {
@@ -254,7 +252,6 @@ class Live {
     if (!this.flight.replay) return;
     this.flight.leave();
     this.flight.ghostShown = this.flight.isOther || this.isTuned();
-    this.span = SPAN;
     this.arrange();
     this.say("You have control; the recording has ended.");
   }
@@ -336,13 +333,7 @@ class Live {
   arrange(choice) {
     const view = /** @type {HTMLSelectElement} */ (part("view"));
     if (choice) view.value = choice;
-    const { replay } = this.flight;
-    for (const option of view.options) {
-      option.hidden =
-        option.value === "force"
-          ? !replay?.recording.forces.length
-          : ["measured", "error"].includes(option.value) && !replay;
-    }
+    for (const option of view.options) option.hidden = PANELS[option.value](this.flight).length === 0;
     if (view.selectedOptions[0].hidden) view.value = "velocities";
     const panels = PANELS[view.value](this.flight);
     part("charts").replaceChildren();
@@ -350,7 +341,7 @@ class Live {
     this.charts = panels.map((panel) => new Chart(part("charts"), panel));
     const heave = PANELS.positions(this.flight).find((_, a) => this.vehicle.axes[a].position === "z");
     this.dive?.svg.remove();
-    this.dive = heave ? new Chart(part("column"), { ...heave, id: "dive", title: "depth", signal: -1 }) : null;
+    this.dive = heave ? new Chart(part("column"), { ...heave, id: "dive", title: "depth", signal: undefined }) : null;
     this.fit();
   }
 
@@ -369,9 +360,16 @@ class Live {
     this.picture?.reset();
     this.paused = false;
     this.speed = 1;
-    this.span = SPAN;
     this.say("");
     this.show();
+  }
+
+  /** The time span of the charts, in s: that of a step test shows its Tau. */
+  get span() {
+    const { test, replay, pilot } = this.flight;
+    const Tau = test ? pilot.model.marks[2 * test.axis + 1] : Number.NaN;
+    if (test) return Math.min(60, Math.max(4, Math.ceil(6 * (Number.isFinite(Tau) ? Tau : 3))));
+    return replay ? SPAN_REPLAYED : SPAN;
   }
 
   /** Returns true when the step test has reached the end of the charts, or the recording its end. */
@@ -384,7 +382,6 @@ class Live {
   leaveTest() {
     if (this.hasEnded()) this.paused = false;
     this.flight.test = null;
-    this.span = SPAN;
   }
 
   /** Returns all commands to their start values. */
@@ -420,8 +417,6 @@ class Live {
     this.flight.run(test);
     this.arrange("velocities");
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
-    const Tau = this.flight.pilot.model.marks[2 * test.axis + 1];
-    this.span = Math.min(60, Math.max(4, Math.ceil(6 * (Number.isFinite(Tau) ? Tau : 3))));
     this.paused = false;
     this.say(
       `${name} ${Math.round(test.command * 100)} % from rest${test.V === null ? "" : `; measured: V_ss ${test.V} ${unit}${test.Tau === null ? "" : `, Tau ${test.Tau} s`}`}.`,
@@ -448,7 +443,6 @@ class Live {
       this.say(`${recording.name}: the vehicle moves too fast under these commands to be computed.`);
       return;
     }
-    this.span = 30;
     this.paused = false;
     this.arrange("measured");
     const end = this.flight.times[this.flight.times.length - 1];
@@ -618,10 +612,10 @@ class Live {
     this.horizon?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost, this.pointed);
-    this.track?.draw(flight, ghost && (flight.replay?.hasTrack ?? true));
+    this.track?.draw(flight, flight.hasGhostTrack);
     this.dive?.draw(flight, Math.max(SPAN, flight.times[flight.times.length - 1]), ghost, null);
     const all = this.charts.flatMap(({ panel }) => panel.traces);
-    part("steady").hidden = flight.steering() !== null || this.charts.every(({ panel }) => panel.axis < 0);
+    part("steady").hidden = flight.steering() !== null || this.charts.every(({ panel }) => panel.axis === undefined);
     part("measured").hidden = !flight.test && !all.some(({ kind }) => kind === "line measured");
     part("banded").hidden = !all.some(({ band }) => band);
     part("grey").hidden = !ghost;

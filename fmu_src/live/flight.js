@@ -16,6 +16,30 @@ function placeOf(numbers, x) {
   return low;
 }
 
+/** Returns the place at which ascending times are at most a time, and how far it is from there to the next one, from 0 to 1.
+ * @param {number[]} times @param {number} time @returns {[number, number]} */
+function shareOf(times, time) {
+  const n = placeOf(times, time);
+  return [n, n + 1 < times.length ? Math.max(0, (time - times[n]) / (times[n + 1] - times[n])) : 0];
+}
+
+/** Returns what the n-th of ascending times has, at a time between them.
+ * @param {number[]} times @param {(n: number) => number} value @param {number} time */
+function between(times, value, time) {
+  const [n, share] = shareOf(times, time);
+  return share ? value(n) + share * (value(n + 1) - value(n)) : value(n);
+}
+
+/** Returns the variable of a signal, or null for the distance along its axis. @param {Axis} axis @param {boolean} isPosition */
+function variableOf({ velocity, position }, isPosition) {
+  return isPosition ? position : velocity;
+}
+
+/** @param {Axis} axis @param {boolean} isPosition */
+function unitOf({ unit, positionUnit }, isPosition) {
+  return isPosition ? positionUnit : unit;
+}
+
 /** A vehicle with its history: the values of all variables, and then the distances along the axes, at the times of the flight. */
 class Craft {
   /** @param {Model} model */
@@ -93,15 +117,23 @@ class Craft {
     return place === undefined ? 0 : this.states[n][place];
   }
 
-  /** Returns depth, heading, or the distance along an axis at the n-th time. @param {number} a @param {number} n */
-  position(a, n = this.states.length - 1) {
-    const { position } = this.model.vehicle.axes[a];
-    return position ? this.at(n, position) : this.states[n][this.model.values.length + a];
+  /** Returns the position or the velocity along an axis at the n-th time. @param {number} a @param {boolean} isPosition @param {number} n */
+  along(a, isPosition, n) {
+    const name = variableOf(this.model.vehicle.axes[a], isPosition);
+    return name ? this.at(n, name) : this.states[n][this.model.values.length + a];
   }
 
-  /** Returns the velocity along an axis at the n-th time. @param {number} a @param {number} n */
-  velocity(a, n = this.states.length - 1) {
-    return this.at(n, this.model.vehicle.axes[a].velocity);
+  /** Returns the position or the velocity along an axis now. @param {number} a @param {boolean} isPosition */
+  now(a, isPosition) {
+    const name = variableOf(this.model.vehicle.axes[a], isPosition);
+    return name ? this.model.get(name) : this.distances[a];
+  }
+
+  /** Sets the position or the velocity along an axis. @param {number} a @param {boolean} isPosition @param {number} value */
+  put(a, isPosition, value) {
+    const name = variableOf(this.model.vehicle.axes[a], isPosition);
+    if (name) this.model.set(name, value);
+    else this.distances[a] = value;
   }
 
   /** Returns the number of an axis, or -1 if the vehicle does not have it. @param {string} name */
@@ -226,6 +258,12 @@ class Flight {
     return this.isHeld && !this.replay && !this.test ? this.sticks : null;
   }
 
+  /** True while the ghost is shown with its track, which needs measurements of surge in a recording. */
+  get hasGhostTrack() {
+    const { axes } = this.pilot.model.vehicle;
+    return this.ghostShown && (this.replay?.recording.signals.some(({ axis }) => axes[axis].name === "surge") ?? true);
+  }
+
   /** Moves on by h seconds. Returns false, and returns to the start, when a step overflows. @param {number} h */
   advance(h) {
     if (this.replay) {
@@ -279,20 +317,23 @@ class Flight {
   seek(time) {
     const last = this.times[this.times.length - 1];
     this.time = Math.max(0, Math.min(last, time));
-    const n = placeOf(this.times, this.time);
-    const share = n + 1 < this.times.length ? (this.time - this.times[n]) / (this.times[n + 1] - this.times[n]) : 0;
+    const [n, share] = shareOf(this.times, this.time);
     for (const craft of [this.pilot, this.ghost]) craft.show(n, share);
     this.pilot.model.give(
       Object.fromEntries(this.pilot.model.vehicle.commands.map((name, c) => [name, this.commands[n][c]])),
     );
   }
 
-  /** Ends the recording; the flight goes on from where it is shown. */
+  /** Ends the recording; the flight goes on from where it is shown, without the loads of the recording. */
   leave() {
     const n = placeOf(this.times, this.time) + 1;
     for (const list of [this.times, this.commands, this.pilot.states, this.ghost.states]) list.splice(n);
     this.pilot.model.turn();
+    const { variables, inputs, commands } = this.pilot.model.vehicle;
+    const loads = variables.slice(0, inputs).filter(([name]) => !commands.includes(name));
+    const own = loads.filter(([name]) => this.replay && name in this.replay.recording.commands);
     this.replay = null;
+    this.set(Object.fromEntries(own));
   }
 
   /** Flies a published step test: from rest, with all other inputs at their start values. @param {StepTest} test */
@@ -318,8 +359,6 @@ class Replay {
     this.errors = recording.signals.map(() => []);
     /** By signal: the axis of the ghost, which may be another vehicle, or -1. */
     this.places = recording.signals.map(({ axis }) => ghost.axis(axes[axis].name));
-    /** True when the ghost has a track, which needs measurements of surge. */
-    this.hasTrack = recording.signals.some(({ axis }) => axes[axis].name === "surge");
   }
 
   /** Flies all of it. Returns false when a step overflows. @param {Flight} flight */
@@ -331,11 +370,7 @@ class Replay {
         [pilot, signal.axis],
         [ghost, this.places[n]],
       ])) {
-        if (axis < 0) continue;
-        const { velocity, position } = craft.model.vehicle.axes[axis];
-        const name = signal.isPosition ? position : velocity;
-        if (name) craft.model.set(name, signal.values[0]);
-        else craft.distances[axis] = signal.values[0];
+        if (axis >= 0) craft.put(axis, signal.isPosition, signal.values[0]);
       }
     });
     for (const craft of [pilot, ghost]) craft.model.turn();
@@ -355,13 +390,7 @@ class Replay {
       }
       signals.forEach((signal, n) => {
         if (signal.times[next[n]] !== stop) return;
-        const { velocity, position } = pilot.model.vehicle.axes[signal.axis];
-        const predicted = !signal.isPosition
-          ? pilot.model.get(velocity)
-          : position
-            ? pilot.model.get(position)
-            : pilot.distances[signal.axis];
-        this.errors[n].push(predicted - signal.values[next[n]]);
+        this.errors[n].push(pilot.now(signal.axis, signal.isPosition) - signal.values[next[n]]);
         next[n] += 1;
       });
       if (times[row] === stop) {
@@ -374,16 +403,13 @@ class Replay {
 
   /** Moves the ghost from a time on along the measured motion. @param {Craft} ghost @param {number} time @param {number} h */
   move(ghost, time, h) {
-    const { model, distances } = ghost;
+    const { model } = ghost;
     this.recording.signals.forEach(({ isPosition, times, values }, n) => {
       const axis = this.places[n];
       if (axis < 0) return;
-      const { velocity, position } = model.vehicle.axes[axis];
-      const [now, then] = [time, time + h].map((t) => between(times, values, t));
-      const travelled = isPosition ? then : (position ? model.get(position) : distances[axis]) + now * h;
-      model.set(velocity, isPosition ? (then - now) / h : then);
-      if (position) model.set(position, travelled);
-      else distances[axis] = travelled;
+      const [now, then] = [time, time + h].map((t) => between(times, (k) => values[k], t));
+      ghost.put(axis, true, isPosition ? then : ghost.now(axis, true) + now * h);
+      ghost.put(axis, false, isPosition ? (then - now) / h : then);
     });
     const [u, v, psi] = ["u", "v", "psi"].map((name) => model.get(name));
     model.turn();
@@ -395,20 +421,13 @@ class Replay {
   /** Returns a sentence about the deviations (root mean square) of the prediction. @param {Vehicle} vehicle */
   verdict(vehicle) {
     const deviations = this.recording.signals.map(({ axis, isPosition }, n) => {
-      const { name, unit, positionUnit } = vehicle.axes[axis];
+      const { name } = vehicle.axes[axis];
       const squares = this.errors[n].reduce((sum, error) => sum + error ** 2, 0);
-      return `${name} ${Math.sqrt(squares / Math.max(1, this.errors[n].length)).toPrecision(2)} ${isPosition ? positionUnit : unit}`;
+      return `${name} ${Math.sqrt(squares / Math.max(1, this.errors[n].length)).toPrecision(2)} ${unitOf(vehicle.axes[axis], isPosition)}`;
     });
     const left = this.recording.left;
     return `The end of the recording. The prediction is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;
   }
-}
-
-/** Returns a value at a time between the measured ones. @param {number[]} times @param {number[]} values @param {number} time */
-function between(times, values, time) {
-  const n = placeOf(times, time);
-  if (n + 1 >= times.length || time <= times[n]) return values[n];
-  return values[n] + ((time - times[n]) / (times[n + 1] - times[n])) * (values[n + 1] - values[n]);
 }
 
 /**

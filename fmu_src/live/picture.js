@@ -45,9 +45,14 @@ function shared(one, other) {
   return Math.max(0, wide) * Math.max(0, Math.min(one.bottom, other.bottom) - Math.max(one.top, other.top));
 }
 
+/** Returns the path through points. @param {number[][]} points */
+function path(points) {
+  return `M${points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`;
+}
+
 /** Returns the closed path around points. @param {number[][]} points */
 function outline(points) {
-  return `M${points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}Z`;
+  return `${path(points)}Z`;
 }
 
 /** Returns the corners of the convex hull of points. @param {number[][]} points */
@@ -233,14 +238,17 @@ function thruster(at, along, r, share, look, size) {
     { kind: "tube", path: outline(hull(tube)), near: middle },
     { ...(fore.near > aft.near ? fore : aft), near: middle + 1e-6 },
   ];
-  const start = share > 0 ? -0.6 * r : 0.6 * r;
-  for (const [kind, length] of Math.abs(share) < 0.004
-    ? []
-    : /** @type {[string, number][]} */ ([
-        ["jet", 1],
-        ["jet core", 0.55],
-      ])) {
-    const end = start - length * Math.sign(share) * (0.3 + 1.7 * Math.abs(share)) * size;
+  const start = -Math.sign(share) * 0.6 * r;
+  const tip = jetOf(share, r, size);
+  for (const [kind, length] of /** @type {[string, number][]} */ (
+    tip
+      ? [
+          ["jet", 1],
+          ["jet core", 0.55],
+        ]
+      : []
+  )) {
+    const end = start + length * (tip - start);
     const [near, far] = [start, end].map((x, n) =>
       ring(plus(at, [x, along]), along, (n ? 0.7 + 0.7 * length : 0.7) * r).map(look),
     );
@@ -384,11 +392,11 @@ class Picture {
     const frame = rotationOf(pilot.model);
     const plan = this.pilot.shape.plan.map(([u, v]) => plus([0, 0, 0], [u, frame[0]], [v, frame[1]]));
     this.shadow.setAttribute("d", outline(plan.map(([u, v]) => see([u, v, floor]))));
-    const ghostIsThere = flight.ghostShown && (flight.replay?.hasTrack ?? true);
+    const ghostIsThere = flight.hasGhostTrack;
     const from = (/** @type {Vector} */ p) => see(plus(p, [-1, here]));
     const last = placeOf(flight.times, flight.time);
-    this.tracks[0].setAttribute("d", ghostIsThere ? pathOf(ghost, last, from) : "");
-    this.tracks[1].setAttribute("d", pathOf(pilot, last, from));
+    this.tracks[0].setAttribute("d", ghostIsThere ? path(trackOf(ghost, last, 1500).map(from)) : "");
+    this.tracks[1].setAttribute("d", path(trackOf(pilot, last, 1500).map(from)));
     this.ghost.group.setAttribute("visibility", ghostIsThere ? "visible" : "hidden");
     const away = plus(positionOf(ghost.model), [-1, here]);
     if (ghostIsThere) this.ghost.draw(ghost.model, (p) => see(plus(p, [1, away])), scale, []);
@@ -434,12 +442,12 @@ class Picture {
   }
 }
 
-/** Returns the track up to the n-th time and the present place. @param {Craft} craft @param {number} last
- * @param {(p: Vector) => number[]} see From the earth frame to px. */
-function pathOf(craft, last, see) {
-  const stride = Math.max(1, Math.ceil(last / 1500));
+/** Returns the places before the n-th time, and the present one. @param {Craft} craft @param {number} last @param {number} most
+ * The largest number of places. */
+function trackOf(craft, last, most) {
+  const stride = Math.max(1, Math.ceil(last / most));
+  /** @type {Vector[]} */
   const places = [];
-  for (let n = 0; n < last; n += stride) places.push(see([craft.at(n, "x"), craft.at(n, "y"), craft.at(n, "z")]));
-  places.push(see(positionOf(craft.model)));
-  return `M${places.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L")}`;
+  for (let n = 0; n < last; n += stride) places.push([craft.at(n, "x"), craft.at(n, "y"), craft.at(n, "z")]);
+  return [...places, positionOf(craft.model)];
 }

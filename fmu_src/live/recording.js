@@ -14,8 +14,8 @@ class Unreadable extends Error {}
  * @typedef {{axis: number, isPosition: boolean, times: number[], values: number[], band?: Band}} Signal */
 /** An unknown force along an axis, with its band. @typedef {{axis: number, times: number[], values: number[], band?: Band}} Force */
 /**
- * A recording: the times in s from which commands hold, the commands by name, signals, unknown forces, sentences about what is not as in
- * the file, and the number of rows that were left out.
+ * A recording: the times in s from which commands hold, the commands by name, or the loads of a wrench, signals, unknown forces, sentences
+ * about what is not as in the file, and the number of rows that were left out.
  * @typedef {{name: string, times: number[], commands: Record<string, number[]>, signals: Signal[], forces: Force[], notes: string[],
  *   left: number}} Recording
  */

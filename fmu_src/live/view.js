@@ -133,11 +133,11 @@ class DepthTape {
 
 /** A line of a chart: its class, its times, its value at the n-th of them, and half of its band, if it has one.
  * @typedef {{kind: string, times: number[], value: (n: number) => number, band?: (n: number) => number}} Trace */
-/** What a chart shows: its place in the page, its title, the unit and the digits of its readings, its lines, and the axis whose V_ss
- * and Tau it marks, or -1. `signal` is the number of the recording's signal that the second line is.
- * @typedef {{id: string, title: string, unit: string, digits: number, traces: Trace[], axis: number, signal: number}} Graph */
+/** What a chart shows: its place in the page, its title, the unit and the digits of its readings, its lines, the axis whose V_ss and Tau
+ * it marks, and the number of the recording's signal that the second line is, if any.
+ * @typedef {{id: string, title: string, unit: string, digits: number, traces: Trace[], axis?: number, signal?: number}} Graph */
 
-/** The choices of charts, by the words of the list. @type {Record<string, (flight: Flight) => Graph[]>} */
+/** The choices of charts, which are empty without what they show, by the words of the list. @type {Record<string, (flight: Flight) => Graph[]>} */
 const PANELS = {
   velocities: (flight) => axisPanels(flight, () => false),
   positions: (flight) => axisPanels(flight, () => true),
@@ -148,70 +148,49 @@ const PANELS = {
       unit: "N",
       digits: 2,
       traces: [{ kind: "line", times, value: (n) => pilot.at(n, force) }],
-      axis: -1,
-      signal: -1,
     })),
-  measured: (flight) =>
-    axisPanels(flight, (a) => flight.replay?.recording.signals.find(({ axis }) => axis === a)?.isPosition ?? false),
+  measured: (flight) => {
+    const { signals } = flight.replay?.recording ?? { signals: [] };
+    return signals.length ? axisPanels(flight, (a) => signals.find(({ axis }) => axis === a)?.isPosition ?? false) : [];
+  },
   error: ({ replay, pilot }) =>
     (replay?.recording.signals ?? []).map(({ axis, isPosition, times, band }, s) => {
-      const { name, unit, positionUnit } = pilot.model.vehicle.axes[axis];
-      const value = (/** @type {number} */ n) => replay?.errors[s][n] ?? 0;
-      const trace = { kind: "line", times, value, ...bandOf(band, times) };
-      return {
-        id: name,
-        title: `${name}: error`,
-        unit: isPosition ? positionUnit : unit,
-        digits: 3,
-        traces: [trace],
-        axis: -1,
-        signal: -1,
-      };
+      const own = pilot.model.vehicle.axes[axis];
+      return banded(own.name, "error", unitOf(own, isPosition), 3, { times, values: replay?.errors[s] ?? [], band });
     }),
   force: ({ replay, pilot }) =>
-    (replay?.recording.forces ?? []).map(({ axis, times, values, band }) => {
-      const { name, unit } = pilot.model.vehicle.axes[axis];
-      return {
-        id: name,
-        title: `${name}: unknown`,
-        unit: unit.startsWith("rad") ? "N m" : "N",
-        digits: 2,
-        traces: [{ kind: "line", times, value: (n) => values[n], ...bandOf(band, times) }],
-        axis: -1,
-        signal: -1,
-      };
+    (replay?.recording.forces ?? []).map((force) => {
+      const { name, unit } = pilot.model.vehicle.axes[force.axis];
+      return banded(name, "unknown", unit.startsWith("rad") ? "N m" : "N", 2, force);
     }),
 };
 
-/** Returns the band at the times of a trace, if there is one. @param {Band | undefined} band @param {number[]} times */
-function bandOf(band, times) {
-  return band ? { band: (/** @type {number} */ n) => between(band.times, band.values, times[n]) } : {};
+/** Returns a chart of one line of a recording, and of its band, if there is one. @param {string} id The name of the axis.
+ * @param {string} what @param {string} unit @param {number} digits @param {Band & {band?: Band}} line @returns {Graph} */
+function banded(id, what, unit, digits, { times, values, band }) {
+  /** @type {Trace} */
+  const trace = { kind: "line", times, value: (n) => values[n] ?? 0 };
+  if (band) trace.band = (n) => between(band.times, (k) => band.values[k], times[n]);
+  return { id, title: `${id}: ${what}`, unit, digits, traces: [trace] };
 }
 
 /** Returns a chart for each axis: of its position or of its velocity. In a recording, the second line is what was measured.
  * @param {Flight} flight @param {(a: number) => boolean} ofPosition @returns {Graph[]} */
 function axisPanels({ pilot, ghost, times, replay }, ofPosition) {
-  return pilot.model.vehicle.axes.map(({ name, velocity, unit, position, positionUnit }, a) => {
-    const isPosition = ofPosition(a);
-    const get = (/** @type {Craft} */ craft, /** @type {number} */ axis) => (/** @type {number} */ n) =>
-      isPosition ? craft.position(axis, n) : craft.velocity(axis, n);
-    const traces = [{ kind: "line", times, value: get(pilot, a) }];
-    const other = ghost.axis(name);
-    const signal = replay ? replay.recording.signals.findIndex((one) => one.axis === a) : -1;
+  return pilot.model.vehicle.axes.map((axis, a) => {
+    const [id, isPosition] = [axis.name, ofPosition(a)];
+    /** @type {Trace[]} */
+    const traces = [{ kind: "line", times, value: (n) => pilot.along(a, isPosition, n) }];
+    const other = ghost.axis(id);
+    const signal = replay?.recording.signals.findIndex((one) => one.axis === a) ?? -1;
     const measured = replay?.recording.signals[signal];
-    if (measured?.isPosition === isPosition)
-      traces.push({ kind: "line measured", times: measured.times, value: (n) => measured.values[n] });
+    const isMeasured = measured?.isPosition === isPosition;
+    if (isMeasured) traces.push({ kind: "line measured", times: measured.times, value: (n) => measured.values[n] });
     else if (other >= 0 && (!replay || measured))
-      traces.push({ kind: "line ghostly", times, value: get(ghost, other) });
-    return {
-      id: name,
-      title: `${name}: ${isPosition ? (position ?? "distance") : velocity}`,
-      unit: isPosition ? positionUnit : unit,
-      digits: isPosition ? 2 : 3,
-      traces,
-      axis: isPosition ? -1 : a,
-      signal: measured?.isPosition === isPosition ? signal : -1,
-    };
+      traces.push({ kind: "line ghostly", times, value: (n) => ghost.along(other, isPosition, n) });
+    const title = `${id}: ${variableOf(axis, isPosition) ?? "distance"}`;
+    const graph = { id, title, unit: unitOf(axis, isPosition), digits: isPosition ? 2 : 3, traces };
+    return { ...graph, ...(isPosition ? {} : { axis: a }), ...(isMeasured ? { signal } : {}) };
   });
 }
 
@@ -239,12 +218,7 @@ class Track {
   draw({ pilot, ghost: other, times, time }, ghost) {
     const { width, height } = this;
     const last = placeOf(times, time);
-    const stride = Math.max(1, Math.ceil(last / 500));
-    const tracks = [other, pilot].map((craft) => {
-      const points = [];
-      for (let n = 0; n < last; n += stride) points.push([craft.at(n, "x"), craft.at(n, "y")]);
-      return [...points, positionOf(craft.model)];
-    });
+    const tracks = [other, pilot].map((craft) => trackOf(craft, last, 500));
     const shownTracks = ghost ? tracks : tracks.slice(1);
     const [north, east] = [0, 1].map((i) => shownTracks.flatMap((points) => points.map((p) => p[i])));
     const [middle, aside] = [north, east].map((list) => (Math.min(...list) + Math.max(...list)) / 2);
@@ -255,7 +229,7 @@ class Track {
       height / 2 + 8 - (x - middle) * scale,
     ];
     this.lines.forEach((line, n) => {
-      line.setAttribute("d", n || ghost ? outline(tracks[n].map(see)).slice(0, -1) : "");
+      line.setAttribute("d", n || ghost ? path(tracks[n].map(see)) : "");
     });
     const [x, y] = see(positionOf(pilot.model));
     const turned = (pilot.model.get("psi") * 180) / Math.PI;
@@ -318,14 +292,14 @@ class Chart {
     const { left, right, top, bottom } = this.plot;
     const { time, replay, test } = flight;
     const start = Math.max(0, time - span);
-    const marked = axis >= 0 && !flight.steering();
+    const marked = axis !== undefined && !flight.steering();
     const [V, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
     const published =
       marked && test?.axis === axis && test.V !== null
         ? { V: test.command < 0 ? -test.V : test.V, Tau: test.Tau }
         : null;
     const windows = traces.map(({ times }) => [placeOf(times, start), placeOf(times, time)]);
-    const levels = axis >= 0 ? [0, V, published?.V ?? 0] : [];
+    const levels = axis === undefined ? [] : [0, V, published?.V ?? 0];
     const [low, high, step] = rangeOf(levels, traces, windows, bottom - top);
     const px = (/** @type {number} */ t) => Math.max(left, left + ((t - start) / span) * (right - left));
     const share = (/** @type {number} */ v) => (v - low) / (high - low);
@@ -344,7 +318,7 @@ class Chart {
       const lower = lineOf({ ...mine, value: (n) => -band(n) }, windows[0], px, py);
       this.band.setAttribute("d", `${upper}L${lower.slice(1).split("L").reverse().join("L")}Z`);
     }
-    const since = flight.since[axis];
+    const since = flight.since[axis ?? 0];
     const fromRest = marked && V !== 0 && Math.abs(since.velocity) < 0.02 * Math.abs(V) && Number.isFinite(Tau);
     const hasSteady = marked && V !== 0 && Number.isFinite(V);
     const level = (/** @type {number} */ x, /** @type {number} */ v) => `M${x.toFixed(1)} ${py(v).toFixed(1)}H${right}`;
@@ -355,19 +329,24 @@ class Chart {
     this.mark(this.point, published?.Tau ? [px(published.Tau), py(p * published.V)] : null);
     const at = pointed === null ? time : start + pointed * span;
     const isPointed = pointed !== null && at <= time;
-    const reading = (/** @type {Trace} */ { times, value }) => {
-      const n = placeOf(times, Math.min(at, time));
-      const share = n + 1 < times.length ? Math.max(0, (Math.min(at, time) - times[n]) / (times[n + 1] - times[n])) : 0;
-      return share ? value(n) + share * (value(n + 1) - value(n)) : value(n);
-    };
+    const reading = (/** @type {Trace} */ { times, value }) => between(times, value, Math.min(at, time));
     this.pointer.setAttribute("d", isPointed ? `M${px(at).toFixed(1)} ${top}V${bottom}` : "");
     this.title.textContent = `${this.panel.title} ${shown(reading(mine), digits)} ${unit}`;
     const words = [];
-    if (signal >= 0 && replay && other) {
+    if (signal !== undefined && replay && other) {
       const n = placeOf(other.times, Math.min(at, time));
       const half = replay.recording.signals[signal].band;
       const error = shown(replay.errors[signal][n] ?? 0, digits);
-      words.push(`error ${error}${half ? ` ± ${shown(between(half.times, half.values, at), digits)}` : ""}`);
+      words.push(
+        `error ${error}${
+          half
+            ? ` ± ${shown(
+                between(half.times, (k) => half.values[k], at),
+                digits,
+              )}`
+            : ""
+        }`,
+      );
     } else if (isPointed && other) words.push(`ghost ${shown(reading(other), digits)}`);
     else if (isPointed && band) words.push(`± ${shown(band(placeOf(mine.times, at)), digits)}`);
     else if (hasSteady && !isPointed)
@@ -416,10 +395,7 @@ function rangeOf(levels, traces, windows, height) {
 /** @param {Trace} trace @param {number[]} window @param {(t: number) => number} px @param {(v: number) => number} py */
 function lineOf({ times, value }, [first, last], px, py) {
   const stride = Math.max(1, Math.floor((last - first) / 250));
-  /** @type {string[]} */
   const places = [];
-  const add = (/** @type {number} */ n) => places.push(`${px(times[n]).toFixed(1)} ${py(value(n)).toFixed(1)}`);
-  for (let n = Math.ceil(first / stride) * stride; n < last; n += stride) add(n);
-  add(last);
-  return `M${places.join("L")}`;
+  for (let n = Math.ceil(first / stride) * stride; n < last; n += stride) places.push([px(times[n]), py(value(n))]);
+  return path([...places, [px(times[last]), py(value(last))]]);
 }

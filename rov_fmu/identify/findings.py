@@ -35,11 +35,14 @@ from rov_fmu.tank.findings import Finding, SentenceForm
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.uncertainty import significant, with_interval
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Heading = Literal["Warnings", "Doubts", "Facts"]
 
 _CONTRADICTION = 0.15
 """Tables that differ by more than this from the model contradict it: batteries and scales explain less."""
+_BEYOND = 1.05
+"""A wrench is beyond the thrusters if it is so many times what they give."""
 _FULL = 0.98
 _SATURATED = 0.2
 """Logs are doubted in which thrusters have at least the command _FULL for this share of the time."""
@@ -83,6 +86,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         "unknown force": (
             "{what} in {files}{since}. Check the thrusters for weed and damage, the tether, contact with the bottom or "
             "a wall, a current, and the payload"
+        ),
+        "beyond thrusters": (
+            "{axes}: the logs have {largest} and the thrusters of rov.toml give {most} at full command. Check their "
+            "thrust, directions and positions, and the units of the logs"
         ),
         "change of thrust": "{what} in {files}{since}. Check the battery, and the thrusters for weed and damage",
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -516,6 +523,15 @@ def _disturbance(d: Disturbance) -> Finding:
     since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"
     names = {"what": what, "since": since, "cause": d.cause, "remedy": _REMEDIES.get(d.cause, "")}
     return Finding(kind, axis, file=d.file, names=names)
+
+
+def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
+    """Yield a finding for each axis along which a wrench, which is a vehicle's thrust, exceeds its own thrusters."""
+    for axis in (form.axis for form in own.layout.axes if own.layout.thrusters):
+        largest, most = wrench.strongest(axis), own.strongest(axis)
+        if largest > _BEYOND * most:
+            names = {"largest": f"{largest:.3g} {axis.load}", "most": f"{most:.3g} {axis.load}"}
+            yield Finding("beyond thrusters", axis.name, names=names)
 
 
 def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:

@@ -46,6 +46,8 @@ class GivenVehicle:
     """The coefficients of the base and those that are known: the centre of the prior."""
     requests: Requests
     """The requests that concern the remaining curves."""
+    thrusters: Layout | None = None
+    """The thrusters that give the forces of a wrench along these axes; None where rov.toml does not say."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +96,20 @@ def narrowed(description: Description, tested: TestContents, folder: Path, usele
         return Narrowing(None, test_mistakes=tuple(useless) or (line,))
     hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
     hardware = hardware or [*check_part_names(_with_every_effect(layout, description.requests))]
+    own = None
+    if description.thrusters:
+        own = replace(description.thrusters, axes=layout.axes)
+        if wrong := [*check_thruster_places(own)]:
+            hardware += wrong
+        else:
+            own = _with_axes_alone(own, axes)
+            hardware += check_layout(own, tested.axes)
     hardware += _missing_hardware(description, layout, known)
     tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
     if hardware or tests or description.tables.vehicle is None:
         in_rov_file = tuple(f"{description.path}: {mistake}" for mistake in hardware)
         return Narrowing(None, in_rov_file, tuple(f"{folder}: {mistake}" for mistake in tests))
-    given = _given(description, description.tables.vehicle, layout, known)
+    given = replace(_given(description, description.tables.vehicle, layout, known), thrusters=own)
     return Narrowing(given, findings=tuple(_left_out(description, tested, layout)))
 
 

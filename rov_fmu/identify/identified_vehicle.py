@@ -9,6 +9,7 @@ from rov_fmu import __version__
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.equation.layout import Curve, Layout, Part, VehicleAxis
 from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.given import GivenVehicle
 from rov_fmu.identify.likelihood.curves import fitted
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
@@ -16,7 +17,7 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.description import Provenance
-from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -87,22 +88,33 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     return vehicle, coefficients
 
 
-def without_wrench(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle of the file: the forces of a wrench are its loads from outside, the inputs X_ext ...
+def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
+    """Return the vehicle of the file: in place of the forces of a wrench, it has the thrusters of rov.toml.
 
-    Other vehicles are returned as they are.
+    Without these, its inputs are the loads from outside, X_ext ... Other vehicles are returned as they are. The curves
+    of the thrusters are those of rov.toml and hold for all commands, unless its [validity] says otherwise.
     """
     if not vehicle.layout.has_wrench:
         return vehicle
-    layout = replace(vehicle.layout, curves=(), thrusters=())
-    kept = layout.coefficients
+    own, tables = given.thrusters or Layout((), (), ()), given.description.tables
+    layout = replace(vehicle.layout, curves=own.curves, thrusters=own.thrusters, mix=own.mix)
+    kept, places = layout.coefficients, layout.keys_in_file
+    thrust = {
+        name: quantity
+        for name, quantity in tables.quantities(layout).items()
+        if quantity and places[name][0] in ("arm", "curves")
+    }
+    numbers = {name: vehicle.coefficients.get(name, UNTUNED) for name in kept}
+    sources = dict.fromkeys(kept, NOT_GIVEN) | {name: s for name, s in vehicle.sources.items() if name in kept}
+    intervals = {name: interval for name, interval in vehicle.intervals.items() if name in kept}
     return replace(
         vehicle,
         layout=layout,
-        coefficients={name: vehicle[name] for name in kept},
-        sources={name: source for name, source in vehicle.sources.items() if name in kept},
-        intervals={name: interval for name, interval in vehicle.intervals.items() if name in kept},
+        coefficients=numbers | {name: quantity.value for name, quantity in thrust.items()},
+        sources=sources | {name: quantity.source for name, quantity in thrust.items()},
+        intervals=intervals | {name: q.interval for name, q in thrust.items() if q.interval},
         estimates={name: _of_kept(row, kept) for name, row in vehicle.estimates.items() if name in kept},
+        command_range=vehicle.command_range if tables.validity else (0.0, 1.0),
     )
 
 

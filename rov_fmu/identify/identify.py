@@ -12,8 +12,8 @@ from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
-from rov_fmu.identify.findings import told
-from rov_fmu.identify.identified_vehicle import identified_vehicle, without_wrench
+from rov_fmu.identify.findings import beyond_thrusters, told
+from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Identification, Prediction, Slip
@@ -63,10 +63,11 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
     names = tuple(vehicle.estimates)
+    of_file = with_own_inputs(vehicle, tests.given)
     found = Identification(
-        folder=replace(tests.folder, findings=[*tests.findings]),
+        folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,
-        vehicle=without_wrench(vehicle),
+        vehicle=of_file,
         against=against,
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, map(curve.coefficient, curve.keys)) for curve in known.curves},

@@ -17,7 +17,7 @@ from rov_fmu.vehicle import uncertainty
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """The translation of digits to superscripts."""
 _TEMPLATES = Path(__file__).parent / "templates"
-_FOR_READERS = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ |^ +|^\n")
+_FOR_READERS = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ |^ +|^\n| // [^`\n]*$")
 """Comments, types and indents are for readers of a script. They are a third of it, and are left out of pages."""
 
 

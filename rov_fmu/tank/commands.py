@@ -57,6 +57,8 @@ class LogKeys(Strict):
     """The pulse that stops a thruster, µs."""
     span: _Pulse = None
     """The distance from the neutral pulse to full thrust, µs."""
+    wrench: bool = False
+    """True where the commands are forces and moments on the body, although the vehicle has thrusters."""
 
 
 NO_KEYS = LogKeys()

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from rov_fmu.equation.catalogue import (
+    ARM,
     AXES,
     HEAVE,
     PITCH,
@@ -41,7 +42,7 @@ from rov_fmu.io.toml_file import (
     read_toml,
 )
 from rov_fmu.tank.commands import LogKeys
-from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities
+from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, check_tables_of_thrust
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
@@ -240,6 +241,9 @@ class Description:
     """Sentences about what the model leaves out."""
     base_name: str
     """The value of `base` as it stands in the file; empty without one."""
+    thrusters: Layout | None = None
+    """The thrusters that give the forces on the body, where the logs have these forces and the file has the thrusters.
+    `layout` then has the forces in their place."""
 
     @property
     def has_hardware_tables(self) -> bool:
@@ -320,6 +324,8 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
             yield key_line(
                 name, "is not allowed together with base, which has its own; coefficients may be given in [known]"
             )
+        if file.logs.wrench:
+            yield key_line("logs.wrench", "is not allowed with base: write its hardware tables here", True)
         return
     for name in ("curves", "thruster") if {*present} - {"body"} else ():
         if name not in data or data[name] in ({}, []):
@@ -327,11 +333,22 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
             yield key_line(name, f"this table is missing, and there is {present[0]}: write {form}")
     if {"curves", "thruster"} <= data.keys():
         yield from check_names_and_keys(file, lost, data)
+        if file.logs.wrench and not lost & {"curves", "arm"}:
+            yield from _thrust_not_given(file)
+
+
+def _thrust_not_given(file: RovTables) -> Iterator[str]:
+    """Yield a line for each number of the thrusters that is missing: forces on the body tell none of them."""
+    yield from check_tables_of_thrust(file)
+    for name, quantity in file.quantities(file.layout).items():
+        if quantity is None and name in ARM:
+            yield key_line(f"arm.{name}", "this key is missing, and a thruster has the key arm")
 
 
 def has_wrench(file: RovTables) -> bool:
-    """Return True for a rov.toml with [body] that describes no thrusters: the commands of its logs are a wrench."""
-    return bool(file.body and not (file.base or file.arm or file.thruster or file.curves or file.inputs or file.fin))
+    """Return True where the commands of the logs are a wrench: rov.toml says so, or has [body] and no thrusters."""
+    has_thrusters = file.base or file.arm or file.thruster or file.curves or file.inputs or file.fin
+    return bool(file.logs.wrench or (file.body and not has_thrusters))
 
 
 def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> Description:
@@ -357,6 +374,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=file.validity.limits if file.validity else base.limits if base else (),
         base_name=data.get("base", ""),
+        thrusters=own_layout if file.logs.wrench and file.thruster else None,
     )
 
 
@@ -405,6 +423,9 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
     yield from _unknown_effects(layout, description.base_name)
+    if thrusters := description.thrusters:  # one table is used as it is
+        untold = tuple(replace(curve, tables=curve.tables[1:]) for curve in thrusters.curves)
+        yield from _unknown_effects(replace(thrusters, curves=untold), "")
     yield from _mistakes_in_known(file, description)
     if "known" not in lost:
         yield from _missing_halves(file, description)

@@ -133,8 +133,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "source of wrench": "{files}: the forces and moments on the body are those of {source}{others}",
     "wrench": (
         "the commands are forces and moments along the axes of the body, forward, starboard and down. 100% of a "
-        "command is the largest of all logs: {full}. The vehicle has these loads as inputs, and neither thrusters nor "
-        "their lag"
+        "command is the largest of all logs: {full}. {inputs}"
     ),
     "channel left out": "{files}: {source} is left out for {quantities}: {words}",
     "clock restarts": "{files}: the clock restarts after {at} s. The log is read as two, before and after",

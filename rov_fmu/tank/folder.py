@@ -39,6 +39,8 @@ from rov_fmu.vehicle.vehicle import VehicleFileError
 
 KINDS = (*TABLES, "log")
 """The words that the name of a file begins with."""
+_LOADS = "The vehicle has these loads as inputs, and neither thrusters nor their lag"
+_OWN_THRUSTERS = f"The vehicle has the thrusters of {ROV_FILE} as inputs, whose thrust and lag these logs do not tell"
 
 
 @dataclass
@@ -124,7 +126,10 @@ class Folder:
         description = self.rov_file.description
         assert description
         for name in (name for (kind, _), names in self.files.items() if kind != "log" for name in names):
-            reason = f"its commands are of thrusters, and {ROV_FILE} has none: write [curves.<name>] and [[thruster]]"
+            instead = f"{ROV_FILE} has none: write [curves.<name>] and [[thruster]]"
+            if description.thrusters:
+                instead = "those of the logs are forces on the body, by `wrench` in [logs]: move it to another folder"
+            reason = f"its commands are of thrusters, and {instead}"
             self.mistakes.append(f"{self.path / name}: {reason}")
         largest = [log.commands.largest for log in self.logs if log.commands]
         names = [curve.name for curve in description.layout.curves]
@@ -140,7 +145,8 @@ class Folder:
         if self.logs:
             loads = {form.axis.external: form.axis.load for form in description.layout.axes}
             told = [f"{name} = {most:.3g} {loads[name]}" for name, most in full.items() if name in loads]
-            self.findings.append(Finding("wrench", names={"full": listed(told)}))
+            inputs = _OWN_THRUSTERS if description.thrusters else _LOADS
+            self.findings.append(Finding("wrench", names={"full": listed(told), "inputs": inputs}))
 
     def read_dive(self, dive: Dive) -> None:
         """Read the files of a dive together."""

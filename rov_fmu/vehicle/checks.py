@@ -42,7 +42,7 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
     yield from wrong_names
     yield from _check_keys(parts)
     if "curves" not in lost and "battery" not in lost:
-        yield from _check_tables_of_thrust(parts)
+        yield from check_tables_of_thrust(parts)
     if "curves" not in lost:
         yield from _check_electric_currents(parts)
     if "axes" not in lost:
@@ -149,7 +149,7 @@ def _check_keys(parts: Tables) -> Iterator[str]:
         yield from _check_reverse_pairs(f"axes.{axis.name}", given_quantities(table, AXIS))
 
 
-def _check_tables_of_thrust(parts: File) -> Iterator[str]:
+def check_tables_of_thrust(parts: Tables) -> Iterator[str]:
     """Check that each curve has either coefficients or tables, and that its voltages are complete."""
     needs_voltage = False
     for name, curve in parts.curves.items():

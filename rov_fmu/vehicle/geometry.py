@@ -3,7 +3,7 @@
 Each mistake gives one line.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import combinations, pairwise
 from math import hypot, sqrt
 from typing import Any
@@ -22,13 +22,16 @@ _PARALLEL = 1e-6
 It decides whether the thrusters can drive two axes separately, and whether a thruster pushes sideways."""
 
 
-def check_layout(layout: Layout) -> Iterator[str]:
-    """Yield a line for each mistake in the thrusters, axes, inputs and names of a vehicle."""
+def check_layout(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
+    """Yield a line for each mistake in the thrusters, axes, inputs and names of a vehicle.
+
+    `driven` are the names of axes that thrusters must drive even if weight rights the vehicle about them.
+    """
     wrong_places = [*check_thruster_places(layout)]
     if wrong_places:
         yield from wrong_places
     else:
-        yield from check_axes(layout)
+        yield from check_axes(layout, driven)
         yield from check_inputs(layout)
     yield from check_part_names(layout)
 
@@ -50,22 +53,22 @@ def check_thruster_places(layout: Layout) -> Iterator[str]:
                 yield key_line(f"{key}.position", f"this key, or arm, is missing, and the vehicle has {turning[0]}")
 
 
-def check_axes(layout: Layout) -> Iterator[str]:
+def check_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
     """Check that each thruster acts on an axis, and that the thrusters can drive each axis without the others.
 
-    Roll and pitch need no thruster, because weight and buoyancy right the vehicle. An axis without thrusters may have
-    fins.
+    Roll and pitch need no thruster, because weight and buoyancy right the vehicle, unless they are in `driven`. An axis
+    without thrusters may have fins.
     """
     axes = [vehicle_axis.axis for vehicle_axis in layout.axes]
     for thruster in layout.thrusters:
         if not any(thruster in layout.drivers(axis) for axis in axes):
             reason = f"acts on no axis of the vehicle, which are {join_names([axis.name for axis in axes])}"
             yield key_line(f"thruster.{thruster.name}", reason)
-    for axis, reason in undriven_axes(layout):
+    for axis, reason in undriven_axes(layout, driven):
         yield key_line(f"axes.{axis.name}", reason)
 
 
-def undriven_axes(layout: Layout) -> Iterator[tuple[Axis, str]]:
+def undriven_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[tuple[Axis, str]]:
     """Yield each axis that the thrusters cannot drive without the axes before it, and why.
 
     Sway comes last: two thrusters with a toe-in turn the vehicle, and their push to the side is a by-product.
@@ -74,7 +77,7 @@ def undriven_axes(layout: Layout) -> Iterator[tuple[Axis, str]]:
         return
     axes = sorted((form.axis for form in layout.axes), key=lambda axis: axis is SWAY)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
-    for axis in (axis for axis in axes if axis not in _RIGHTED):
+    for axis in (axis for axis in axes if axis not in _RIGHTED or axis.name in driven):
         if not layout.drivers(axis) and any(fin.effect(axis) for fin in layout.fins):
             continue
         if not layout.drivers(axis):
@@ -96,7 +99,7 @@ def undriven_axes(layout: Layout) -> Iterator[tuple[Axis, str]]:
 
 def _undriven(axis: Axis) -> str:
     """Return what to do about an axis that no thruster drives."""
-    if axis is YAW:
+    if axis.is_rotation:
         return "no thruster turns the vehicle: give one a position beside the line of its force, or remove this table"
     return f"no thruster drives it: give one a direction with a part {axis.positive}, or remove this table"
 

@@ -111,6 +111,17 @@ def test_rov_toml_tells_the_pulses_of_the_columns(logs: str, header: str, u: flo
     assert read_inputs(log, VIDEORAY.layout)["u_t"].tolist() == pytest.approx([u, u])
 
 
+@pytest.mark.parametrize("named", ["commands.csv", "depth.csv"])
+def test_a_dive_in_several_files_gives_its_commands(named: str, here: Path) -> None:
+    (here / "commands.csv").write_text("time [s],u_t [1]\n10,0.5\n12,-0.25\n", encoding="utf-8")
+    (here / "depth.csv").write_text("time [s],depth [m]\n10,1\n11,2\n12,3\n", encoding="utf-8")
+    files = '[dives.may]\nfiles = ["commands.csv", "depth.csv"]\n'
+    (here / "rov.toml").write_text(f"[vehicle]\n{files}", encoding="utf-8")
+    found = read_inputs(here / named, VIDEORAY.layout)
+    assert found["time"].tolist() == [0.0, 2.0]
+    assert found["u_t"].tolist() == [0.5, -0.25]
+
+
 def test_the_commands_of_an_autopilot_drive_a_simulation(here: Path) -> None:
     test_mavlink.tlog(here / "dive.tlog", test_mavlink.dive())
     assert main(["simulate", "bluerov2", "--input", "dive.tlog", "--step", "1", "-o", "result.csv"]) == 0

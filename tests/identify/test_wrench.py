@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rov_fmu import load
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
@@ -51,11 +52,17 @@ class Dive:
 
 
 def dive(seed: int) -> Dive:
-    """Simulate m u' = X - d |u| u - b u, and the same downward with a load, under forces that are held for 0.1 s."""
+    """Simulate m u' = X - d |u| u - b u, and the same downward with a load."""
     random = np.random.default_rng(seed)
     time = np.arange(0.0, 40.0, 0.1)
     phases = random.uniform(-1.0, 1.0, (2, 10)).repeat(40, axis=1)
     X, Z = 45.0 * phases[0], 40.0 * phases[1]
+    u, depth = motion(X, Z)
+    return Dive(time, X, Z, u + random.normal(0.0, 0.01, len(u)), depth + 5.0 + random.normal(0.0, 0.01, len(u)))
+
+
+def motion(X: NDArray[np.float64], Z: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the velocity ahead and the depth, every 0.1 s from rest, under forces that are held for 0.1 s."""
     state, rows = np.zeros(3), [np.zeros(3)]
     for x, z in zip(X[:-1], Z[:-1], strict=True):
 
@@ -68,7 +75,7 @@ def dive(seed: int) -> Dive:
         state = solve_ivp(rates, (0.0, 0.1), state, "DOP853", rtol=1e-9, atol=1e-12).y[:, -1]
         rows.append(state)
     u, _, depth = np.array(rows).T
-    return Dive(time, X, Z, u + random.normal(0.0, 0.01, len(u)), depth + 5.0 + random.normal(0.0, 0.01, len(u)))
+    return u, depth
 
 
 def write(path: Path, header: str, *columns: NDArray[np.float64]) -> None:
@@ -157,3 +164,130 @@ def test_logs_without_a_wrench_are_refused(tmp_path: Path, capsys: pytest.Captur
     (line,) = capsys.readouterr().err.splitlines()
     place = f"rov-fmu: {tmp_path / 'dive.csv'}, line 1: there is no column of commands. Possible columns: "
     assert line.startswith(f"{place}X_ext, Y_ext, Z_ext, K_ext, M_ext, N_ext, in [N] or [N.m]")
+
+
+TOE, TILT = 0.6, 0.2
+"""The angles of the rear thrusters to the bow, and of the vertical one to straight down, rad."""
+QUADRATIC_THRUST, LINEAR_THRUST = 40.0, 8.0
+"""The thrust of each thruster, N: 40 c |c| + 8 c at the command c."""
+CURVE = """[curves.all]
+a_t = { value = 40.0, unit = "N", source = "Bollard pull" }
+b_t = { value = 8.0, unit = "N", source = "Bollard pull" }
+"""
+MIX = (
+    ROV.replace("[axes.surge]", "")
+    + f"""
+[logs]
+wrench = true
+
+{CURVE}
+"""
+)
+for name, direction in {
+    "l": (np.cos(TOE), np.sin(TOE), 0.0),
+    "r": (np.cos(TOE), -np.sin(TOE), 0.0),
+    "t": (np.sin(TILT), 0.0, np.cos(TILT)),
+}.items():
+    MIX += f"""
+[[thruster]]
+name = "{name}"
+curve = "all"
+direction = {{ value = [{", ".join(f"{x:.17g}" for x in direction)}], source = "CAD" }}
+"""
+MIX += "[axes.surge]\n"
+
+
+def write_dives(folder: Path, rov: str = MIX) -> None:
+    (folder / "rov.toml").write_text(rov, encoding="utf-8")
+    for n in (1, 2):
+        d = dive(n)
+        header = "time [s],X_ext [N],Z_ext [N],surge velocity [m/s],depth [m]"
+        write(folder / f"dive_{n}.csv", header, d.time, d.X, d.Z, d.u, d.z)
+
+
+def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The motion under commands is that of the simulation under the sum of the thrusters, written by hand."""
+    write_dives(tmp_path)
+    out = tmp_path / "mixer.toml"
+    assert main(["identify", str(tmp_path), "-o", str(out)]) == 0
+    assert "the thrusters of rov.toml give" not in capsys.readouterr().out
+    vehicle = load(out)
+    assert [*vehicle.layout.commands] == ["u_l", "u_r", "u_t"]
+    assert (vehicle["a_t_all"], vehicle.sources["a_t_all"]) == (40.0, "Bollard pull")
+    assert vehicle.command_range == (0.0, 1.0)
+    commands = np.random.default_rng(7).uniform(-0.7, 0.7, (3, 5)).repeat(40, axis=1)
+    left, right, top = QUADRATIC_THRUST * commands * abs(commands) + LINEAR_THRUST * commands
+    u, depth = motion(np.cos(TOE) * (left + right) + np.sin(TILT) * top, np.cos(TILT) * top)
+    time = np.arange(0.0, 20.0, 0.1)
+    run = vehicle.simulate(time, dict(zip(vehicle.layout.commands, commands, strict=True)))
+    assert run["u"] == pytest.approx(u, abs=0.03 * np.ptp(u))
+    assert run["z"] == pytest.approx(depth, abs=0.03 * np.ptp(depth))
+
+
+def test_weak_thrusters_are_told_and_their_forces_are_those_of_loads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_dives(tmp_path, MIX.replace("value = 40.0", "value = 20.0"))
+    out = tmp_path / "mixer.toml"
+    assert main(["identify", str(tmp_path), "-o", str(out)]) == 0
+    most = 28.0 * np.cos(TILT)
+    largest = max(abs(dive(n).Z).max() for n in (1, 2))
+    words = " ".join(capsys.readouterr().out.split())
+    assert f"heave: the logs have {largest:.3g} N and the thrusters of rov.toml give {most:.3g} N at full" in words
+    vehicle = load(out)
+    usual, at_rest, F = vehicle.layout.usual_inputs, vehicle.layout.at_rest, 20.0 * 0.25 + 8.0 * 0.5
+    pushed = vehicle.derivatives(usual | {"u_l": 0.5, "u_t": -0.5}, at_rest)
+    load_ahead, load_down = F * (np.cos(TOE) - np.sin(TILT)), -F * np.cos(TILT)
+    loaded = vehicle.derivatives(usual | {"X_ext": load_ahead, "Z_ext": load_down}, at_rest)
+    assert pushed == pytest.approx(loaded, rel=1e-12)
+
+
+def test_a_moment_that_no_thruster_gives_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Weight may right a vehicle in pitch, but the logs command a moment, which no thruster gives."""
+    position = 'position = { value = [0, 0, 0], unit = "m", source = "CAD" }'
+    rov = MIX.replace(_CAD, f"{_CAD}\n{position}").replace("[body]", f"[body]\n{PITCHING}") + "[axes.pitch]\n"
+    (tmp_path / "rov.toml").write_text(rov, encoding="utf-8")
+    d = dive(1)
+    header = "time [s],X_ext [N],Z_ext [N],M_ext [N.m],surge velocity [m/s],depth [m],pitch [rad]"
+    write(tmp_path / "dive_1.csv", header, d.time, d.X, d.Z, 0.1 * d.X, d.u, d.z, 0.1 * np.sin(d.time))
+    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
+    reason = "no thruster turns the vehicle: give one a position beside the line of its force, or remove this table"
+    assert f"{tmp_path / 'rov.toml'}: axes.pitch: {reason}" in capsys.readouterr().err
+
+
+LOSS = 'd = { value = 1.0, unit = "N.s/m", source = "Towed" }\n'
+_CAD = 'source = "CAD" }'
+PITCHING = """I_q = { value = 1.0, unit = "kg.m2", source = "CAD" }
+W = { value = 196.2, unit = "N", source = "Weighed" }
+B = { value = 196.2, unit = "N", source = "Weighed" }
+z_B = { value = -0.05, unit = "m", source = "CAD" }
+"""
+_UP = 'direction = { value = [0.19866933079506122, 0, 0.98006657784124163], source = "CAD" }'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        (_UP, _UP.replace("0.98006657784124163", "0"), "rov.toml: axes.heave: no thruster drives it: give one a dir"),
+        (CURVE, "[curves.all]\n", "rov.toml: curves.all.a_t: this key is missing"),
+        ('curve = "all"', 'curve = "al"', "rov.toml: thruster.l.curve = 'al': there is no such curve, only all"),
+        ("[logs]", "[inputs]\nahead = { q = 1 }\n[logs]", "rov.toml: inputs.ahead.q: there is no such thruster"),
+        (
+            'source = "Bollard pull" }\n\n',
+            'source = "" }\nd = { value = 1, unit = "N.s/m", source = "" }\n\n',
+            "curves.all.d",
+        ),
+        (
+            "[vehicle]",
+            'base = "bluerov2"\n[vehicle]',
+            "rov.toml: logs.wrench = True: is not allowed with base",
+        ),
+    ],
+)
+def test_thrusters_that_cannot_give_the_wrench_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, line: str
+) -> None:
+    assert old in MIX
+    write_dives(tmp_path, MIX.replace(old, new))
+    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
+    assert line in capsys.readouterr().err

@@ -93,7 +93,7 @@ def check_live_section(page: str, vehicle: Vehicle) -> None:
     """Check the size of the section that flies, that its script alone may run, and the step tests that it offers."""
     section = live_section(page).encode()
     assert len(section) < 120_000
-    assert len(zlib.compress(section, 9)) < 60_000
+    assert len(zlib.compress(section, 9)) < 45_000
     root = html.fromstring(page)
     data, script = root.iter("script")
     assert [dict(data.attrib), dict(script.attrib)] == [{"type": "application/json", "id": "live-vehicles"}, {}]

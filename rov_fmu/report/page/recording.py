@@ -6,33 +6,28 @@ and measurements keep their own times.
 """
 
 import re
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import NO_FILE, FileError, lines_on
+from rov_fmu.io.messages import NO_FILE, FileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.columns import COMMAND, names_of
-from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
-from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.folder import joined_dive
-from rov_fmu.tank.inspection.headers import axis_in_name
+from rov_fmu.tank.columns import COMMAND
+from rov_fmu.tank.description import has_wrench
+from rov_fmu.tank.inspection.one_log import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import unwrapped
-from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _MOST_SAMPLES = 20_000
 """The largest number of samples of a quantity. Of more samples, every second, third … is flown."""
-_NOT_TOLD = {"missing column", "unknown direction", "time of arrival"}
-"""The findings that a flight does not need."""
 
 
 def topic_name(text: str) -> str:
@@ -46,7 +41,10 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
     `identified` is the MCAP file that `rov-fmu identify --mcap` wrote: the bands of its predictions and its unknown
     forces are added. Warns of what is left out. Raises FileError if the log cannot be flown by this vehicle.
     """
-    log = _read(path, vehicle.layout)
+    rov_file, layout = description_beside(path), vehicle.layout
+    if has_wrench(rov_file.tables):
+        layout = Layout.of_wrench(layout.axes)
+    log = one_log(path, layout, rov_file)
     if not log.commands:
         raise DataFileError(f"{path}: no commands of thrusters were found, so it cannot be flown")
     start, end = float(log.commands.rows[0]), log.commands.end
@@ -68,34 +66,17 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
     }
 
 
-def _read(path: Path, layout: Layout) -> Log:
-    """Read the log up to the first restart of its clock. Raises FileError."""
-    if not path.is_file():
-        raise FileError(f"{path}: {NO_FILE}")
-    described = path.parent / ROV_FILE
-    rov_file = read_description(described) if described.is_file() else NO_ROV_FILE
-    names, wrong = names_of(layout, rov_file.tables)
-    if wrong or not rov_file.explains_files:
-        raise VehicleFileError(*(lines_on(described, wrong) or rov_file.mistakes))
-    dives = [dive for dive in rov_file.tables.dives.values() if path.name in dive.files]
-    if dives:
-        logs = [joined_dive(path.parent, dives[0], layout, names)]
-    else:
-        logs = read_logs(path, layout, names, axis_in_name(path))
-    if len(logs) > 1:
-        warnings.warn(f"{path}: only the part before the clock restarts is flown", UserWarning, stacklevel=3)
-    log = logs[0]
-    for sentence in sentences((f for f in log.findings if f.kind not in _NOT_TOLD), SENTENCES):
-        warnings.warn(sentence, UserWarning, stacklevel=3)
-    return log
-
-
 def _commands(log: Log, layout: Layout) -> tuple[Array, dict[str, list[float]]]:
-    """Return the times at which commands change, and the commands of the vehicle that give those of the log best."""
+    """Return the times at which commands change, and the commands of the vehicle that give those of the log best.
+
+    Of a log of forces on the body, they are the loads.
+    """
     commands = log.commands
     assert isinstance(commands, Commands)
     times = np.unique([commands.rows[0], *commands.time, commands.rows[-1]])
     given = commands.at(times)
+    if {*commands.thrusters} <= {axis.external for axis in AXES.values()}:  # the forces of a wrench are loads
+        return times, {name: _rounded(column) for name, column in zip(commands.thrusters, given.T, strict=True)}
     if commands.thrusters == (COMMAND,) and log.axis:
         signs = layout.signs(log.axis)
         values = given @ np.array([[signs.get(name, 0.0) for name in layout.commands]])

@@ -6,12 +6,16 @@ from typing import Any
 
 import pytest
 
+from rov_fmu.fmu.archive import python_content
+from rov_fmu.fmu.variables import variables
+from rov_fmu.interface.model import VehicleModel
 from tests import fmi3
 from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, OK, STEP, WITH_EVENTS, Fmu
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.fmu.calls.test_state_bytes import checksum
 from tests.vehicles import SIX, a_vehicle
 from verification.references import rigid_vehicle
+from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 from verification.references.rigid_vehicle import compared, places
 
 ROV = a_vehicle(SIX)
@@ -65,6 +69,43 @@ def test_ballast_changed_in_event_mode_is_the_rigid_body_restarted_there(six3_di
         assert rov.step(10.0, 10.0) == OK
         state = dict(zip(ROV.layout.state, rov.get([*ROV.layout.state]), strict=True))
         assert rov.log == []
+    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
+
+
+def test_ballast_changed_in_python_is_the_rigid_body_restarted_there(expected: list[float]) -> None:
+    """A second run begins with the states at the end of the first one."""
+    rov = VehicleModel(**vars(ROV))
+    before = rov.simulate([0.0, 10.0], INPUTS)
+    start = {name: before[name][-1] for name in ROV.layout.state}
+    after = rov.with_(**BALLAST).simulate([10.0, 20.0], INPUTS, start=start)
+    assert [after[name][0] for name in ROV.layout.velocities] == [start[name] for name in ROV.layout.velocities]
+    state = {name: float(after[name][-1]) for name in ROV.layout.state}
+    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
+
+
+def test_ballast_changed_in_the_python_flavour_is_the_rigid_body_restarted_there(
+    tmp_path: Path, expected: list[float]
+) -> None:
+    for name, data in python_content(ROV).files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    keep_loaded(tmp_path)
+    slave = fmpy_slave(tmp_path)
+    references = {variable.name: variable.value_reference for variable in variables(ROV)}
+
+    def put(values: dict[str, float]) -> None:
+        slave.setReal([references[name] for name in values], [*values.values()])
+
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    put(INPUTS)
+    slave.exitInitializationMode()
+    slave.doStep(0.0, 10.0)
+    put(BALLAST)
+    slave.doStep(10.0, 10.0)
+    state = dict(zip(ROV.layout.state, slave.getReal([references[name] for name in ROV.layout.state]), strict=True))
+    slave.terminate()
+    slave.freeInstance()
     assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
 
 

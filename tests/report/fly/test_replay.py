@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu import load
 from rov_fmu.cli import main
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.tank.columns import Names
@@ -122,6 +123,25 @@ def test_tuning_flies_the_recording_again_where_it_is_shown(
     page.locator("input[name=beta_w]").fill("0.3")
     assert page.evaluate("live.flight.time") == 12.0
     assert page.evaluate("Math.max(...live.flight.replay.errors[1].map(Math.abs))") > 0.01
+
+
+@pytest.mark.interop
+def test_forces_on_the_body_are_flown_as_loads(tmp_path: Path, visit: Callable[..., Visit]) -> None:
+    """The log is of the model itself, whose loads hold for 2 s each."""
+    time, random = np.arange(0.0, 20.0, 0.1), np.random.default_rng(3)
+    names = {"X_ext [N]": 8.0, "Z_ext [N]": 4.0, "N_ext [N.m]": 0.2}
+    forces = {name: most * random.uniform(-1.0, 1.0, 10).repeat(20) for name, most in names.items()}
+    run = load("videoray").simulate(time, {name.split()[0]: values for name, values in forces.items()})
+    columns = [time, *forces.values(), run["u"], run["z"], run["psi"]]
+    header = ",".join(["time [s]", *names, "surge velocity [m/s]", "depth [m]", "heading [rad]"])
+    np.savetxt(tmp_path / "dive.csv", np.column_stack(columns), "%.17g", ",", header=header, comments="")
+    (tmp_path / "rov.toml").write_text("[logs]\nwrench = true\n", encoding="utf-8")
+    page = flying(visit, page_of(tmp_path / "dive.csv", tmp_path / "page.html")).page
+    errors = page.evaluate("live.flight.replay.errors.map((list) => Math.max(...list.map(Math.abs)))")
+    assert len(errors) == 3
+    assert max(errors) < 1e-7, "numbers of a recording have nine decimals"
+    page.evaluate("() => { live.pause(true); live.flight.seek(11); live.takeOver(); }")
+    assert page.evaluate("['X_ext', 'Z_ext', 'N_ext'].map((name) => live.flight.pilot.model.get(name))") == [0, 0, 0]
 
 
 @pytest.mark.interop
