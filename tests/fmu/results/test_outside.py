@@ -32,6 +32,7 @@ from tests.fmi import (
     MODEL_EXCHANGE,
     OK,
     STEP,
+    WITH_EVENTS,
     AnyInstance,
     Fmu,
 )
@@ -248,7 +249,9 @@ def test_exactly_at_an_end_its_derivative_is_that_of_the_inside(fmu3: fmi3.Fmu, 
 def test_its_adjoint_derivatives_are_the_same_row(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
     knowns = [*fmu3.inputs, *(fmu3.states if kind == MODEL_EXCHANGE else ())]
     for point in _points(fmu3, 6, seed=4):
-        with _at(fmu3, point, kind, mode) as rov:
+        with fmu3.instance(kind) as rov:
+            assert rov.set(point) == OK
+            rov.reach(mode)
             values = _read(rov)
             row = [_slope({**values, known: values.get(known, 0.0)}, known, _FLAT) for known in knowns]
             assert rov.adjoint(["outside"], knowns, [1.0]) == pytest.approx(row, rel=1e-12, abs=1e-14)
@@ -303,7 +306,7 @@ def test_a_restored_state_has_it_again(fmu: Fmu, kind: int) -> None:
     assert moved
 
 
-@pytest.mark.parametrize("kind", [MODEL_EXCHANGE, fmi3.WITH_EVENTS])
+@pytest.mark.parametrize("kind", [MODEL_EXCHANGE, WITH_EVENTS])
 def test_in_event_mode_it_is_that_of_the_values_set(fmu3: fmi3.Fmu, kind: int) -> None:
     """And in the mode after it: leaving Event Mode changes neither it nor its slopes."""
     with fmu3.instance(kind) as rov:
