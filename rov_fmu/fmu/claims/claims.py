@@ -68,11 +68,12 @@ CLAIMS = (
         "Hashes and signature",
         "Nobody has changed the FMU since it was built.",
         measures.integrity,
-        f"{META_DATA} in the FMU, and the file .sig beside it",
+        f"{META_DATA} in the FMU, and the file .sig beside it, which rov-fmu prove FMU --key KEY.pub and "
+        "ssh-keygen -Y check-novalidate -n rov-fmu -s FMU.sig < FMU check",
     ),
     Claim(
         "Unseen data",
-        "Motion that the identification had not seen is predicted.",
+        "Motion that the identification had not seen is predicted, or the axis is named that is not to be used.",
         measures.unseen,
         "documentation/model_card.txt in the FMU",
     ),
