@@ -68,8 +68,8 @@ CLAIMS = (
         "Hashes and signature",
         "Nobody has changed the FMU since it was built.",
         measures.integrity,
-        f"{META_DATA} in the FMU, and the file .sig beside it, which rov-fmu prove FMU --key KEY.pub and "
-        "ssh-keygen -Y check-novalidate -n rov-fmu -s FMU.sig < FMU check",
+        f"{META_DATA} in the FMU, and the file .sig beside it; rov-fmu prove FMU --key KEY.pub or "
+        "ssh-keygen -Y check-novalidate -n rov-fmu -s FMU.sig < FMU checks the signature",
     ),
     Claim(
         "Unseen data",

@@ -316,7 +316,7 @@ def integrity(subject: Subject) -> Evidence:
             f"All {len(found.files)} files are as they were built; it is signed with the key {found.signer} ({known})."
         )
     rows = [("Program", name, digest) for name, digest in found.generator.items()]
-    rows += [("Read by the identification", name, digest) for name, digest in found.inputs.items()]
+    rows += [("File read", name, digest) for name, digest in found.inputs.items()]
     return Evidence("holds", words, f"{len(found.files)} files", ("Made from", "Name", "Hash"), rows)
 
 
