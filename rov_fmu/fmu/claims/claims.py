@@ -11,8 +11,8 @@ from rov_fmu.fmu.claims.runs import RunError
 from rov_fmu.fmu.claims.subject import Subject, opened
 from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.experiments import FOLDER
-from rov_fmu.fmu.proof import TIME_LIMIT
-from rov_fmu.io.child_process import ChildError, LimitError
+from rov_fmu.fmu.proof import TIME_LIMIT, remedy
+from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import Progress, ProofError, silent
 from rov_fmu.io.reading import hash_of
 
@@ -130,7 +130,5 @@ def _checked(claim: Claim, subject: Subject) -> Evidence:
     except ProofError as error:
         return Evidence("fails", f"{str(error).removeprefix(f'{subject.path}: ')}.")
     except (ChildError, RunError) as error:
-        is_time = isinstance(error, LimitError) and error.limit == "time"
-        remedy = "; --time-limit allows more" if is_time else ""
         who = "The FMU " if isinstance(error, ChildError) else ""
-        return Evidence("fails", f"{who}{error}{remedy}.")
+        return Evidence("fails", f"{who}{error}{remedy(error)}.")

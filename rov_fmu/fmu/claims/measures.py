@@ -16,7 +16,7 @@ from rov_fmu.fmu.card import read_card
 from rov_fmu.fmu.claims.runs import Answer, Array, Plan, RunError
 from rov_fmu.fmu.claims.subject import Subject
 from rov_fmu.fmu.evidence.check import check_evidence
-from rov_fmu.fmu.proof import prove
+from rov_fmu.fmu.proof import SHARE_OF_NOMINAL, compare, nominal
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import brief, listed
 
@@ -78,7 +78,8 @@ def expected(subject: Subject) -> Evidence:
     """Compare the FMU with the results that it carries."""
     if not subject.experiments:
         return _not("the FMU carries no expected results (FMI-LS-REF)")
-    findings = prove(subject.path, subject.interface, subject.tolerance, subject.time_limit)
+    has = subject.path, subject.folder, subject.description, subject.experiments
+    findings = compare(*has, subject.interface, subject.tolerance, subject.time_limit)
     experiments = [*dict.fromkeys(f.experiment for f in findings)]
     worst = [
         max((f for f in findings if f.experiment == x), key=lambda f: f.deviation / f.tolerance) for x in experiments
@@ -135,8 +136,8 @@ def step_size(subject: Subject) -> Evidence:
 
 def _deviation(subject: Subject, values: Array, reference: Array) -> float:
     """Return the largest deviation, relative to the largest value of a variable or to 1 % of its nominal value."""
-    nominal = [abs(float(subject.variables[name].nominal or 0.0)) or 1.0 for name in subject.plan.outputs]
-    scale = np.maximum(np.abs(reference).max(axis=0), 0.01 * np.array(nominal))
+    least = [SHARE_OF_NOMINAL * nominal(subject.variables[name]) for name in subject.plan.outputs]
+    scale = np.maximum(np.abs(reference).max(axis=0), least)
     same = (values == reference) | (np.isnan(values) & np.isnan(reference))
     off = float(np.where(same, 0.0, np.abs(values - reference) / scale).max())
     return off if isfinite(off) else inf
