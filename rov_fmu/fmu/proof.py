@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
@@ -23,7 +23,7 @@ INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"
 """FMPy's name of each interface, by the name on the command line."""
 _SAME = 1e-9
 """The relative difference below which two times are the same."""
-_SHARE_OF_NOMINAL = 0.01
+SHARE_OF_NOMINAL = 0.01
 """The least divisor of a deviation, as a share of the nominal value.
 
 Otherwise the divisor is the largest expected value. FMI recommends the nominal value for absolute tolerances (2.0,
@@ -79,25 +79,45 @@ def prove(
         description = unpack_fmu(fmu, fmu, Path(folder))
         experiments = reference_results.experiments(description)
         check_binary(fmu, folder)
-        has = [name for name, of in INTERFACES.items() if getattr(description, of)]
-        if not has or (interface and interface not in has):
-            raise FileError(
-                f"{fmu}: has no {interface or 'interface that can be run'}, only {', '.join(has) or 'none'}"
-            )
-        chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
-        experiment, findings = chosen[0], list[Finding]()
-        limits = Limits(time=time_limit, memory=MEMORY, disk=DISK)
-        try:
-            with closing(ChildProcess(_Experiments, folder, interface or has[0], limits=limits)) as child:
-                for n, experiment in enumerate(chosen):
-                    on_experiment(experiment.name, n / len(chosen))
-                    findings += child.call("findings", experiment)
-        except ChildError as error:
-            where = one_line(f"{fmu}: experiment {experiment.name!r}")
-            is_time = isinstance(error, LimitError) and error.limit == "time"
-            remedy = "; --time-limit allows more" if is_time else ""
-            raise ProofError(f"{where}: the FMU {error}{remedy}") from error
+        return compare(fmu, folder, description, experiments, interface, tolerance, time_limit, on_experiment)
+
+
+def compare(
+    fmu: Path,
+    folder: str,
+    description: Any,
+    experiments: Sequence[Experiment],
+    interface: str | None = None,
+    tolerance: float | None = None,
+    time_limit: float = TIME_LIMIT,
+    on_experiment: Callable[[str, float], None] = lambda *_: None,
+) -> list[Finding]:
+    """Run experiments of an FMU that is unpacked in a folder, as `prove` does."""
+    has = [name for name, of in INTERFACES.items() if getattr(description, of)]
+    if not has or (interface and interface not in has):
+        raise FileError(f"{fmu}: has no {interface or 'interface that can be run'}, only {', '.join(has) or 'none'}")
+    chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
+    experiment, findings = chosen[0], list[Finding]()
+    limits = Limits(time=time_limit, memory=MEMORY, disk=DISK)
+    try:
+        with closing(ChildProcess(_Experiments, folder, interface or has[0], limits=limits)) as child:
+            for n, experiment in enumerate(chosen):
+                on_experiment(experiment.name, n / len(chosen))
+                findings += child.call("findings", experiment)
+    except ChildError as error:
+        where = one_line(f"{fmu}: experiment {experiment.name!r}")
+        raise ProofError(f"{where}: the FMU {error}{remedy(error)}") from error
     return findings
+
+
+def remedy(error: Exception) -> str:
+    """Return how to get more of what an FMU had too little of, to follow the error; an empty text if nothing helps."""
+    return "; --time-limit allows more" if isinstance(error, LimitError) and error.limit == "time" else ""
+
+
+def nominal(variable: Any) -> float:
+    """Return the size of the nominal value of one of FMPy's variables; 1 if it has none."""
+    return abs(float(variable.nominal or 0.0)) or 1.0
 
 
 def check_binary(fmu: Path, folder: str) -> None:
@@ -166,9 +186,9 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
         what = str(error).replace(folder + os.sep, "").rstrip(".")  # the cause follows the library's path
         yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(what + messages, 240))
         return
-    nominal = {v.name: abs(float(v.nominal or 0.0)) or 1.0 for v in description.modelVariables}
+    variables = {v.name: v for v in description.modelVariables}
     for name, values in zip(names, expected, strict=True):
-        scale = max(float(np.abs(values).max()), _SHARE_OF_NOMINAL * nominal[name])
+        scale = max(float(np.abs(values).max()), SHARE_OF_NOMINAL * nominal(variables[name]))
         off = _deviation(result["time"], result[name], times, values)
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         yield Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved))

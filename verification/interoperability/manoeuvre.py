@@ -24,9 +24,9 @@ from pathlib import Path
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from verification.references.vehicles import EVERY_OPTION
+from verification.references.vehicles import EVERY_OPTION, IDENTIFIED
 
-VEHICLES = {**SHIPPED, "every_option": EVERY_OPTION}
+VEHICLES = {**SHIPPED, "identified": IDENTIFIED, "every_option": EVERY_OPTION}
 """The vehicle files by name."""
 POINTS_A_SECOND = 10
 STEP = 1.0 / POINTS_A_SECOND
@@ -201,6 +201,35 @@ _HEAVY = Manoeuvre(
     },
 )
 
+# Beyond what was identified in the middle, so that the output `outside` changes.
+_IDENTIFIED = Manoeuvre(
+    "identified",
+    {
+        "m_rov": 12.0,
+        "a_d_v": 24.0,
+        "b_d_r": 0.1,
+        "m_a_u": 6.0,
+        "c_0_t200": 0.1,
+        "T_t200": 0.15,
+        "alpha_v": 0.9,
+        "beta_w": 0.7,
+        "alpha_r": 1.1,
+        "beta_r": 0.8,
+    },
+    {
+        0.0: {},
+        1.0: {"surge": 0.4, "heave": 0.3},
+        4.0: {"surge": 0.3, "yaw": 0.15, "heave": 0.2},
+        8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
+        11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
+        14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
+        17.0: {"surge": 0.35, "sway": 0.1, "Y_ext": 8.0, **_LOADS},
+        21.0: {"yaw": 1.0, "heave": 1.0, "Y_ext": 8.0, **_LOADS},
+        25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
+        28.0: {"u_2": 0.2, **_CURRENT},
+    },
+)
+
 _EVERY_OPTION = Manoeuvre(
     "every_option",
     {
@@ -243,5 +272,5 @@ _EVERY_OPTION = Manoeuvre(
     },
 )
 
-MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY, _EVERY_OPTION)}
+MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY, _IDENTIFIED, _EVERY_OPTION)}
 """The manoeuvres by the name of the vehicle."""

@@ -11,8 +11,8 @@ from rov_fmu.fmu.claims.runs import RunError
 from rov_fmu.fmu.claims.subject import Subject, opened
 from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.experiments import FOLDER
-from rov_fmu.fmu.proof import TIME_LIMIT
-from rov_fmu.io.child_process import ChildError, LimitError
+from rov_fmu.fmu.proof import TIME_LIMIT, remedy
+from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import Progress, ProofError, silent
 from rov_fmu.io.reading import hash_of
 
@@ -68,11 +68,12 @@ CLAIMS = (
         "Hashes and signature",
         "Nobody has changed the FMU since it was built.",
         measures.integrity,
-        f"{META_DATA} in the FMU, and the file .sig beside it",
+        f"{META_DATA} in the FMU, and the file .sig beside it; rov-fmu prove FMU --key KEY.pub or "
+        "ssh-keygen -Y check-novalidate -n rov-fmu -s FMU.sig < FMU checks the signature",
     ),
     Claim(
         "Unseen data",
-        "Motion that the identification had not seen is predicted.",
+        "Motion that the identification had not seen is predicted, or the axis is named that is not to be used.",
         measures.unseen,
         "documentation/model_card.txt in the FMU",
     ),
@@ -129,7 +130,5 @@ def _checked(claim: Claim, subject: Subject) -> Evidence:
     except ProofError as error:
         return Evidence("fails", f"{str(error).removeprefix(f'{subject.path}: ')}.")
     except (ChildError, RunError) as error:
-        is_time = isinstance(error, LimitError) and error.limit == "time"
-        remedy = "; --time-limit allows more" if is_time else ""
         who = "The FMU " if isinstance(error, ChildError) else ""
-        return Evidence("fails", f"{who}{error}{remedy}.")
+        return Evidence("fails", f"{who}{error}{remedy(error)}.")

@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from rov_fmu.fmu.card import read_card
 from rov_fmu.fmu.claims.runs import Answer, Array, Plan, RunError
 from rov_fmu.fmu.claims.subject import Subject
 from rov_fmu.fmu.evidence.check import check_evidence
-from rov_fmu.fmu.proof import prove
+from rov_fmu.fmu.proof import SHARE_OF_NOMINAL, compare, nominal
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import brief, listed
 
@@ -37,6 +38,9 @@ _LOSS = 1e-12
 
 _UNSEEN = "Unseen data: "
 """The beginning of a paragraph of the model card about a prediction."""
+_BAD = "do not use"
+_VERDICT = re.compile(rf"([\w ]+): (good|usable|{_BAD})\. ?(.*)")
+"""A paragraph of the model card with the verdict of an axis and its reasons."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,8 @@ def expected(subject: Subject) -> Evidence:
     """Compare the FMU with the results that it carries."""
     if not subject.experiments:
         return _not("the FMU carries no expected results (FMI-LS-REF)")
-    findings = prove(subject.path, subject.interface, subject.tolerance, subject.time_limit)
+    has = subject.path, subject.folder, subject.description, subject.experiments
+    findings = compare(*has, subject.interface, subject.tolerance, subject.time_limit)
     experiments = [*dict.fromkeys(f.experiment for f in findings)]
     worst = [
         max((f for f in findings if f.experiment == x), key=lambda f: f.deviation / f.tolerance) for x in experiments
@@ -83,6 +88,9 @@ def expected(subject: Subject) -> Evidence:
     largest = max(f.deviation for f in findings)
     words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(experiments)} experiments are as expected"
     words += f", within {max(f.tolerance for f in findings):.0e} of the largest value of each variable."
+    if subject.is_ours and Path(subject.folder, "sources", "step.c").exists():
+        words += " They come from a second implementation of the equation: an explicit Runge-Kutta method of order 8 "
+        words += "(DOP853) in Python, run when the FMU was built, and not the Taylor series in C that the FMU runs."
     for f in wrong[:1]:
         words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {_tiny(f.deviation)}'}."
     rows = [(f.experiment, f.error or f.variable, _tiny(f.deviation), f"{f.tolerance:.0e}") for f in worst]
@@ -128,8 +136,8 @@ def step_size(subject: Subject) -> Evidence:
 
 def _deviation(subject: Subject, values: Array, reference: Array) -> float:
     """Return the largest deviation, relative to the largest value of a variable or to 1 % of its nominal value."""
-    nominal = [abs(float(subject.variables[name].nominal or 0.0)) or 1.0 for name in subject.plan.outputs]
-    scale = np.maximum(np.abs(reference).max(axis=0), 0.01 * np.array(nominal))
+    least = [SHARE_OF_NOMINAL * nominal(subject.variables[name]) for name in subject.plan.outputs]
+    scale = np.maximum(np.abs(reference).max(axis=0), least)
     same = (values == reference) | (np.isnan(values) & np.isnan(reference))
     off = float(np.where(same, 0.0, np.abs(values - reference) / scale).max())
     return off if isfinite(off) else inf
@@ -302,28 +310,40 @@ def integrity(subject: Subject) -> Evidence:
     found = check_evidence(subject.path, subject.key)
     if not (found.files or found.signer):
         return _not("the FMU carries no hashes of its files, and no signature lies beside it")
-    signed = f"it is signed with the key {found.signer}" if found.signer else "it is not signed"
-    words = f"All {len(found.files)} files are as they were built; {signed}."
+    words = f"All {len(found.files)} files are as they were built; it is not signed, so whoever built it is unknown."
+    if found.signer:
+        known = "given with --key" if subject.key else "compare it with the fingerprint that its maker gives"
+        words = (
+            f"All {len(found.files)} files are as they were built; it is signed with the key {found.signer} ({known})."
+        )
     rows = [("Program", name, digest) for name, digest in found.generator.items()]
-    rows += [("Read by the identification", name, digest) for name, digest in found.inputs.items()]
+    rows += [("File read", name, digest) for name, digest in found.inputs.items()]
     return Evidence("holds", words, f"{len(found.files)} files", ("Made from", "Name", "Hash"), rows)
 
 
 def unseen(subject: Subject) -> Evidence:
-    """Repeat what the model card says about predictions of motion that the identification had not seen."""
+    """Repeat what the model card says about predictions of motion that the identification had not seen.
+
+    An axis whose verdict is *do not use* makes no promise, so that the claim does not fail: the FMU is as it was built,
+    and says so itself. The evidence names the axis, with the reasons, and does not count as held.
+    """
     paragraphs = card_of(subject).get("How far to trust it", [])
     errors = [text.removeprefix(_UNSEEN) for text in paragraphs if text.startswith(_UNSEEN)]
-    if not errors:
+    verdicts = [found.groups() for text in paragraphs if (found := _VERDICT.match(text))]
+    if not (errors or verdicts):
         known = f": {paragraphs[0].rstrip('.')}" if paragraphs else ""
         return _not(f"the FMU says nothing about errors on unseen data{known}")
-    verdicts = [text.partition(". ") for text in paragraphs if re.match(r"[\w ]+: (good|usable|do not use)\.", text)]
-    bad = [verdict for verdict, _, _ in verdicts if verdict.endswith("do not use")]
+    bad = [(axis, reasons) for axis, word, reasons in verdicts if word == _BAD]
     words = f"The model card has the errors of {len(errors)} predictions."
+    figure = ""
     if verdicts:
-        words += f" Its verdicts: {'; '.join(verdict for verdict, _, _ in verdicts)}."
+        words += f" Its verdicts: {'; '.join(f'{axis}: {word}' for axis, word, _ in verdicts)}."
+        figure = f"{len(verdicts)} of {len(verdicts)} axes"
+    if bad:
+        words += "".join(f" Do not use {axis}: {reasons}" for axis, reasons in bad)
+        figure = f"{_BAD} {listed(axis for axis, _ in bad)}"
     rows = [tuple(one.rstrip(".").split(": ", 1)) for one in errors]
-    figure = f"{len(verdicts) - len(bad)} of {len(verdicts)} axes" if verdicts else ""
-    return Evidence(_is(not bad), words, figure, ("Quantity", "Error"), rows)
+    return Evidence("holds" if verdicts and not bad else "measured", words, figure, ("Quantity", "Error"), rows)
 
 
 def card_of(subject: Subject) -> dict[str, list[str]]:

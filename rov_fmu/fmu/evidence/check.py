@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from rov_fmu.fmu.evidence.meta_data import FILES, GENERATOR, INPUTS, META_DATA
+from rov_fmu.fmu.evidence.meta_data import FILES, GENERATOR, INPUTS, META_DATA, own_hash
 from rov_fmu.fmu.evidence.signature import check_signature
 from rov_fmu.fmu.unpacking import refusal
 from rov_fmu.io.file_kinds import FMU, check_suffix
@@ -49,7 +49,7 @@ def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
                 raise FileError(f"{fmu}: {reason}")
             if META_DATA in archive.namelist():
                 found = _read(fmu, archive)
-                if found.files and (change := next(_changes(archive, found.files), "")):
+                if found != MetaData() and (change := next(_changes(archive, found.files), "")):
                     raise ProofError(f"{fmu}: {change}")
     except FileNotFoundError as error:
         raise FileError(f"{fmu}: {NO_FILE}") from error
@@ -80,19 +80,18 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
 
 
 def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str]:
-    """Yield a line about each file that differs from what the meta-data say."""
-    members = [name for name in archive.namelist() if not name.endswith("/") and name != META_DATA]
+    """Yield a line about each file that is not what the meta-data say; the meta-data themselves come first."""
+    members = [name for name in archive.namelist() if not name.endswith("/")]
     for name, times in Counter(archive.namelist()).items():
         if times > 1:
             yield f"{shown(name)}: is {times} times in the archive"
-    for name in files:
+    for name in sorted({*members, *files}, key=lambda name: (name != META_DATA, name)):
         if name not in members:
             yield f"{shown(name)}: is missing; it was there when the FMU was built"
-    for name in members:
-        if name not in files:
+        elif name not in files and name != META_DATA:
             yield f"{shown(name)}: was added after the FMU was built"
-        elif (found := _hash(archive, name)) != files[name]:
-            differs = f"its SHA3-256 is {found[:16]}..., and was {files[name][:16]}..." if found else "it is damaged"
+        elif (found := _hash(archive, name)) != (given := files.get(name, "unknown")):
+            differs = f"its SHA3-256 is {found[:16]}..., and was {given[:16]}..." if found else "it is damaged"
             yield f"{shown(name)}: was altered after the FMU was built: {differs}"
 
 
@@ -100,6 +99,6 @@ def _hash(archive: zipfile.ZipFile, name: str) -> str:
     """Return the SHA3-256 of a file in the archive, or an empty text if it cannot be unpacked."""
     try:
         with archive.open(name) as file:
-            return hash_of(file, "sha3_256").hex()
+            return own_hash(file.read()) if name == META_DATA else hash_of(file, "sha3_256").hex()
     except Exception:  # zipfile raises many kinds on damaged archives
         return ""

@@ -1,9 +1,10 @@
 """The meta-data of an FMU: a file SRMD of SSP-LS-Traceability 1.0 with the hashes of all that it was made from.
 
-The hashes are SHA3-256, as the standard demands. They cover every other file of the FMU, the program that made it, and,
-if the vehicle was identified, its logs.
+The hashes are SHA3-256, as the standard demands. They cover every file of the FMU, the program that made it, and, if
+the vehicle was identified, its logs. The hash of this file itself is that of the file with zeros in place of this hash.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from hashlib import sha3_256
@@ -19,6 +20,8 @@ META_DATA = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
 FILES, INPUTS, GENERATOR = "rov-fmu.files", "rov-fmu.inputs", "rov-fmu.generator"
 """The classifications: the files of the FMU, the files that identification read, and the program. Each entry has a
 name and a hash."""
+_ZEROS = "0" * 64
+_OWN_HASH = re.compile(rb'(keyword="' + re.escape(META_DATA).encode() + rb'">)[^<]*')
 _PACKAGE = Path(__file__).parents[2]
 _SOURCES = (".py", ".c", ".h", ".js", ".j2")
 """The kinds of files that the program consists of."""
@@ -28,7 +31,10 @@ def meta_data(vehicle: Vehicle, files: Mapping[str, bytes]) -> bytes:
     """Return the document for an FMU that has these other files. The same files give the same bytes."""
     made = vehicle.provenance
     classifications = {
-        FILES: [(name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())],
+        FILES: [
+            *((name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())),
+            (META_DATA, _ZEROS),
+        ],
         INPUTS: [(name, f"{made.hash}: {digest}") for name, digest in made.inputs.items()] if made else [],
         GENERATOR: [(f"rov-fmu {__version__}", generator_hash())],
     }
@@ -39,11 +45,21 @@ def meta_data(vehicle: Vehicle, files: Mapping[str, bytes]) -> bytes:
         "fileversion": vehicle.version,
         "generationTool": f"rov-fmu {__version__}",
     }
-    return render(
+    document = render(
         "resourceMetaData.srmd.j2",
         head=head,
         classifications={name: entries for name, entries in classifications.items() if entries},
     ).encode()
+    return _with_own_hash(document, own_hash(document))
+
+
+def own_hash(document: bytes) -> str:
+    """Return the SHA3-256 of the meta-data, in which zeros stand for this hash."""
+    return sha3_256(_with_own_hash(document, _ZEROS)).hexdigest()
+
+
+def _with_own_hash(document: bytes, digest: str) -> bytes:
+    return _OWN_HASH.sub(rb"\g<1>" + digest.encode(), document)
 
 
 @cache

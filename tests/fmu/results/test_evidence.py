@@ -22,10 +22,13 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.evidence.check import check_evidence
 from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
+from rov_fmu.fmu.evidence.signature import check_signature
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.io.messages import FileError, ProofError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.references.vehicles import IDENTIFIED
 
 Capsys = pytest.CaptureFixture[str]
 _REFIT = SHIPPED["videoray_refit"]
@@ -142,7 +145,8 @@ def _check_meta_data(fmu: Path) -> None:
         document = etree.fromstring(zipped.read(META_DATA))
         schema.assertValid(document)
         expected = {name: hashlib.sha3_256(zipped.read(name)).hexdigest() for name in zipped.namelist()}
-    del expected[META_DATA]
+        of_zeros = re.sub(rf'(?<={re.escape(META_DATA)}">)\w{{64}}', "0" * 64, zipped.read(META_DATA).decode())
+    expected[META_DATA] = hashlib.sha3_256(of_zeros.encode()).hexdigest()
     found = {x.get("type"): {e.get("keyword"): e.text for e in x} for x in document}
     assert found["rov-fmu.files"] == expected
     (generator,) = found["rov-fmu.generator"]
@@ -191,10 +195,15 @@ def _altered(fmu: Path, path: Path, change: Callable[[dict[str, bytes]], None]) 
         f"{FOLDER}/vehicle/tables/",
         "sources/",
         "documentation/model_card.txt",
+        "documentation/index.html",
         MANIFEST,
+        META_DATA,
     ],
 )
-def test_one_altered_byte_is_named(part: str, videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+@pytest.mark.parametrize("version", ["videoray_fmu", "videoray3_fmu"])
+def test_one_altered_byte_is_named(
+    part: str, version: str, tmp_path: Path, capsys: Capsys, request: pytest.FixtureRequest
+) -> None:
     names = []
 
     def change(files: dict[str, bytes]) -> None:
@@ -203,7 +212,8 @@ def test_one_altered_byte_is_named(part: str, videoray_fmu: Path, tmp_path: Path
         middle = len(files[name]) // 2
         files[name] = files[name][:middle] + bytes([files[name][middle] ^ 1]) + files[name][middle + 1 :]
 
-    fmu = _altered(videoray_fmu, tmp_path / "altered.fmu", change)
+    fmu = _altered(request.getfixturevalue(version), tmp_path / "altered.fmu", change)
+    capsys.readouterr()
     assert main(["prove", str(fmu)]) == 1
     out, err = capsys.readouterr()
     assert out == ""
@@ -212,6 +222,38 @@ def test_one_altered_byte_is_named(part: str, videoray_fmu: Path, tmp_path: Path
         + r"its SHA3-256 is [0-9a-f]{16}\.\.\., and was [0-9a-f]{16}\.\.\.\n",
         err,
     )
+
+
+def test_no_byte_of_the_meta_data_can_be_altered(tmp_path: Path) -> None:
+    """Whether it is a name, a hash, a word or a part of the XML: the line names the meta-data."""
+    files = {"a": b"1", "b": b"2"}
+    content = meta_data(load_vehicle(_REFIT), files)
+    fmu = tmp_path / "altered.fmu"
+    for n in range(len(content)):
+        changed = content[:n] + bytes([content[n] ^ 1]) + content[n + 1 :]
+        fmu.write_bytes(archive({**files, META_DATA: changed}))
+        with pytest.raises((ProofError, FileError)) as error:
+            check_evidence(fmu)
+        assert META_DATA in str(error.value)[: len(str(fmu)) + len(META_DATA) + 6], (n, str(error.value))
+        assert "\n" not in str(error.value)
+
+
+def test_an_identified_vehicle_whose_data_were_altered_fails(tmp_path: Path, capsys: Capsys) -> None:
+    """Its covariance, its intervals and its vehicle file."""
+    vehicle = load_vehicle(IDENTIFIED)
+    files = reference_results(vehicle)
+    files[META_DATA] = meta_data(vehicle, files)
+    for name in (
+        "covariance.csv",
+        "uncertainty.exp",
+        "uncertainty/a_d_u_low.ssv",
+        f"vehicle/{vehicle.identifier}.toml",
+    ):
+        path, content = f"{FOLDER}/{name}", files[f"{FOLDER}/{name}"]
+        fmu = tmp_path / "altered.fmu"
+        fmu.write_bytes(archive({**files, path: content[:-2] + bytes([content[-2] ^ 1]) + content[-1:]}))
+        assert main(["prove", str(fmu)]) == 1
+        assert capsys.readouterr().err.startswith(f"rov-fmu: {fmu}: '{path}': was altered after the FMU was built")
 
 
 def test_files_that_were_added_or_taken_away_are_named(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
@@ -324,6 +366,18 @@ def test_a_signature_that_does_not_fit_fails(signed_fmu: Path, keys: Path, tmp_p
     assert refused(fmu).startswith(f"the signature {signature} does not fit: the FMU was altered or built again after")
     signature.unlink()
     assert refused(fmu, "--key", str(keys / "key.pub")) == f"is not signed: there is no file {signature}\n"
+
+
+def test_no_letter_of_a_signature_can_be_altered(signed_fmu: Path, tmp_path: Path) -> None:
+    fmu = Path(shutil.copy(signed_fmu, tmp_path))
+    good = Path(f"{signed_fmu}.sig").read_bytes()
+    for n, byte in enumerate(good):
+        if not chr(byte).isspace():
+            Path(f"{fmu}.sig").write_bytes(good[:n] + bytes([byte ^ 1]) + good[n + 1 :])
+            with pytest.raises((ProofError, FileError)) as error:
+                check_signature(fmu)
+            assert f"{fmu}.sig" in str(error.value)
+            assert "\n" not in str(error.value)
 
 
 def test_bad_keys_and_signatures_are_one_line(signed_fmu: Path, keys: Path, tmp_path: Path, capsys: Capsys) -> None:

@@ -2,19 +2,43 @@
 
 import math
 import random
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
+from mpmath import mp
 
 import rov_fmu
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.dependencies import dependencies_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
+from tests import fmi3
 from tests.conftest import unzipped
+from tests.fmi import (
+    CO_SIMULATION,
+    CONTINUOUS,
+    ERROR,
+    EVENT,
+    EVERY_MODE,
+    FAILED,
+    INITIALIZATION,
+    INSTANTIATED,
+    MODEL_EXCHANGE,
+    OK,
+    STEP,
+    WITH_EVENTS,
+    AnyInstance,
+    Fmu,
+)
+from tests.fmu.calls.conftest import WRAPPERS
+
+Values = Mapping[str, float]
 
 _COMMAND = 0.7
 _FLAT = {"u": (0.2, 0.5), "w": (-0.1, 0.3), "r": (-1.0, 2.0), "z": (0.0, 3.0)}
@@ -45,9 +69,17 @@ def tilted(tmp_path_factory: pytest.TempPathFactory) -> Vehicle:
     return _identified("bluerov2_heavy", _TILTED, tmp_path_factory.mktemp("tilted"))
 
 
-def _expected(values: Mapping[str, float], ranges: Mapping[str, tuple[float, float]]) -> float:
-    """Return the largest excess over a range, relative to the range from 0 on. The depth does not count."""
+def _expected(values: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]) -> Any:
+    """Return the largest excess over a range, relative to the range from 0 on. The depth does not count.
+
+    The attitude is given by phi and theta, or by the quaternion. The numbers may have any precision.
+    """
     excess = [0.0]
+    if "eta" in values:
+        e, a, b, c = (values[name] for name in QUATERNION)
+        phi = mp.atan2(2 * (e * a + b * c), e * e - a * a - b * b + c * c)
+        theta = mp.asin(2 * (e * b - a * c) / (e * e + a * a + b * b + c * c))
+        values = {**values, "phi": phi, "theta": theta}
     for name, value in values.items():
         if name.startswith("u_"):
             excess.append((min(abs(value), 1.0) - _COMMAND) / _COMMAND)
@@ -85,16 +117,30 @@ def test_exactly_at_an_end_it_is_0_and_beyond_it_is_not(name: str, flat: Vehicle
     assert math.isfinite(at(1e6))
 
 
+@pytest.fixture(scope="module")
+def folder_of(flat: Vehicle, tilted: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
+    """Return the unzipped FMU of the flat or the tilted vehicle in a version of FMI, which is built once."""
+    vehicles = {"flat": flat, "tilted": tilted}
+
+    @cache
+    def built(name: str, fmi: int) -> Path:
+        return unzipped(vehicles[name], tmp_path_factory.mktemp(name), fmi)
+
+    return built
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_the_fmu_calculates_it(fmi: int, kind: str, flat: Vehicle, tilted: Vehicle, tmp_path: Path) -> None:
+def test_the_fmu_calculates_it(
+    fmi: int, kind: str, flat: Vehicle, tilted: Vehicle, folder_of: Callable[[str, int], Path]
+) -> None:
     """In both interfaces and versions of FMI, at the start and at every step, from the other outputs."""
-    for vehicle, ranges, axis in ((flat, _FLAT, "surge"), (tilted, _TILTED, "roll")):
+    for name, vehicle, ranges, axis in (("flat", flat, _FLAT, "surge"), ("tilted", tilted, _TILTED, "roll")):
         own = vehicle.layout.kinds[axis].axis
         commands = vehicle.layout.driving(own, 0.9)
         names = [*vehicle.layout.velocities, *vehicle.layout.angles]
         result = fmpy.simulate_fmu(
-            str(unzipped(vehicle, tmp_path / vehicle.identifier, fmi)),
+            str(folder_of(name, fmi)),
             fmi_type=kind,
             stop_time=2.0,
             output_interval=0.1,
@@ -105,6 +151,180 @@ def test_the_fmu_calculates_it(fmi: int, kind: str, flat: Vehicle, tilted: Vehic
         np.testing.assert_allclose(result["outside"], expected, rtol=1e-12, atol=1e-15)
         assert result["outside"][0] == pytest.approx(max((0.9 - _COMMAND) / _COMMAND, expected[0]))
         assert len({*result["outside"]}) > 3, "it changes"
+
+
+# ---- The calls of FMI ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=[("flat", 2), ("flat", 3), ("tilted", 2), ("tilted", 3)], ids=str)
+def fmu(request: pytest.FixtureRequest, folder_of: Callable[[str, int], Path]) -> Fmu:
+    name, fmi = request.param
+    return WRAPPERS[fmi](folder_of(name, fmi))
+
+
+@pytest.fixture(scope="module")
+def fmu3(folder_of: Callable[[str, int], Path]) -> fmi3.Fmu:
+    return fmi3.Fmu(folder_of("flat", 3))
+
+
+def _ranges(fmu: Fmu) -> Mapping[str, tuple[float, float]]:
+    return _TILTED if "eta" in fmu.states else _FLAT
+
+
+def _points(fmu: Fmu, number: int, seed: int) -> list[dict[str, float]]:
+    """Return random commands, velocities and attitudes; in turns, each kind is what may be outside."""
+    drawn = random.Random(seed)
+    found = []
+    for n in range(number):
+        command, velocity = ((0.5, 2.0), (0.95, 0.02), (0.5, 0.02))[n % 3]
+        point = {name: drawn.uniform(-command, command) for name in fmu.commands}
+        point |= {name: drawn.uniform(-velocity, velocity) for name in "uvwpqr" if name in fmu.variables}
+        if "phi_0" in fmu.parameters:
+            angle = 0.02 if n % 3 == 1 else 1.0
+            point |= {"phi_0": drawn.uniform(-angle, angle), "theta_0": drawn.uniform(-angle, angle), "psi_0": 2.0}
+        found.append(point)
+    return found
+
+
+def _read(rov: AnyInstance) -> dict[str, float]:
+    """Return the commands and the states of an instance."""
+    names = [*rov.fmu.commands, *rov.fmu.states]
+    return dict(zip(names, rov.get(names), strict=True))
+
+
+def _at(fmu: Fmu, point: Values, kind: int, mode: str) -> AnyInstance:
+    rov = fmu.instance(kind)
+    assert rov.set(point) == OK
+    rov.reach(mode)
+    return rov
+
+
+def _slope(values: Values, known: str, ranges: Mapping[str, tuple[float, float]]) -> float:
+    """Return the slope of the formula by a command or a state, computed in 50 digits."""
+    with mp.workdps(50):
+        exact = {name: mp.mpf(value) for name, value in values.items()}
+        h = mp.mpf(10) ** -20
+        low, high = (_expected({**exact, known: exact[known] + side * h}, ranges) for side in (-1, 1))
+        return float((high - low) / (2 * h))
+
+
+@pytest.mark.parametrize(("kind", "mode"), [c for c in EVERY_MODE if c[1] not in (INSTANTIATED, FAILED)], ids=str)
+def test_its_directional_derivatives_are_the_slopes_of_the_formula(fmu: Fmu, kind: int, mode: str) -> None:
+    """By each input and each state; it does not depend on the depth, on loads or on coefficients."""
+    moved = set()
+    for point in _points(fmu, 12, seed=2):
+        with _at(fmu, point, kind, mode) as rov:
+            values = _read(rov)
+            for known in (*fmu.inputs, *fmu.states):
+                expected = _slope({**values, known: values.get(known, 0.0)}, known, _ranges(fmu))
+                (found,) = rov.derivatives(["outside"], known)
+                assert found == pytest.approx(expected, rel=1e-11, abs=1e-14), (known, point)
+                moved |= {known} if found else set()
+    assert {*fmu.commands} & moved
+    assert {*_ranges(fmu)} & moved
+    assert ("eta" not in fmu.states) or {*QUATERNION} & moved
+
+
+@pytest.mark.parametrize("fmu", [("tilted", 2), ("tilted", 3)], indirect=True, ids=str)
+def test_at_the_start_it_follows_from_the_angles_that_are_parameters(fmu: Fmu) -> None:
+    for point in _points(fmu, 6, seed=3):
+        with _at(fmu, point, CO_SIMULATION, INITIALIZATION) as rov:
+            angles = {"phi": point["phi_0"], "theta": point["theta_0"]}
+            others = {name: value for name, value in point.items() if not name.endswith("_0")}
+            for name in angles:
+                slope = _slope({**others, **angles}, name, _ranges(fmu))
+                assert rov.derivatives(["outside"], f"{name}_0") == pytest.approx([slope], rel=1e-11, abs=1e-13)
+
+
+@pytest.mark.parametrize("name", ["u_l", "u", "r"])
+def test_exactly_at_an_end_its_derivative_is_that_of_the_inside(fmu3: fmi3.Fmu, name: str) -> None:
+    for end in (-_COMMAND, _COMMAND) if name == "u_l" else (min(_FLAT[name][0], 0.0), _FLAT[name][1]):
+        with _at(fmu3, {name: end}, CO_SIMULATION, INITIALIZATION) as rov:
+            assert rov.derivatives(["outside"], name) == [0.0]
+            assert rov.set({name: 1.01 * end or -0.01}) == OK
+            assert rov.derivatives(["outside"], name) != [0.0]
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(MODEL_EXCHANGE, CONTINUOUS), (CO_SIMULATION, STEP)])
+def test_its_adjoint_derivatives_are_the_same_row(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
+    knowns = [*fmu3.inputs, *(fmu3.states if kind == MODEL_EXCHANGE else ())]
+    for point in _points(fmu3, 6, seed=4):
+        with fmu3.instance(kind) as rov:
+            assert rov.set(point) == OK
+            rov.reach(mode)
+            values = _read(rov)
+            row = [_slope({**values, known: values.get(known, 0.0)}, known, _FLAT) for known in knowns]
+            assert rov.adjoint(["outside"], knowns, [1.0]) == pytest.approx(row, rel=1e-12, abs=1e-14)
+
+
+def test_its_derivative_by_time_is_the_chain_rule(fmu: Fmu) -> None:
+    """As the derivative of an output in Co-Simulation, with the commands held."""
+    found = []
+    for point in _points(fmu, 12, seed=5):
+        with _at(fmu, point, CO_SIMULATION, STEP) as rov:
+            values = _read(rov)
+            slopes = {name: _slope(values, name, _ranges(fmu)) for name in fmu.states}
+            rates = dict(zip(fmu.states, rov.get(fmu.derivatives), strict=True))
+            expected = sum(slopes[name] * rates[name] for name in fmu.states)
+            found += rov.rates(["outside"])
+            assert found[-1] == pytest.approx(expected, rel=1e-11, abs=1e-12)
+    assert any(found)
+
+
+def test_what_is_set_counts_at_once(fmu: Fmu) -> None:
+    """In every mode in which a command or a state can be set; `outside` itself cannot be set."""
+    for kind, mode in [c for c in EVERY_MODE if c[1] in (INITIALIZATION, EVENT, CONTINUOUS, STEP)]:
+        with fmu.instance(kind) as rov:
+            rov.reach(mode)
+            assert rov.get(["outside"]) == [0.0]
+            for point in _points(fmu, 6, seed=6):
+                values = {name: value for name, value in point.items() if name in fmu.settable(mode)}
+                assert rov.set(values) == OK
+                assert rov.get(["outside"]) == [pytest.approx(float(_expected(_read(rov), _ranges(fmu))), rel=1e-12)]
+            before = rov.save()
+            assert rov.set({"outside": 0.0}) == ERROR
+            assert "outside" in rov.log[-1].text
+            assert rov.save() == before
+
+
+@pytest.mark.parametrize("kind", [CO_SIMULATION, MODEL_EXCHANGE])
+def test_a_restored_state_has_it_again(fmu: Fmu, kind: int) -> None:
+    mode, moved = STEP if kind == CO_SIMULATION else CONTINUOUS, 0
+    for point in _points(fmu, 6, seed=7):
+        with _at(fmu, point, kind, mode) as rov, fmu.instance(kind, name="other") as other:
+            names = ["outside", *fmu.states]
+            saved, before = rov.save(), rov.get(names)
+            moved += before[0] > 0.0
+            first = rov.trajectory(range(5), 0.05) if kind == CO_SIMULATION else b""
+            assert rov.set(dict.fromkeys(fmu.commands, 0.9)) == OK
+            assert kind == CO_SIMULATION or rov.set({"u": 3.0}) == OK
+            assert rov.get(names) != before
+            for one in (rov, other):
+                assert one.load(saved) == OK
+                assert one.get(names) == before
+                assert kind == MODEL_EXCHANGE or one.trajectory(range(5), 0.05) == first
+    assert moved
+
+
+@pytest.mark.parametrize("kind", [MODEL_EXCHANGE, WITH_EVENTS])
+def test_in_event_mode_it_is_that_of_the_values_set(fmu3: fmi3.Fmu, kind: int) -> None:
+    """And in the mode after it: leaving Event Mode changes neither it nor its slopes."""
+    with fmu3.instance(kind) as rov:
+        rov.reach(EVENT)
+        for point in _points(fmu3, 6, seed=8):
+            assert rov.set(point) == OK
+            expected = float(_expected(_read(rov), _FLAT))
+            assert rov.get(["outside"]) == [pytest.approx(expected, rel=1e-12)]
+            rov.update()
+            rov.expect("EnterContinuousTimeMode" if kind == MODEL_EXCHANGE else "EnterStepMode")
+            values = _read(rov)
+            assert rov.get(["outside"]) == [pytest.approx(expected, rel=1e-12)]
+            for known in (*fmu3.commands, *"uwr"):
+                assert rov.derivatives(["outside"], known) == [pytest.approx(_slope(values, known, _FLAT), rel=1e-11)]
+            if kind != MODEL_EXCHANGE:
+                assert rov.step(rov.time(), 0.1) == OK
+                assert rov.get(["outside"]) == [pytest.approx(float(_expected(_read(rov), _FLAT)), rel=1e-12)]
+            rov.expect("EnterEventMode")
 
 
 def test_python_simulates_it(tilted: Vehicle) -> None:
