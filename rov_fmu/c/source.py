@@ -1,6 +1,6 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
@@ -204,25 +204,30 @@ class EquationSource:
         runs: list[tuple[str, str, int]] = []
         places: dict[tuple[str, ...], str] = {}
         while wanted:
-            candidates = {*wanted, *((b, a) for a, b in wanted if a)}
-            best: tuple[str, str, int] = ("", "", 0)
-            for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
-                place, length = states.index(second), 0
-                while (
-                    place + length < len(states)
-                    and (first, states[place + length]) in candidates
-                    and self.block_of[states[place + length]] == self.block_of[second]
-                ):
-                    length += 1
-                if length > best[2]:
-                    best = first, second, length
-            first, second, length = best
+            first, second, length = self._longest_run(wanted)
             for lane in range(length):
                 other = states[states.index(second) + lane]
                 places[first or other, other] = places[other, first or other] = f"p{len(runs)}[{lane}]"
                 wanted -= {(first, other), (other, first)}
-            runs.append(best)
+            runs.append((first, second, length))
         return runs, places
+
+    def _longest_run(self, wanted: Collection[tuple[str, str]]) -> tuple[str, str, int]:
+        """Return the longest run among some products; of several, the first in the order of the states."""
+        states = self.equation.states
+        candidates = {*wanted, *((b, a) for a, b in wanted if a)}
+        best: tuple[str, str, int] = ("", "", 0)
+        for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
+            place, length = states.index(second), 0
+            while (
+                place + length < len(states)
+                and (first, states[place + length]) in candidates
+                and self.block_of[states[place + length]] == self.block_of[second]
+            ):
+                length += 1
+            if length > best[2]:
+                best = first, second, length
+        return best
 
     def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""

@@ -10,7 +10,7 @@ the time from rest until p V_ss is reached, p = 1 - 1/e:
     D^2 = B^2 + 4 A |C|,    V_ss = 2 C / (B + D),    Tau = (2 / D) artanh(p / (1 + (1 - p) B / D)).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import e, inf
 
@@ -30,7 +30,7 @@ from .expression import (
     total,
     where,
 )
-from .forces import forces_of
+from .forces import Force, forces_of
 from .layout import Layout
 from .terms import equation_of
 
@@ -58,26 +58,29 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """
     equation = equation_of(layout)
     gain = equation.names("gain", velocity)
+    forces = [force for force in forces_of(layout, equation.names) if force.axis == velocity]
     constant: list[tuple[str, ...]] = [()]
     """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
     if not layout.by_velocity[velocity].axis.is_rotation:
         constant.append((entry(3, 3),))
-    loads: list[Expression] = []
-    drag: dict[str, list[Expression]] = {key + end: [] for end in ("", REVERSE) for key in POWERS.values()}
-    for force in (force for force in forces_of(layout, equation.names) if force.axis == velocity):
-        power = len(force.factors)
-        if force.factors in constant:
-            loads.append(scaled(force.sign, product(*force.coefficient)))
-        elif set(force.factors) == {velocity}:
-            if power not in POWERS:
-                raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
-            ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
-            drag[POWERS[power]].append(minus(ahead))
-            drag[POWERS[power] + REVERSE].append(astern if power % 2 == 0 else minus(astern))
-    forces = {force: Name(steady) for own in equation.lags.values() for force, steady in own.items()}
+    loads = [scaled(force.sign, product(*force.coefficient)) for force in forces if force.factors in constant]
+    formulas = _drag((force for force in forces if {*force.factors} == {velocity}), gain) | {"C": gain * total(loads)}
+    steady = {force: Name(name) for own in equation.lags.values() for force, name in own.items()}
     torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
-    formulas = {**{key: total(parts) for key, parts in drag.items()}, "C": gain * total(loads)}
-    return {key: replaced(formula, forces | torques) for key, formula in formulas.items()}
+    return {key: replaced(formula, steady | torques) for key, formula in formulas.items()}
+
+
+def _drag(forces: Iterable[Force], gain: Expression) -> dict[str, Expression]:
+    """Return the formulas of the drag by the keys of POWERS, ahead and in reverse. Raises ValueError."""
+    parts: dict[str, list[Expression]] = {key + end: [] for end in ("", REVERSE) for key in POWERS.values()}
+    for force in forces:
+        power = len(force.factors)
+        if power not in POWERS:
+            raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
+        ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
+        parts[POWERS[power]].append(minus(ahead))
+        parts[POWERS[power] + REVERSE].append(astern if power % 2 == 0 else minus(astern))
+    return {key: total(own) for key, own in parts.items()}
 
 
 def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:

@@ -10,7 +10,7 @@ Printing changes neither the order nor the association of operations, so C and P
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
 from itertools import groupby
@@ -481,9 +481,7 @@ Change: TypeAlias = "Expression | None"
 """The change of an expression, or None if it does not change."""
 
 
-def tangent(  # noqa: PLR0911 - a case for each operation
-    x: Expression, changes: Callable[[str], Change]
-) -> Change:
+def tangent(x: Expression, changes: Callable[[str], Change]) -> Change:
     """Return the change of an expression: the sum of its partial derivatives times the changes of its names.
 
     `changes` gives the change of a name by its identifier.
@@ -499,18 +497,23 @@ def tangent(  # noqa: PLR0911 - a case for each operation
         return None
     if len(args) == 1:
         return _of_function(x, args[0], of(d[0] or 0.0))
-    (a, b), (left, right) = d, args
+    return _of_two(x, args, d)
+
+
+def _of_two(x: Operation, args: Sequence[Expression], changes: Sequence[Change]) -> Change:
+    """Return the change of an operation with two arguments, by the changes of these."""
+    (a, b), (left, right) = changes, args
     match x.op:
         case "if":
             return where(x.args[0], a or 0.0, b or 0.0)
         case "+" | "-":
             return _added(a, x.op, b)
         case "*":
-            return _added(a and a * right, "+", b and left * b)
+            return _added(_times(a, right), "+", b and left * b)
         case "/":
             return of(_added(a, "-", b and x * b) or 0.0) / right
         case "atan2":
-            rate = _added(a and a * right, "-", b and b * left)
+            rate = _added(_times(a, right), "-", _times(b, left))
             return of(rate or 0.0) / (left * left + right * right)
     assert x.op == "pow"  # the base is not negative
     logarithm = where(left > 0.0, call("log", left), 0.0)
@@ -545,6 +548,10 @@ def _of_function(x: Operation, argument: Expression, change: Expression) -> Expr
         "cos": lambda: -call("sin", argument) * change,
     }
     return slopes[x.op]() if x.op in slopes else call(slope_name(x.op), argument) * change
+
+
+def _times(change: Change, factor: Expression) -> Change:
+    return change and change * factor
 
 
 def _added(a: Change, op: str, b: Change) -> Change:

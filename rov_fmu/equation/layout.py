@@ -5,7 +5,7 @@ variables. Thrusters are the tables of the vehicle file themselves.
 """
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot, inf, sin
@@ -528,18 +528,14 @@ class Layout:
             Owner(("arm",), {key: key for key in ARM if self.has_arm}, ARM, {}),
             Owner(("commands",), {key: key for key in dead_time}, COMMANDS, {}),
         ]
-        for curve in self.curves:
-            words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-            names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
-            found.append(Owner(("curves", curve.name), names, CURVE, words))
-        for fin in self.fins:
-            names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
-            found.append(Owner(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"}))
+        return (*found, *map(_of_curve, self.curves), *map(_of_fin, self.fins), *self._owners_of_axes)
+
+    @property
+    def _owners_of_axes(self) -> Iterator[Owner]:
         for kinds in (AXIS, TUNING):
             for form in self.axes:
                 names = {key: form.coefficient(key) for key in kinds if kinds is TUNING or key in form.keys}
-                found.append(Owner(("axes", form.axis.name), names, kinds, axis_words(form.axis)))
-        return tuple(found)
+                yield Owner(("axes", form.axis.name), names, kinds, axis_words(form.axis))
 
     @cached_property
     def keys_in_file(self) -> dict[str, tuple[str, ...]]:
@@ -714,6 +710,17 @@ class Layout:
         """The curves whose thrusters turn the vehicle."""
         driving = {t.curve for t in self.drivers(YAW)} if self.has(YAW) else set()
         return tuple(curve for curve in self.curves if curve.name in driving)
+
+
+def _of_curve(curve: Curve) -> Owner:
+    words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
+    names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
+    return Owner(("curves", curve.name), names, CURVE, words)
+
+
+def _of_fin(fin: Fin) -> Owner:
+    names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
+    return Owner(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
 
 
 def _pushes(direction: tuple[float, float, float]) -> str:

@@ -77,22 +77,8 @@ class MassMatrix:
 
     def _inverse_of(self, block: tuple[str, ...]) -> dict[str, Expression]:
         """Return formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
-        found: dict[str, Expression] = {}
         pivot = {axis: self.names("pivot", axis) for axis in block}
-        factor: dict[tuple[str, str], Name] = {}
-        for n, row in enumerate(block):  # M = L D L^T, row by row; L has the factors, D the pivots
-            for m, column in enumerate(block[:n]):
-                parts: list[Expression] = [self._name("mass", column, row)] if (column, row) in self.entries else []
-                parts += [
-                    minus(factor[row, k] * factor[column, k] * pivot[k])
-                    for k in block[:m]
-                    if {(row, k), (column, k)} <= factor.keys()
-                ]
-                if parts:
-                    factor[row, column] = self._name("factor", row, column)
-                    found[factor[row, column].identifier] = total(parts) / pivot[column]
-            squares = [minus(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
-            found[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
+        found, factor = self._decomposed(block, pivot)
         for n, row in enumerate(block):  # K L = 1, from the diagonal outwards; K has the names undo_..
             for m in reversed(range(n)):
                 column = block[m]
@@ -108,6 +94,27 @@ class MassMatrix:
                     for k in block[block.index(column) :]
                 )
         return found
+
+    def _decomposed(
+        self, block: tuple[str, ...], pivot: Mapping[str, Name]
+    ) -> tuple[dict[str, Expression], dict[tuple[str, str], Name]]:
+        """Return formulas for M = L D L^T, row by row, and the names of the factors in L. D has the pivots."""
+        found: dict[str, Expression] = {}
+        factor: dict[tuple[str, str], Name] = {}
+        for n, row in enumerate(block):
+            for m, column in enumerate(block[:n]):
+                parts: list[Expression] = [self._name("mass", column, row)] if (column, row) in self.entries else []
+                parts += [
+                    minus(factor[row, k] * factor[column, k] * pivot[k])
+                    for k in block[:m]
+                    if {(row, k), (column, k)} <= factor.keys()
+                ]
+                if parts:
+                    factor[row, column] = self._name("factor", row, column)
+                    found[factor[row, column].identifier] = total(parts) / pivot[column]
+            squares = [minus(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
+            found[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
+        return found, factor
 
     def coriolis(self, axis: str) -> dict[tuple[str, str], Expression]:
         """Return the coefficients of products of two velocities in the acceleration of an axis, as formulas."""

@@ -39,25 +39,16 @@ def equation_text(layout: Layout) -> str:
     def places(names: Iterable[str]) -> dict[str, int]:
         return {name: states.index(name) for name in names}
 
-    dynamic = []
-    for group in equation.dynamic:
-        others = {name for state in group for name in equation.states_in_rate[state]}.difference(group)
-        dynamic.append(([*places(group).values()], [*places(sorted(others, key=states.index)).values()]))
-
-    def shared(names: Iterable[str]) -> list[int]:
-        return [states.index(name) for name in names if name in states]
-
     entries = [entry(row, column) for row in (1, 2, 3) for column in (1, 2, 3)]
-    groups = [shared(names) for names in ("uvwpqr", ("x", "y", "z", "psi"), entries, quaternion)]
+    alike = ("uvwpqr", ("x", "y", "z", "psi"), entries, quaternion)
+    groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
     return f"""\
 STATES = {tuple(states)!r}
 MONITORED = {places(equation.monitored)!r}  # velocities on whose direction coefficients depend, and their places
-DYNAMIC = {dynamic!r}  # the groups of states that may settle, each with those on which it depends
 OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets from the start
-GROUPS = {[*filter(None, groups)]!r}  # of like size
-TURNING = {shared("pqr")!r}  # the angular velocities
+GROUPS = {[*filter(None, groups)]!r}  # the states of like size
 QUATERNION = {places(quaternion)!r}
 PIVOTS = {[name.identifier for name in equation.names.of_kind("pivot")]!r}  # of the mass matrix, all above 0
 {_tables(equation)}

@@ -3,8 +3,7 @@
 The method has the coefficients of DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993).
 It is a second, independent way to the step that fmu_src/c computes by Taylor series. It moves a `model`: a module that
 printed.py prints for each vehicle. Forces that lag follow their exponential, which makes nothing stiff. A substep ends
-where a velocity reverses, because drag then has other coefficients. Once nothing changes any more, the rest of the step
-is straight motion, or circular motion whose whole turns are all alike.
+where a velocity reverses, because drag then has other coefficients.
 """
 
 from bisect import bisect_right
@@ -14,7 +13,7 @@ from math import atan2, copysign, hypot, inf, isfinite, nan, sqrt, tau
 from typing import Any, NamedTuple
 
 MOST_SUBSTEPS = 100_000
-"""The largest number of substeps that a step may try. Only a motion that never settles needs more."""
+"""The largest number of substeps that a step may try. Hours of a fast turn or of a fast decay need more."""
 MOST_WAITING = 1024
 """The largest number of changes of commands that may wait for the dead time, as in fmu_src/c/delay.c."""
 BESIDE_NOSE = (1.0, 1e-6, 0.618e-6)
@@ -24,7 +23,6 @@ The heading of the nose jumps by half a turn where the nose passes the vertical,
 
 _EPSILON = 2.0**-52
 _TOLERANCE = 64.0 * _EPSILON  # of the estimated error, which is far above the true one; rounding gives up to 40
-_FADED = 1e-14  # a state below this share of its largest size acts no more
 _SHARE = 1e-3  # a velocity below this share of the largest needs no smaller errors than one of this share
 _SHORTEST = 1e-30  # a substep in s; a motion that needs shorter ones overflows
 _TABLE = """
@@ -77,8 +75,6 @@ class Motion:
     def __init__(self, model: Any, values: Mapping[str, float]) -> None:
         self.model, self.values, self.time, self.tried = model, dict(values), 0.0, 0
         self.direction = dict.fromkeys(model.MONITORED, 1.0)
-        self.settled: set[int] = set()
-        """The places of the states that do not change any more."""
         self.hold()
         starts = {**model.numbers(self.values), **values, **dict.fromkeys(model.OFFSETS, 0.0)}
         self.y: State = [starts[name] for name in model.STATES]
@@ -95,8 +91,6 @@ class Motion:
     def rates(self, after: float, y: State) -> State:
         """Return the rates of the states some seconds after the start of the substep."""
         rates: State = self.of_model(self.time + after, y)
-        for i in self.settled:
-            rates[i] = 0.0
         return rates
 
     def begin(self) -> None:
@@ -119,29 +113,8 @@ class Motion:
         """Return True if the rate of a state is a rounding error of its terms."""
         return abs(rate) <= 16.0 * _EPSILON * self.terms[i]
 
-    def move(self, h: float) -> bool:
-        """Move for h seconds. Return False if the motion overflows or needs too many substeps.
-
-        Once all has settled, whole turns are skipped, because each changes the offsets by the same.
-        """
-        rest = self.substeps(h)
-        turn = tau / (hypot(*(self.y[i] for i in self.model.TURNING)) or nan)
-        if self.has_settled and rest > 2.0 * turn:
-            before, heading = list(self.y), self.heading
-            if self.substeps(turn) > 0.0:
-                return False
-            turns, rest = divmod(rest - turn, turn)
-            self.heading += turns * (self.heading - heading)
-            for i in self.model.OFFSETS.values():
-                self.y[i] += turns * (self.y[i] - before[i])
-            for i in self.model.QUATERNION.values() if turns % 2.0 else ():
-                self.y[i] *= -1.0
-            self.begin()
-        rest = self.substeps(rest)
-        return rest == 0.0
-
-    def substeps(self, rest: float) -> float:
-        """Move for a time, or until nothing changes any more. Return the rest of the time."""
+    def move(self, rest: float) -> bool:
+        """Move for a time. Return False if the motion overflows or needs too many substeps."""
         h, shortest = rest, min(_SHORTEST, _SHORTEST * rest)
         while rest > 0.0 and h > shortest and self.tried < MOST_SUBSTEPS:
             self.tried += 1
@@ -160,10 +133,8 @@ class Motion:
             self.y, self.time, rest = y, self.time + length, rest - length
             self.heading = self.turned(y, self.heading)
             self.begin()
-            if not self.has_settled and self.settle(length):
-                break
             h *= min(6.0, 0.9 * (error or 1e-9) ** -0.125)
-        return rest
+        return rest == 0.0
 
     def trial(self, h: float) -> tuple[State, float]:
         """Return the states after a substep, and the largest error relative to the tolerance."""
@@ -228,30 +199,6 @@ class Motion:
                     self.rate = self.rates(0.0, self.y)
                 return 0.5 * h, None
         return found
-
-    def settle(self, h: float) -> bool:
-        """Find the components that do not change any more, and return True if these are all.
-
-        The others on which such a component depends have settled, and its rates are rounding errors, once those of its
-        states that have faded are put to rest. `h` is the length of the last substep.
-        """
-        for group, inputs in self.model.DYNAMIC:
-            if self.settled.isdisjoint(group) and self.settled.issuperset(inputs):
-                y = list(self.y)
-                for i in group:
-                    if abs(y[i]) <= _FADED * (self.size[i] + h * self.terms[i]):
-                        y[i] = 0.0
-                rates, terms = self.rates(0.0, y), self.model.sizes(self.held, self.time, y)
-                if all(abs(rates[i]) <= 16.0 * _EPSILON * terms[i] for i in group):
-                    self.settled |= set(group)
-                    self.y = y
-                    self.begin()
-        return self.has_settled
-
-    @property
-    def has_settled(self) -> bool:
-        """True if only the orientation and the offsets still change."""
-        return all(map(self.settled.issuperset, (group for group, _ in self.model.DYNAMIC)))
 
     # ---- Attitude ----
 

@@ -222,12 +222,10 @@ def equation_of(layout: Layout) -> Equation:
 
     Raises ValueError when two thrust tables have the same name.
     """
-    measured = [table for curve in layout.curves for table in curve.tables]
-    tables = {table.function: table for table in measured}
-    if len(tables) < len(measured):
-        raise ValueError("two thrust tables have the same name")
-    by_attitude = rotation_formulas() | quaternion_formulas() if layout.has_attitude else {}
-    table = _Table(layout, Names([*layout.places, *by_attitude]))
+    rotation, quaternion, angles = (
+        (rotation_formulas(), quaternion_formulas(), angle_formulas()) if layout.has_attitude else ({}, {}, {})
+    )
+    table = _Table(layout, Names([*layout.places, *rotation, *quaternion]))
     rows: Rows = {v: table.motion(v) for v in layout.velocities}
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
@@ -239,8 +237,7 @@ def equation_of(layout: Layout) -> Equation:
     starts |= products
     if "cos_psi" in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
-    if layout.has_attitude:
-        starts |= rotation_formulas()
+    starts |= rotation
     return Equation(
         table.parameters,
         table.directed,
@@ -248,20 +245,34 @@ def equation_of(layout: Layout) -> Equation:
         table.forces,
         {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
-        {
-            table.names("arrived", curve.name).identifier: {
-                f"F_{t.name}": steady_name(t.name, curve, table.names).identifier
-                for t in layout.thrusters
-                if t.curve == curve.name
-            }
-            for curve in layout.curves
-            if curve.has_lag
-        },
-        outputs=(angle_formulas() if layout.has_attitude else {}) | _outside(layout, table.names),
-        ends=quaternion_formulas() if layout.has_attitude else {},
-        tables=tables,
+        _lags(layout, table.names),
+        outputs=angles | _outside(layout, table.names),
+        ends=quaternion,
+        tables=_tables(layout),
         names=table.names,
     )
+
+
+def _tables(layout: Layout) -> dict[str, ThrustTable]:
+    """Return the thrust tables by the functions that formulas call. Raises ValueError when two have the same name."""
+    measured = [table for curve in layout.curves for table in curve.tables]
+    tables = {table.function: table for table in measured}
+    if len(tables) < len(measured):
+        raise ValueError("two thrust tables have the same name")
+    return tables
+
+
+def _lags(layout: Layout, names: Names) -> dict[str, dict[str, str]]:
+    """Return for the progress of each lag the forces that lag, each with its steady force."""
+    return {
+        names("arrived", curve.name).identifier: {
+            f"F_{t.name}": steady_name(t.name, curve, names).identifier
+            for t in layout.thrusters
+            if t.curve == curve.name
+        }
+        for curve in layout.curves
+        if curve.has_lag
+    }
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
@@ -431,6 +442,15 @@ def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
         if "m_a" in form.keys:
             inertia = inertia + Name(form.coefficient("m_a"))
         gains[form.axis.velocity] = Name(form.axis.coefficient("beta")) / inertia
+    entries = {}
+    for pair, sums in _inertia_of_two_axes(layout).items():
+        betas = product(*(Name(f"beta_{axis}") for axis in pair if axis in gains))
+        entries[pair] = total(sums) / call("sqrt", betas)
+    return MassMatrix(gains, entries, names)
+
+
+def _inertia_of_two_axes(layout: Layout) -> dict[tuple[str, str], list[Expression]]:
+    """Return the parts of the entries beside the diagonal, before the tuning: added mass, and the centre of mass."""
     parts: dict[tuple[str, str], list[Expression]] = {}
     for key, *axes in layout.cross:
         if key == "m_a":
@@ -438,14 +458,10 @@ def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
     # with the coupling, momentum along an axis that the vehicle lacks still acts on its other axes
     moves = layout.coupled and layout.has(SURGE, SWAY, HEAVE)
     for pair, (sign, coordinate) in _OF_CENTRE.items():
-        present = [axis for axis in pair if axis in gains]
+        present = [axis for axis in pair if axis in layout.by_velocity]
         if coordinate in layout.restoring and (len(present) == 2 or (present and moves)):
             parts.setdefault(pair, []).append(scaled(sign, Name("m_rov") * Name(coordinate)))
-    entries = {}
-    for pair, sums in parts.items():
-        betas = product(*(Name(f"beta_{axis}") for axis in pair if axis in gains))
-        entries[pair] = total(sums) / call("sqrt", betas)
-    return MassMatrix(gains, entries, names)
+    return parts
 
 
 _OF_CENTRE = {

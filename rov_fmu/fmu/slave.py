@@ -149,7 +149,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             return False
         if not all(map(isfinite, after.values())):
             self.log(
-                f"the motion overflows within {step_size!r} s, or never settles and needs shorter steps.",
+                f"the motion overflows within {step_size!r} s, or needs more than {step.MOST_SUBSTEPS} substeps.",
                 Fmi2Status.error,
             )
             return False

@@ -7,7 +7,7 @@ over time, whose headers are names.
 import csv
 import re
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -143,35 +143,26 @@ def read_columns(
     file = _CsvFile(path, open_stream)
     lines = iter(file)
     line, titles = next(lines)
-    header = [renamed.get(title, title) for title in titles]
+    header = [*map(renamed.get, titles, titles)]
     file_columns = _find_columns(path, line, header, columns, others, hint)
-    names = [column.name for column in file_columns.values()]
     headers = {column.name: header[place] for place, column in file_columns.items()}
-    if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in file_columns])]:
-        raise DataFileError(*(f"{path}, line {line}: {reason}" for reason in reasons))
-
-    def by_column(cells: list[str]) -> dict[str, str]:
-        texts = (cells[place] if place < len(cells) else "" for place in file_columns)
-        return dict(zip(names, texts, strict=True))
-
-    def rows() -> Iterator[Mapping[str, str]]:
-        return (by_column(cells) for _, cells in islice(file, 1, None) if len(cells) <= len(header))
-
-    values = {name: array("d") for name in names}
-    row_lines = array("L")
-    unread = {name: array("L") for name in names}
     torn, wrong = _Mistakes(path), _Mistakes(path)
+    for reason in check_header(headers, _others(header, file_columns)):
+        wrong.add(f"{path}, line {line}: {reason}")
+    wrong.check()
+    values = {name: array("d") for name in headers}
+    row_lines = array("L")
+    unread = {name: array("L") for name in headers}
     for line, cells in lines:
         if len(cells) > len(header):
             (torn if loose else wrong).add(file.too_many(line, cells, len(header)))
             continue
         row_lines.append(line)
-        for (place, column), cell in zip(file_columns.items(), by_column(cells).values(), strict=True):
+        for (place, column), cell in zip(file_columns.items(), _by_column(cells, file_columns).values(), strict=True):
             try:
                 value = _value(cell, place < len(cells), column, loose)
             except ValueError as error:
-                content = f" = {shown(cell)}" if cell else ""
-                wrong.add(f"{path}, line {line}, column {shown(header[place])}{content}: {error}")
+                wrong.add(f"{path}, line {line}, column {shown(header[place])}{_content(cell)}: {error}")
                 continue
             values[column.name].append(value)
             if isnan(value) and not _is_blank(cell):
@@ -181,8 +172,32 @@ def read_columns(
     wrong.check()
     if not row_lines:
         raise DataFileError(f"{path}, line {line}: {_NO_ROWS}")
-    units = {column.name: column.unit for column in file_columns.values()}
-    return Columns(path, titles, headers, units, values, row_lines, unread, torn.count, rows)
+    return Columns(
+        path,
+        titles,
+        headers,
+        {column.name: column.unit for column in file_columns.values()},
+        values,
+        row_lines,
+        unread,
+        torn.count,
+        partial(_rows, file, file_columns, len(header)),
+    )
+
+
+def _rows(file: "_CsvFile", file_columns: Mapping[int, FileColumn], width: int) -> Iterator[Mapping[str, str]]:
+    """Yield the cells of each row that has not more of them than the header, by column."""
+    return (_by_column(cells, file_columns) for _, cells in islice(file, 1, None) if len(cells) <= width)
+
+
+def _content(cell: str) -> str:
+    """Return the content of a cell for a message; empty for an empty cell."""
+    return f" = {shown(cell)}" if cell else ""
+
+
+def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict[str, str]:
+    """Return the cells of a row that are read, by column. One that the row does not have is empty."""
+    return {column.name: cells[place] if place < len(cells) else "" for place, column in file_columns.items()}
 
 
 def read_header(path: Path, open_stream: Callable[[], TextIO] | None = None) -> list[str]:
@@ -343,17 +358,27 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
                 return column.parse(text)
         if loose:
             return nan
-        hint = ""
-        if "," in text and NUMBER.fullmatch(text.replace(",", ".", 1)):
-            hint = " with a decimal point, unless ; separates the columns"
-        elif ";" in text or "\t" in text:
-            hint = "; what separates the cells must be the same as in the header"
-        elif not any(map(str.isdigit, text)):
-            hint = "; leave out the row if nothing was measured"
-        raise ValueError(f"must be a number{hint}")
+        raise ValueError(_why_no_number(text))
     value = file_column.convert(number)
-    if file_column.unit in column.conversions:
-        return value
+    if file_column.unit not in column.conversions:
+        _check_bounds(value, column, factor)
+    return value
+
+
+def _why_no_number(text: str) -> str:
+    """Return what a cell must be that is not a number."""
+    hint = ""
+    if "," in text and NUMBER.fullmatch(text.replace(",", ".", 1)):
+        hint = " with a decimal point, unless ; separates the columns"
+    elif ";" in text or "\t" in text:
+        hint = "; what separates the cells must be the same as in the header"
+    elif not any(map(str.isdigit, text)):
+        hint = "; leave out the row if nothing was measured"
+    return f"must be a number{hint}"
+
+
+def _check_bounds(value: float, column: Column, factor: float) -> None:
+    """Raise ValueError if a value is out of the bounds of its column, which the message gives in the file's unit."""
     lower, upper = ("least", "most") if factor > 0.0 else ("most", "least")
     if column.minimum is not None and value < column.minimum:
         raise ValueError(f"must be at {lower} {column.minimum * factor:g}")
@@ -362,7 +387,6 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
     if 0.0 < abs(value) < column.least:
         least = column.least * abs(factor)
         raise ValueError(f"must be 0, or {least:g} at least, or {-least:g} at most")
-    return value
 
 
 def _why_no_variable(header: Sequence[str], place: int, why_wrong: Callable[[str], str | None]) -> str | None:
@@ -384,11 +408,9 @@ def _find_columns(
     """Return the columns that are read, by their index in the header. Raises DataFileError."""
     known = KnownColumns(columns)
     if not any(_may_be_header(title, known) for title in header[:_MOST_COMPARED]):
-        needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
-        reason = f"the first line must be a header that names the columns, such as {needed}"
-        if all(any(map(str.isalpha, title)) for title in header):
-            reason = f"none of these headers is known; the first line must have the headers {needed}{hint}"
-        raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
+        raise DataFileError(
+            f"{path}, line {line} = {shown(', '.join(header))}: {_why_no_header(header, columns, hint)}"
+        )
     file_columns: dict[int, FileColumn] = {}
     names: set[str] = set()
     wrong = []
@@ -405,15 +427,33 @@ def _find_columns(
             wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}{end}")
     missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
-        first, *more = (repr(_title(name, column)) for name, column in missing.items())
-        reason = ", and so is ".join([f"{first} is missing", *more])
-        unread = {_name_and_unit(title)[0]: title for place, title in enumerate(header) if place not in file_columns}
-        near = [shown(unread[name]) for wanted in missing for name in similar(wanted, [*unread][:_MOST_COMPARED])]
-        hint = f"; is it the column {' or '.join(near)}?" if near else f"{_listed_titles(unread)}{hint}"
-        wrong.append(f"{path}, line {line}, column {len(header) + 1}: {reason}{hint}")
+        reason = _what_lacks(missing, _others(header, file_columns), hint)
+        wrong.append(f"{path}, line {line}, column {len(header) + 1}: {reason}")
     if wrong:
         raise DataFileError(*wrong[:MOST])
     return file_columns
+
+
+def _why_no_header(header: Sequence[str], columns: Mapping[str, Column], hint: str) -> str:
+    """Return what the first line of a file must be, none of whose headers is known."""
+    needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
+    if all(any(map(str.isalpha, title)) for title in header):
+        return f"none of these headers is known; the first line must have the headers {needed}{hint}"
+    return f"the first line must be a header that names the columns, such as {needed}"
+
+
+def _others(header: Sequence[str], read: Container[int]) -> list[str]:
+    """Return the headers of the columns that are not read."""
+    return [title for place, title in enumerate(header) if place not in read]
+
+
+def _what_lacks(missing: Mapping[str, Column], others: Iterable[str], hint: str) -> str:
+    """Return words about the columns that are missing, with the other headers that may be meant by them."""
+    unread = {_name_and_unit(title)[0]: title for title in others}
+    first, *more = (repr(_title(name, column)) for name, column in missing.items())
+    reason = ", and so is ".join([f"{first} is missing", *more])
+    near = [shown(unread[name]) for wanted in missing for name in similar(wanted, [*unread][:_MOST_COMPARED])]
+    return reason + (f"; is it the column {' or '.join(near)}?" if near else f"{_listed_titles(unread)}{hint}")
 
 
 def _listed_titles(unread: Mapping[str, str]) -> str:

@@ -233,12 +233,7 @@ def _problem_line(problem: ErrorDetails, data: Toml, model: type[Strict]) -> str
     is_table = isinstance(value, dict)
     key = brief(_key(place, data))
     if isinstance(last, int) and (kind == "missing" or not (is_table or _is_table(_declared(model, place)))):
-        whole: Any = data  # of an entry that is no table, the whole list is shown
-        for step in above:
-            whole = whole[step]
-        entries = len(get_args(_declared(model, tuple(above))))
-        reason = f"must have {entries} entries" if kind == "missing" else f"entry {last + 1} {_reason(problem, model)}"
-        return f"{brief(_key(tuple(above), data))} = {shown(whole)}: {reason}"
+        return _entry_line(problem, last, data, model)
     if kind == "missing":
         constant = _constant(_declared(model, place))
         return f"{key}: this key is missing" + (f": write {last} = {json.dumps(constant)}" if constant else "")
@@ -251,6 +246,18 @@ def _problem_line(problem: ErrorDetails, data: Toml, model: type[Strict]) -> str
     if is_table and kind in ("value_error", "list_type"):
         return f"{key}: {reason}"
     return f"{key} = {shown([*value] if isinstance(value, tuple) else value)}: {reason}"
+
+
+def _entry_line(problem: ErrorDetails, number: int, data: Toml, model: type[Strict]) -> str:
+    """Return the line for a problem with an entry of a list that is no table. It shows the whole list."""
+    *above, _ = problem["loc"]
+    whole: Any = data
+    for step in above:
+        whole = whole[step]
+    entries = len(get_args(_declared(model, tuple(above))))
+    is_missing = problem["type"] == "missing"
+    reason = f"must have {entries} entries" if is_missing else f"entry {number + 1} {_reason(problem, model)}"
+    return f"{brief(_key(tuple(above), data))} = {shown(whole)}: {reason}"
 
 
 def _reason(problem: ErrorDetails, model: type[Strict]) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import sin
+from typing import Any
 
 from rov_fmu.equation.catalogue import (
     ARM,
@@ -28,6 +29,7 @@ from rov_fmu.equation.catalogue import (
 from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line
+from rov_fmu.vehicle import schema
 from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
 from rov_fmu.vehicle.schema import Body, Estimated, File, Tables, given_quantities
@@ -60,10 +62,15 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
-        for title, alternative in parts.alternatives.items():
-            yield from check_quantities(f"alternatives.{title}", alternative.quantities, layout.coefficients)
-        if "estimates" not in lost:
-            yield from _check_estimates(parts.estimates, parts.quantities(layout))
+        yield from _check_named_coefficients(parts, layout, lost)
+
+
+def _check_named_coefficients(parts: File, layout: Layout, lost: set[str]) -> Iterator[str]:
+    """Check the tables whose keys are names of coefficients: [alternatives] and [estimates]."""
+    for title, alternative in parts.alternatives.items():
+        yield from check_quantities(f"alternatives.{title}", alternative.quantities, layout.coefficients)
+    if "estimates" not in lost:
+        yield from _check_estimates(parts.estimates, parts.quantities(layout))
 
 
 def check_names_and_keys(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
@@ -82,25 +89,35 @@ def check_names_and_keys(parts: Tables, lost: set[str], data: Toml) -> Iterator[
 
 def _check_names(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
     """Check the names of thrusters, curves and inputs."""
-    entries = data["thruster"] if isinstance(data.get("thruster"), list) else []
+    entries = _found(data, "thruster", list)
     thrusters = [(n, entry) for n, entry in enumerate(entries) if isinstance(entry, dict)]
     names = [(n, entry["name"]) for n, entry in thrusters if isinstance(entry.get("name"), str)]
     yield from _check_distinct([(f"thruster#{n + 1}", name) for n, name in names], ".name")
-    curves = list(data["curves"]) if isinstance(data.get("curves"), dict) else []
+    curves = [*_found(data, "curves", dict)]
     yield from _check_distinct([(f"curves.{name}", name) for name in curves])
     yield from _check_distinct([(f"inputs.{name}", name) for name in parts.inputs])
     for n, entry in thrusters:
         if curves and isinstance(curve := entry.get("curve"), str) and curve not in curves:
             reason = f"there is no such curve{only(curve, curves, join_names(curves))}"
             yield key_line(f"{entry_label('thruster', entries, n)}.curve", reason, curve)
-    if "thruster" in lost:
-        return
+    if "thruster" not in lost:
+        yield from _check_use(parts, lost, [name for _, name in names])
+
+
+def _found(data: Toml, key: str, kind: type[Any]) -> Any:
+    """Return what a file has for a key, or something empty if that is not of its kind."""
+    found = data.get(key)
+    return found if isinstance(found, kind) else kind()
+
+
+def _check_use(parts: Tables, lost: set[str], thrusters: Sequence[str]) -> Iterator[str]:
+    """Check that thrusters have the curves, and that inputs drive the thrusters."""
     used = {thruster.curve for thruster in parts.thruster}
     for name in parts.curves:
         if name not in used:
             yield key_line(f"curves.{name}", "no thruster has this curve")
     if "inputs" not in lost:
-        yield from _check_gains(parts.inputs, [*(name for _, name in names), *(fin.name for fin in parts.fin)])
+        yield from _check_gains(parts.inputs, [*thrusters, *(fin.name for fin in parts.fin)])
 
 
 def _check_distinct(names: Sequence[tuple[str, str]], key: str = "") -> Iterator[str]:
@@ -151,40 +168,38 @@ def _check_keys(parts: Tables) -> Iterator[str]:
 
 def check_tables_of_thrust(parts: Tables) -> Iterator[str]:
     """Check that each curve has either coefficients or tables, and that its voltages are complete."""
-    needs_voltage = False
     for name, curve in parts.curves.items():
-        given = given_quantities(curve, CURVE)
-        place, key = f"curves.{name}", "table" if curve.table else "tables" if curve.tables else None
-        if curve.table and curve.tables:
-            yield key_line(f"{place}.tables", "must not be given together with table")
-        if key:
-            replaced = (*REPLACED_BY_TABLE, *(("V_0", "n_V") if curve.tables else ()))
-            yield from (
-                key_line(f"{place}.{other}", f"must not be given together with {key}")
-                for other in replaced
-                if other in given
-            )
-        else:
-            yield from (
-                key_line(f"{place}.{other}", "this key is missing") for other in ("a_t", "b_t") if other not in given
-            )
-            if "k_t" in given:
-                yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
-        for one, other in (("V_0", "n_V"), ("n_V", "V_0")):
-            if one in given and other not in given:
-                yield key_line(f"{place}.{other}", f"this key is missing, and {one} is there")
-        needs_voltage |= "V_0" in given or bool(curve.tables)
+        yield from _check_keys_of_thrust(f"curves.{name}", curve)
         if curve.tables and parts.battery:
             low, high = curve.tables[0].voltage, curve.tables[-1].voltage
             if not low <= parts.battery.voltage.value <= high:
                 reason = f"must be within the {low:g} ... {high:g} V of the tables of curves.{name}"
                 yield key_line("battery.voltage.value", reason, parts.battery.voltage.value)
+    needs_voltage = any(curve.V_0 or curve.tables for curve in parts.curves.values())
     if needs_voltage and not parts.battery:
         yield key_line("battery", "this table with the voltage is missing, and the thrust of a curve depends on it")
     elif parts.battery and not needs_voltage:
         yield key_line(
             "battery", "no thrust depends on the voltage: give a curve V_0 and n_V, or tables; or leave it out"
         )
+
+
+def _check_keys_of_thrust(place: str, curve: schema.Curve) -> Iterator[str]:
+    """Check that a curve has either coefficients or tables, and both keys of its voltage or neither."""
+    given = given_quantities(curve, CURVE)
+    if curve.table and curve.tables:
+        yield key_line(f"{place}.tables", "must not be given together with table")
+    if curve.table or curve.tables:
+        replaced = (*REPLACED_BY_TABLE, *(("V_0", "n_V") if curve.tables else ()))
+        reason = f"must not be given together with {'table' if curve.table else 'tables'}"
+        yield from (key_line(f"{place}.{key}", reason) for key in replaced if key in given)
+    else:
+        yield from (key_line(f"{place}.{key}", "this key is missing") for key in ("a_t", "b_t") if key not in given)
+        if "k_t" in given:
+            yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
+    for one, other in (("V_0", "n_V"), ("n_V", "V_0")):
+        if one in given and other not in given:
+            yield key_line(f"{place}.{other}", f"this key is missing, and {one} is there")
 
 
 def _check_electric_currents(parts: File) -> Iterator[str]:

@@ -4,13 +4,13 @@ Each mistake gives one line.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise
 from math import hypot, sqrt
 from typing import Any
 
 from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
@@ -39,18 +39,25 @@ def check_layout(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
 def check_thruster_places(layout: Layout) -> Iterator[str]:
     """Check that each thruster has either a position or an arm, where the vehicle turns."""
     losing = {curve.name for curve in layout.curves if "d" in curve.keys}
+    turning = [axis.name for axis in (ROLL, PITCH, YAW) if layout.has(axis)]
     for thruster in layout.thrusters:
         key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction.value
-        if thruster.arm and thruster.position:
-            yield key_line(f"{key}.arm", "must not be given together with position")
-        elif thruster.arm and x <= 0.0:
-            yield key_line(f"{key}.arm", "must be of a thruster that pushes ahead; give its position instead")
-        elif thruster.arm and thruster.curve in losing:
-            yield key_line(f"{key}.arm", f"d of the curve {thruster.curve} needs a place: give the thruster's position")
-        elif not thruster.arm and thruster.position is None:
-            turning = [axis.name for axis in (ROLL, PITCH, YAW) if layout.has(axis)]
-            if layout.has_attitude or (turning and hypot(x, y) > _PARALLEL):
-                yield key_line(f"{key}.position", f"this key, or arm, is missing, and the vehicle has {turning[0]}")
+        if thruster.arm:
+            if reason := _why_no_arm(thruster, losing):
+                yield key_line(f"{key}.arm", reason)
+        elif thruster.position is None and (layout.has_attitude or (turning and hypot(x, y) > _PARALLEL)):
+            yield key_line(f"{key}.position", f"this key, or arm, is missing, and the vehicle has {turning[0]}")
+
+
+def _why_no_arm(thruster: Thruster, losing: Collection[str]) -> str | None:
+    """Return why a thruster cannot have the key arm, or None. `losing` are the curves that lose thrust with speed."""
+    if thruster.position:
+        return "must not be given together with position"
+    if thruster.direction.value[0] <= 0.0:
+        return "must be of a thruster that pushes ahead; give its position instead"
+    if thruster.curve in losing:
+        return f"d of the curve {thruster.curve} needs a place: give the thruster's position"
+    return None
 
 
 def check_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
@@ -83,18 +90,23 @@ def undriven_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[tupl
         if not layout.drivers(axis):
             yield axis, _undriven(axis)
             continue
-        rest = _unit([thruster.effect(axis) for thruster in layout.thrusters])
-        coupled = []
-        for name, row in independent:
-            projection = sum(a * b for a, b in zip(rest, row, strict=True))
-            rest = [a - projection * b for a, b in zip(rest, row, strict=True)]
-            if abs(projection) > _PARALLEL:
-                coupled.append(name)
+        rest, coupled = _rest(_unit([thruster.effect(axis) for thruster in layout.thrusters]), independent)
         if hypot(*rest) > _PARALLEL:
             independent.append((axis.name, _unit(rest)))
         else:
             reason = f"the thrusters cancel: they drive it only together with {join_names(coupled)}"
             yield axis, f"{reason}; correct a direction or a position, or remove this table"
+
+
+def _rest(row: list[float], others: Sequence[tuple[str, list[float]]]) -> tuple[list[float], list[str]]:
+    """Return the part of a row that is orthogonal to other rows, and the names of those with which it has a part."""
+    coupled = []
+    for name, other in others:
+        projection = sum(a * b for a, b in zip(row, other, strict=True))
+        row = [a - projection * b for a, b in zip(row, other, strict=True)]
+        if abs(projection) > _PARALLEL:
+            coupled.append(name)
+    return row, coupled
 
 
 def _undriven(axis: Axis) -> str:
@@ -154,34 +166,50 @@ def check_mass(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[st
     if not entries and not any(coefficients.get(f"{axis}_G") for axis in "xyz"):
         return
     try:
-        mass = {
-            name.removeprefix("mass_"): value
-            for name, value in compiled(equation_of(layout).parameters)(coefficients).items()
-            if name.startswith("mass_")
-        }
+        mass = _mass_matrix(layout, coefficients)
     except ZeroDivisionError:  # a pivot of a singular matrix, or a β
         yield key_line(
             "cross", "the mass matrix must be positive definite, not singular: reduce m_a_.., or x_G, y_G, z_G"
         )
         return
-    axes = [name[0] for name in mass if name[0] == name[1]]
-    names = [layout.by_velocity[velocity].axis.name for velocity in axes]
-    for a, b in combinations(axes, 2):
-        most = sqrt(mass[a + a] * mass[b + b])
-        if abs(mass.get(a + b, 0.0)) >= most:
-            scale = sqrt(coefficients[f"beta_{a}"] * coefficients[f"beta_{b}"])
-            pair = listed([names[axes.index(a)], names[axes.index(b)]])
-            key = cross_name("m_a", a, b)
-            place = f"cross.{key}" if (a, b) in entries else f"body.{(key := _centre(a, b))}"
-            allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
-            reason = f"the entry of the mass matrix for {pair}, with that of the centre of mass, must be {allowed}"
-            yield key_line(f"{place}.value", reason, coefficients[key])
-            return
-    matrix = [[_entry(mass, a, b) / sqrt(mass[a + a] * mass[b + b]) for b in axes] for a in axes]
-    if axes and _least_eigenvalue(matrix) < _LEAST:
+    names = {name[0]: layout.by_velocity[name[0]].axis.name for name in mass if name[0] == name[1]}
+    wrong = [*_check_entries(mass, names, entries, coefficients)]
+    yield from wrong[:1]
+    if names and not wrong and _least_eigenvalue(names, mass) < _LEAST:
         reduce = join_names([cross_name("m_a", a, b) for a, b in entries])
-        reason = f"the mass matrix of {listed(names)} must be positive definite: reduce {reduce or 'x_G, y_G, z_G'}"
-        yield key_line("cross" if entries else "body", reason)
+        reason = f"the mass matrix of {listed(names.values())} must be positive definite"
+        yield key_line("cross" if entries else "body", f"{reason}: reduce {reduce or 'x_G, y_G, z_G'}")
+
+
+def _check_entries(
+    mass: Mapping[str, float],
+    names: Mapping[str, str],
+    given: Collection[tuple[str, str]],
+    coefficients: Mapping[str, float],
+) -> Iterator[str]:
+    """Yield a line for each entry of the mass matrix that alone makes it not positive definite.
+
+    `names` are the axes by their velocities, and `given` are the pairs of velocities with an added mass.
+    """
+    for a, b in combinations(names, 2):
+        most = sqrt(mass[a + a] * mass[b + b])
+        if abs(mass.get(a + b, 0.0)) < most:
+            continue
+        scale = sqrt(coefficients[f"beta_{a}"] * coefficients[f"beta_{b}"])
+        key = cross_name("m_a", a, b) if (a, b) in given else _centre(a, b)
+        allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
+        of = f"the entry of the mass matrix for {listed([names[a], names[b]])}, with that of the centre of mass"
+        table = "cross" if (a, b) in given else "body"
+        yield key_line(f"{table}.{key}.value", f"{of}, must be {allowed}", coefficients[key])
+
+
+def _mass_matrix(layout: Layout, coefficients: Mapping[str, float]) -> dict[str, float]:
+    """Return the entries of the upper half of the mass matrix with the tuning, by their velocities: uu, uq.
+
+    Raises ZeroDivisionError for a singular matrix, and for a β of 0.
+    """
+    parameters = compiled(equation_of(layout).parameters)(coefficients)
+    return {name.removeprefix("mass_"): x for name, x in parameters.items() if name.startswith("mass_")}
 
 
 def doubts(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
@@ -199,29 +227,27 @@ def _doubts_of_damping(layout: Layout, coefficients: Mapping[str, float]) -> Ite
     cross = {(a, b): coefficients[cross_name("b_d", a, b)] for key, a, b, *_ in layout.cross if key == "b_d"}
     if not cross:
         return
-    damping = {}
-    for form in layout.axes:
-        ends = {coefficients[form.coefficient(key)] for key in ("b_d", "b_d_reverse")}
-        damping[form.axis.velocity] = min(ends)
-    entries = {pair: (cross.get(pair, 0.0) + cross.get(pair[::-1], 0.0)) / 2.0 for pair in combinations(damping, 2)}
+    damping = {
+        form.axis.velocity: min(coefficients[form.coefficient(key)] for key in ("b_d", "b_d_reverse"))
+        for form in layout.axes
+    }
+    entries = {a + a: value for a, value in damping.items()}
     adds = "the linear damping adds energy to some slow motions of"
-    names = {form.axis.velocity: form.axis.name for form in layout.axes}
-    for (a, b), entry in entries.items():
-        if abs(entry) > (most := sqrt(damping[a] * damping[b])) * (1.0 + _LEAST):
-            given = [cross_name("b_d", *pair) for pair in ((a, b), (b, a)) if pair in cross]
-            total = f"{' + '.join(given)} should be within ±{2.0 * most:.4g}"
-            yield key_line(
-                f"cross.{given[0]}.value", f"{adds} {names[a]} and {names[b]}: {total}", coefficients[given[0]]
-            )
+    for a, b in combinations(damping, 2):
+        given = {cross_name("b_d", *pair): cross[pair] for pair in ((a, b), (b, a)) if pair in cross}
+        entries[a + b] = sum(given.values()) / 2.0
+        if abs(entries[a + b]) > (most := sqrt(damping[a] * damping[b])) * (1.0 + _LEAST):
+            first, *_ = given
+            words = f"{adds} {_axes_of(layout, a, b)}: {' + '.join(given)} should be within ±{2.0 * most:.4g}"
+            yield key_line(f"cross.{first}.value", words, given[first])
             return
-    scale = {velocity: sqrt(value) or 1.0 for velocity, value in damping.items()}
-    full = {(a, a): value for a, value in damping.items()} | entries
-    matrix = [[full.get((a, b), full.get((b, a), 0.0)) / scale[a] / scale[b] for b in damping] for a in damping]
-    if _least_eigenvalue(matrix) < -_LEAST:
-        coupled = {velocity for pair in cross for velocity in pair}
-        yield key_line(
-            "cross", f"{adds} {listed([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
-        )
+    if _least_eigenvalue(damping, entries) < -_LEAST:
+        yield key_line("cross", f"{adds} {_axes_of(layout, *chain(*cross))}: reduce its b_d_..")
+
+
+def _axes_of(layout: Layout, *velocities: str) -> str:
+    """Return the names of the axes with some velocities, in the order of the vehicle."""
+    return listed([form.axis.name for velocity, form in layout.by_velocity.items() if velocity in velocities])
 
 
 def _doubts_of_voltage(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:
@@ -258,13 +284,14 @@ def _centre(a: str, b: str) -> str:
     return f"{'xyz'[3 - 'uvw'.index(a) - 'pqr'.index(b)]}_G"
 
 
-def _entry(entries: Mapping[str, float], a: str, b: str) -> float:
-    """Return an entry of a symmetric matrix. `entries` are those of one half of it."""
-    return entries.get(a + b, entries.get(b + a, 0.0))
+def _least_eigenvalue(rows: Collection[str], entries: Mapping[str, float]) -> Any:
+    """Return the smallest eigenvalue of a symmetric matrix that is scaled so that its diagonal is 1, or 0.
 
-
-def _least_eigenvalue(matrix: Sequence[Sequence[float]]) -> Any:
-    """Return the smallest eigenvalue of a symmetric matrix."""
+    `entries` are those of one half of it, by the names of the row and of the column.
+    """
     from numpy.linalg import eigvalsh  # NumPy, which few files need
 
-    return eigvalsh(matrix)[0]
+    scale = {row: sqrt(entries[row + row]) or 1.0 for row in rows}
+    return eigvalsh(
+        [[entries.get(a + b, entries.get(b + a, 0.0)) / (scale[a] * scale[b]) for b in rows] for a in rows]
+    )[0]

@@ -9,7 +9,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from rov_fmu.equation.layout import EVERY_COMMAND, Curve
+from rov_fmu.equation.layout import EVERY_COMMAND, Curve, Layout
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
@@ -52,17 +52,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
     voltage = {"value": layout.voltage, "unit": "V", "source": layout.voltage_source}
     tables: dict[str, Any] = {
         "vehicle": {key: getattr(vehicle, key) for key in FileHead.model_fields},
-        "validity": {
-            "command_min": low,
-            "command_max": high,
-            "limits": vehicle.limits,
-            "identified": {
-                one.name: {"range": (one.low, one.high), "unit": UNIT_OF_RANGE[one.name]}
-                for one in layout.identified
-                if one.name != EVERY_COMMAND
-            }
-            or None,
-        },
+        "validity": {"command_min": low, "command_max": high, "limits": vehicle.limits, "identified": _ranges(layout)},
         "body": {"coupling": True} if layout.coupled else {},
         "arm": {},
         "commands": {"pulse": layout.pulse} if layout.pulse else {},
@@ -83,6 +73,12 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         if vehicle.sources.get(name, NOT_GIVEN) != NOT_GIVEN:
             _table_at(tables, above)[key] = _quantity(vehicle, name)
     return tables
+
+
+def _ranges(layout: Layout) -> dict[str, Any] | None:
+    """Return the table of the ranges over which the vehicle was identified, if they are known."""
+    ranges = [one for one in layout.identified if one.name != EVERY_COMMAND]
+    return {one.name: {"range": (one.low, one.high), "unit": UNIT_OF_RANGE[one.name]} for one in ranges} or None
 
 
 def _item(value: Any, folder: Path, depth: int) -> Any:
