@@ -19,7 +19,7 @@ typedef int mask;
 #else
 typedef double real __attribute__((ext_vector_type(LANES)));
 typedef __typeof__((real)0.0 < (real)0.0) mask;
-#define LANE(x, lane) ((double *)&(x))[lane]
+#define LANE(x, lane) ((__typeof__((x)[0]) *)&(x))[lane] /* in memory, where an index costs nothing */
 #define YES (-1)
 #define NO 0
 #define ALL(condition) (__builtin_reduce_and(condition) != 0)

@@ -8,7 +8,6 @@
 #endif
 
 typedef struct {
-    const model_numbers *n;
     model_held q;
     real y[N_SERIES];              /* the states at the start of a piece */
     real lost[N_SERIES];           /* the rounding error of each state, to be added to its next change */
@@ -16,8 +15,14 @@ typedef struct {
     real scale[N_SERIES];          /* for each group, the largest of its size and its earlier sizes, / 4 for each piece since */
     real largest[N_SERIES];        /* the largest size of each group so far */
     real covered[N_USED];          /* roughly, the integral of the size of each state over time */
-    uint64_t settled;              /* one bit for each component; it is set once the component has settled */
+    real state[N_STATES], heading; /* those at the start of the step, except for the attitude, which is followed */
+    real length;                   /* of the step, s */
+    real done, done_lost;          /* the length of all pieces so far, and its rounding error */
+    real rest;                     /* the time that remains */
+    real unit;                     /* the longest unit of time for the next series */
     mask reverse[N_MONITORED];     /* 1 for each velocity whose coefficients are those of the negative direction */
+    const model_numbers *n;
+    uint64_t settled;              /* one bit for each component; it is set once the component has settled */
 } motion;
 
 /* Return the sum of the sizes of the states in a group. */
@@ -217,42 +222,44 @@ INLINE void motion_move(motion *m, const series *s, real length, real change[N_S
     }
 }
 
-#if LANES > 1
-/* Compute the states of all vehicles after h > 0 seconds, in a single piece, with the inputs held. Return true for the vehicles
- * whose step is such a piece: the series converges, no velocity reverses, and the result is finite. All others, and those that
- * are `left_out`, need motion_step. */
-static mask motion_plain(const real at[], const model_numbers *n, real h, mask left_out, real next[N_STATES], real *heading)
+/* Begin a step of h > 0 seconds, over which the inputs are held. */
+INLINE void motion_start(motion *m, const real at[], const model_numbers *n, real h, real heading)
 {
-    real state[N_STATES], change[N_SERIES];
-    motion m;
-    series s;
-    memset(&m, 0, sizeof m);
-    m.n = n;
-    (void)heading;
-    memcpy(state, at + FIRST_STATE, sizeof state);
-    model_start(at, n, &m.q, m.y, m.scale);
-    motion_measure(&m);
-    motion_begin(&m, h, &s);
-    left_out |= motion_waits(&m, &s);
-    mask done = motion_grow_short(&m, &s, left_out);
-    if (!ALL(done | left_out)) {
-        done = motion_grow_long(&m, &s, left_out);
-    }
-    done &= ~left_out & series_keeps_directions(&s);
-#if HAS_ATTITUDE
-    attitude_after_piece(&s, done ? 1.0 : 0.0, state, heading);
-#endif
-    motion_move(&m, &s, 1.0, change);
-#if HAS_LAG
-    model_arrive(at, n, &m.q, m.y, m.scale);
-#endif
-    model_finish(state, &m.q, m.y, m.displacement, next);
-    for (int i = 0; i < N_STATES; i++) {
-        done &= fabs(next[i]) <= DBL_MAX;
-    }
-    return done;
+    memset(m, 0, sizeof *m);
+    m->n = n;
+    m->length = m->rest = m->unit = h;
+    m->heading = heading;
+    memcpy(m->state, at + FIRST_STATE, sizeof m->state);
+    model_start(at, n, &m->q, m->y, m->scale);
 }
+
+/* Move to the end of a piece, t = length. The series may be used up to t = reach. Return true at the end of the step. */
+INLINE mask motion_pass(motion *m, const real at[], const series *s, real length, real reach, real change[N_SERIES])
+{
+    (void)at;
+#if HAS_ATTITUDE
+    attitude_after_piece(s, length, m->state, &m->heading);
 #endif
+    if (ALL(length == 1.0)) { /* with a constant, the compiler leaves out the multiplications */
+        motion_move(m, s, 1.0, change);
+    } else {
+        motion_move(m, s, length, change);
+    }
+    for (int i = 0; i < N_USED; i++) {
+        m->scale[i] *= 0.25;
+    }
+#if HAS_LAG
+    model_arrive(at, m->n, &m->q, m->y, m->scale);
+#endif
+    const mask ends = length * s->unit >= m->rest;
+    if (!ALL(ends)) {
+        motion_add(&m->done, length * s->unit, &m->done_lost);
+        m->rest = m->length - m->done - m->done_lost;
+        m->unit = 2.0 * s->unit * reach;
+    }
+    return ends;
+}
+
 #if LANES == 1
 /* Return true when all n numbers are finite. */
 static inline bool all_finite(const double x[], int n)
@@ -366,12 +373,12 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 #include "coast.c"
 
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
-static bool motion_coasts(motion *m, double rest, double state[N_STATES], double *heading)
+static bool motion_coasts(motion *m)
 {
     if (m->settled != (UINT64_C(1) << N_DYNAMIC) - 1U) {
         return false;
     }
-    motion_coast(m, rest, state, heading);
+    motion_coast(m, m->rest, m->state, &m->heading);
     return true;
 }
 
@@ -379,26 +386,19 @@ static bool motion_coasts(motion *m, double rest, double state[N_STATES], double
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
 static int motion_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
 {
-    double state[N_STATES]; /* those at the start, except for the quaternion, which is followed */
-    double done = 0.0, lost = 0.0; /* the length of all pieces so far, and its rounding error */
-    double rest = h;               /* the time that remains */
-    double unit = h;               /* the longest unit of time for the next series */
     double change[N_SERIES];
     int pieces = 0;
     motion m;
     series s;
-    memset(&m, 0, sizeof m);
-    m.n = n;
-    memcpy(state, at + FIRST_STATE, sizeof state);
-    model_start(at, n, &m.q, m.y, m.scale);
-    while (++pieces <= MOST_PIECES && unit > 0.0) {
+    motion_start(&m, at, n, h, *heading);
+    while (++pieces <= MOST_PIECES && m.unit > 0.0) {
         motion_measure(&m);
-        motion_begin(&m, fmin(rest, unit), &s);
+        motion_begin(&m, fmin(m.rest, m.unit), &s);
         double reach = 1.0;
         if (!motion_grow(&m, &s)) {
             if (pieces == 1) { /* the step is long, and some states may have settled before it */
-                motion_settle(&m, rest);
-                if (motion_coasts(&m, rest, state, heading)) {
+                motion_settle(&m, m.rest);
+                if (motion_coasts(&m)) {
                     break;
                 }
                 if (m.settled != 0U) {
@@ -409,7 +409,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
             reach = motion_reach(&m, &s);
         }
         if (reach == 0.0) {
-            unit = 1e-3 * s.unit;
+            m.unit = 1e-3 * s.unit;
             continue;
         }
         double length = reach;
@@ -417,43 +417,28 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         if (reach < 1.0 || !series_keeps_directions(&s)) {
             reversed = series_cut(&s, &length);
         }
-#if HAS_ATTITUDE
-        attitude_after_piece(&s, length, state, heading);
-#endif
-        if (length == 1.0) { /* with a constant, the compiler leaves out the multiplications */
-            motion_move(&m, &s, 1.0, change);
-        } else {
-            motion_move(&m, &s, length, change);
-        }
+        const bool ends = motion_pass(&m, at, &s, length, reach, change);
         if (reversed != NONE) { /* exactly at rest, so that the next piece has the other direction */
             m.y[reversed] = m.lost[reversed] = 0.0;
         }
-        for (int i = 0; i < N_USED; i++) {
-            m.scale[i] *= 0.25;
-        }
-#if HAS_LAG
-        model_arrive(at, n, &m.q, m.y, m.scale);
-#endif
-        if (length * s.unit >= rest) {
+        if (ends) {
             break;
         }
-        motion_add(&done, length * s.unit, &lost);
-        rest = h - done - lost;
-        unit = 2.0 * s.unit * reach;
         if (motion_is_slow(&m, &s, change)) {
-            motion_settle(&m, rest);
+            motion_settle(&m, m.rest);
         }
-        if (motion_coasts(&m, rest, state, heading)) {
+        if (motion_coasts(&m)) {
             break;
         }
     }
-    if (!(unit > 0.0)) { /* even the shortest piece overflows */
+    *heading = m.heading;
+    if (!(m.unit > 0.0)) { /* even the shortest piece overflows */
         for (int i = 0; i < N_STATES; i++) {
             next[i] = INFINITY;
         }
         return pieces;
     }
-    model_finish(state, &m.q, m.y, m.displacement, next);
+    model_finish(m.state, &m.q, m.y, m.displacement, next);
     return pieces <= MOST_PIECES ? pieces : 0;
 }
 

@@ -67,6 +67,22 @@ bool lone_step(lone *v, double t, double h)
     return true;
 }
 
+/* Return the length of a piece of a vehicle in a lane, from the coefficients of its series. *reach is 1 when the series may be used up
+ * to t = 1. Otherwise it becomes the largest usable t, or 0 when the series overflows. */
+double lone_length(const double c[], const double scale[], int order, double *reach, int *reversed)
+{
+    series s;
+    s.order = order;
+    s.moving = ~UINT64_C(0);
+    memcpy(s.c, c, (size_t)(order + 1) * sizeof s.c[0]);
+    if (*reach < 1.0) {
+        *reach = series_reach(&s, scale);
+    }
+    double length = *reach;
+    *reversed = length > 0.0 ? series_cut(&s, &length) : NONE;
+    return length;
+}
+
 void simulate(SIMULATION)
 {
     const bool calculates = is_calculated(recorded, records);

@@ -57,5 +57,6 @@ lone *lone_new(void);
 void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
 bool lone_waits(const lone *v);
 bool lone_step(lone *v, double t, double h);
+double lone_length(const double c[], const double scale[], int order, double *reach, int *reversed);
 
 #endif

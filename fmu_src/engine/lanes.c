@@ -1,7 +1,8 @@
-/* Simulation for Python of many vehicles at once, one in each lane of a vector (real.h). A step that is one short piece is taken
- * for all lanes together. All other steps are taken alone by engine.c: where a velocity reverses, a long step has several
- * pieces, commands wait for the dead time, or a number is not finite. So a vehicle has no influence on its neighbours. When a
- * vehicle ends, the next one takes its lane. */
+/* Simulation for Python of many vehicles at once, one in each lane of a vector (real.h). All lanes take a piece of their steps at
+ * the same time, each of its own length, and a lane whose step is at its end begins the next one. So a vehicle has no influence on
+ * its neighbours. When a vehicle ends, the next one takes its lane. Steps that need more than that are taken alone by engine.c: while
+ * commands wait for the dead time, where a velocity may begin to move with a higher power of time, where a number is not finite,
+ * and where a step has many pieces, because engine.c ends a step early when all velocities are steady. */
 #if defined __AVX512F__
 #define LANES 8
 #elif defined __AVX__
@@ -18,18 +19,19 @@
 
 #include "step.c"
 
-enum { LONGEST_PAUSE = 31 }; /* steps */
+enum { MOST_TOGETHER = 64 }; /* pieces of a step */
 
 typedef struct {
-    ptrdiff_t vehicle;  /* or -1 */
-    ptrdiff_t n;        /* the index of the present time */
-    lone *alone;        /* for steps that are taken alone; it has the coefficients and the commands that wait */
-    int pause, longest; /* the steps that will be taken alone, because a step was not plain; twice as many after the next one */
+    ptrdiff_t vehicle; /* or -1 */
+    ptrdiff_t n;       /* the index of the time at which the present step begins */
+    int pieces;        /* the pieces of this step so far, or 0 before it */
+    lone *alone;       /* for steps that are taken alone; it has the coefficients and the commands that wait */
 } lane;
 
 typedef struct {
-    real at[N_VARIABLES], heading;
+    real at[N_VARIABLES], heading; /* at the start of the present step of each lane */
     model_numbers numbers;
+    motion m;
     lane lanes[LANES];
 } block;
 
@@ -38,8 +40,7 @@ static void begin_in_lane(block *b, int i, const table given[N_VARIABLES], ptrdi
 {
     lane *const own = &b->lanes[i];
     own->vehicle = vehicle;
-    own->n = 0;
-    own->pause = own->longest = 0;
+    own->n = own->pieces = 0;
     lone_begin(own->alone, given, vehicle);
     for (int k = 0; k < N_VARIABLES; k++) {
         LANE(b->at[k], i) = own->alone->at[k];
@@ -65,28 +66,86 @@ static bool step_alone(block *b, int i, double t, double h)
     return true;
 }
 
-/* Return true when the next step of a lane must be taken alone. */
-static bool is_alone(block *b, int i)
+/* Return true when commands of a lane wait for the dead time. */
+static bool waits_in_lane(block *b, int i)
 {
-    lane *const own = &b->lanes[i];
+    lone *const alone = b->lanes[i].alone;
     for (int k = 0; HAS_DEAD_TIME && k < N_COMMANDS; k++) {
-        own->alone->at[k] = LANE(b->at[k], i);
+        alone->at[k] = LANE(b->at[k], i);
     }
-    return own->pause > 0 || lone_waits(own->alone);
+    return HAS_DEAD_TIME && lone_waits(alone);
 }
 
-/* Take one step of length h in all lanes that have a vehicle and are not `alone`. Return true for those in which it was taken. */
-static mask step_together(block *b, real h, mask alone)
+/* Begin steps of length h in some of the lanes whose steps have `started`. */
+static void begin_steps(block *b, real h, mask begins, mask started)
 {
-    real next[N_STATES], heading = b->heading;
-    if (ALL(alone)) {
-        return NO;
+    if (!ANY(started & ~begins)) {
+        motion_start(&b->m, b->at, &b->numbers, h, b->heading);
+        return;
     }
-    const mask done = motion_plain(b->at, &b->numbers, h, alone, next, &heading);
+    motion fresh;
+    motion_start(&fresh, b->at, &b->numbers, h, b->heading);
+    real *const to = (real *)&b->m; /* the first members of a motion are numbers of the lanes */
+    const real *const from = (const real *)&fresh;
+    for (size_t k = 0; k < offsetof(motion, reverse) / sizeof(real); k++) {
+        to[k] = begins ? from[k] : to[k];
+    }
+}
+
+/* Assign the states at the end of the steps that end. Return true where they are finite. */
+static mask end_steps(block *b, mask ends)
+{
+    real next[N_STATES];
+    model_finish(b->m.state, &b->m.q, b->m.y, b->m.displacement, next);
     for (int k = 0; k < N_STATES; k++) {
-        b->at[FIRST_STATE + k] = done ? next[k] : b->at[FIRST_STATE + k];
+        ends &= fabs(next[k]) <= DBL_MAX;
     }
-    b->heading = done ? heading : b->heading;
+    for (int k = 0; k < N_STATES; k++) {
+        b->at[FIRST_STATE + k] = ends ? next[k] : b->at[FIRST_STATE + k];
+    }
+    b->heading = ends ? b->m.heading : b->heading;
+    return ends;
+}
+
+/* Take a piece in all lanes whose steps have `started`. Return true for those whose steps end with it. *alone becomes true for those
+ * whose steps must be taken alone. */
+static mask take_piece(block *b, mask started, mask *alone)
+{
+    motion *const m = &b->m;
+    real change[N_SERIES], length = 1.0, reach = 1.0;
+    double c[(ORDER + 1) * N_SERIES], scale[N_SERIES];
+    int reversed[LANES];
+    series s;
+    motion_measure(m);
+    motion_begin(m, fmin(m->rest, m->unit), &s);
+    mask under_way = started & ~motion_waits(m, &s);
+    mask whole = motion_grow_short(m, &s, ~under_way);
+    if (!ALL(whole | ~under_way)) {
+        whole = motion_grow_long(m, &s, ~under_way);
+    }
+    const mask plain = whole & series_keeps_directions(&s);
+    for (int i = 0; i < LANES; i++) {
+        reversed[i] = NONE;
+        if (LANE(under_way, i) & ~LANE(plain, i)) {
+            for (int k = 0; k < (s.order + 1) * N_SERIES; k++) {
+                c[k] = LANE(s.c[0][k], i);
+            }
+            for (int k = 0; k < N_SERIES; k++) {
+                scale[k] = LANE(m->scale[k], i);
+            }
+            LANE(reach, i) = LANE(whole, i) ? 1.0 : 0.0;
+            LANE(length, i) = lone_length(c, scale, s.order, &LANE(reach, i), &reversed[i]);
+            LANE(under_way, i) = LANE(reach, i) > 0.0 && b->lanes[i].pieces < MOST_TOGETHER ? YES : NO;
+        }
+    }
+    const mask ends = under_way & motion_pass(m, b->at, &s, under_way ? length : 0.0, reach, change);
+    for (int i = 0; i < LANES; i++) {
+        if (reversed[i] != NONE) { /* exactly at rest, so that the next piece has the other direction */
+            LANE(m->y[reversed[i]], i) = LANE(m->lost[reversed[i]], i) = 0.0;
+        }
+    }
+    const mask done = end_steps(b, ends);
+    *alone |= (started & ~under_way) | (ends & ~done);
     return done;
 }
 
@@ -95,7 +154,7 @@ int simulate_in_lanes(SIMULATION)
 {
     const bool calculates = is_calculated(recorded, records);
     ptrdiff_t waiting = first;
-    int memory = 1, busy = 1;
+    int memory = 1, busy;
     block b;
     memset(&b, 0, sizeof b);
     for (int i = 0; i < LANES; i++) {
@@ -103,66 +162,73 @@ int simulate_in_lanes(SIMULATION)
         b.lanes[i].alone = lone_new();
         memory &= b.lanes[i].alone != NULL;
     }
-    while (memory && busy > 0 && *stop == 0) {
-        mask apart = YES;
-        real h = 1.0;
-        bool begins = false;
+    do {
+        mask started = NO, begins = NO, alone = NO, ends = NO;
+        real h = 0.0;
+        const ptrdiff_t before = waiting;
         busy = 0;
-        for (int i = 0; i < LANES; i++) {
+        for (int i = 0; memory && i < LANES; i++) {
             lane *const own = &b.lanes[i];
             if (own->vehicle < 0 && waiting < last) {
                 failed[waiting] = times;
                 begin_in_lane(&b, i, given, waiting++);
-                begins = true;
             }
-            for (int k = 0; k < N_INPUTS && own->vehicle >= 0; k++) {
-                if (given[k].per_time != 0) {
-                    LANE(b.at[k], i) = number(&given[k], own->vehicle, own->n);
+            if (own->vehicle < 0) {
+                continue;
+            }
+            busy++;
+            if (own->pieces == 0) {
+                for (int k = 0; k < N_INPUTS; k++) {
+                    if (given[k].per_time != 0) {
+                        LANE(b.at[k], i) = number(&given[k], own->vehicle, own->n);
+                    }
+                }
+                if (own->n + 1 < times) {
+                    LANE(h, i) = time[own->n + 1] - time[own->n];
+                    LANE(alone, i) = waits_in_lane(&b, i) ? YES : NO;
+                    LANE(begins, i) = ~LANE(alone, i);
                 }
             }
+            LANE(started, i) = own->pieces > 0 ? YES : LANE(begins, i);
         }
-        if (begins) {
+        if (waiting > before) {
             model_prepare(b.at, &b.numbers);
+        }
+        if (ANY(begins)) {
+            begin_steps(&b, h, begins, started);
         }
         if (calculates) {
             model_calculate(b.at, &b.numbers, b.heading);
         }
-        for (int i = 0; i < LANES; i++) {
+        for (int i = 0; i < LANES; i++) { /* here, because a piece does not wait for the memory of the results */
             lane *const own = &b.lanes[i];
-            if (own->vehicle < 0) {
-                continue;
-            }
-            double *to = result + own->vehicle * times + own->n;
-            for (ptrdiff_t k = 0; k < records; k++) {
-                to[k * vehicles * times] = LANE(b.at[recorded[k]], i);
-            }
-            busy++;
-            if (own->n + 1 == times) {
-                own->vehicle = -1;
-            } else {
-                LANE(h, i) = time[own->n + 1] - time[own->n];
-                apart[i] = is_alone(&b, i) ? YES : NO;
-            }
-        }
-        const mask done = step_together(&b, h, apart);
-        for (int i = 0; i < LANES; i++) {
-            lane *const own = &b.lanes[i];
-            if (own->vehicle < 0) {
-                continue;
-            }
-            if (done[i]) {
-                own->longest = 0;
-            } else {
-                own->longest = apart[i] ? own->longest : 2 * own->longest + 1 < LONGEST_PAUSE ? 2 * own->longest + 1 : LONGEST_PAUSE;
-                own->pause = apart[i] ? own->pause - (own->pause > 0) : own->longest - 1;
-                if (!step_alone(&b, i, time[own->n], LANE(h, i))) {
-                    failed[own->vehicle] = own->n + 1;
-                    own->vehicle = -1;
+            if (own->vehicle >= 0 && own->pieces == 0) {
+                double *to = result + own->vehicle * times + own->n;
+                for (ptrdiff_t k = 0; k < records; k++) {
+                    to[k * vehicles * times] = LANE(b.at[recorded[k]], i);
                 }
+                own->vehicle = own->n + 1 < times ? own->vehicle : -1;
             }
-            own->n++;
         }
-    }
+        if (ANY(started)) {
+            ends = take_piece(&b, started, &alone);
+        }
+        for (int i = 0; i < LANES; i++) {
+            lane *const own = &b.lanes[i];
+            if (own->vehicle < 0) {
+                continue;
+            }
+            own->pieces++;
+            if (LANE(alone, i) && !step_alone(&b, i, time[own->n], time[own->n + 1] - time[own->n])) {
+                failed[own->vehicle] = own->n + 1;
+                own->vehicle = -1;
+            }
+            if (LANE(alone, i) | LANE(ends, i)) {
+                own->n++;
+                own->pieces = 0;
+            }
+        }
+    } while (busy > 0 && *stop == 0);
     for (int i = 0; i < LANES; i++) {
         free(b.lanes[i].alone);
     }

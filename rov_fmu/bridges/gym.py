@@ -34,7 +34,8 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
     The reward is minus the sum of the squares of the position (m) and the heading (rad, of a vehicle without roll and
     pitch), and a tenth of that of the commands. An episode is truncated after `steps` steps of `step` seconds, and
     begins anew in the step after that. It is terminated when a state exceeds BOUND or the motion cannot be computed.
-    With `draws=False`, all vehicles have the coefficients of the file.
+    With `draws=False`, all vehicles have the coefficients of the file. The processor's vectors step several vehicles at
+    once, so that the states differ from those of the FMU by rounding errors.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it
@@ -84,7 +85,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         commands = {name: command_of(fractions[:, n])[:, None] for n, name in enumerate(self.commands)}
         start = {name: self.state[:, n, None] for n, name in enumerate(self.states)}
         values = {**self.coefficients, **commands, **start}
-        found = simulate(self.vehicle, [0.0, self.length], values, self.states, vehicles=self.num_envs)
+        found = simulate(self.vehicle, [0.0, self.length], values, self.states, vehicles=self.num_envs, lanes=True)
         after = found.values[:, :, 1].T
         failed = ~(np.abs(after) <= BOUND).all(axis=1) & ~begun
         moved = ~(failed | begun)

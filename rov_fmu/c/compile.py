@@ -202,12 +202,15 @@ def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
     """Return the compiler's arguments for a file of the engine: those of the FMU, so the numbers are the same.
 
     The file that computes many vehicles in the lanes of a vector is compiled together with the engine, for the widest
-    vectors of this processor. The compiler warns wrongly about conditions that are vectors (-Wno-conversion).
+    vectors of this processor. There, a product and a sum are one operation with one rounding error, which takes a sixth
+    of the time away: the numbers need not be those of the FMU to the last bit. The compiler warns wrongly about
+    conditions that are vectors (-Wno-conversion).
     """
     name = host_platform(fmi=3)
     in_lanes = file == LANES_FILE.name
     target = ["-target", PLATFORMS[name].target] if name else []
-    processor = ["-mcpu=native", "-Wno-conversion"] if in_lanes else [] if name else ["-mcpu=baseline"]
+    vectors = ["-mcpu=native", "-ffp-contract=on", "-Wno-conversion"]
+    processor = vectors if in_lanes else [] if name else ["-mcpu=baseline"]
     libraries = PLATFORMS[name].flags if name else ("-lm",)
     files = [file, ENGINE_FILE.name] if in_lanes else [file]
     return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, *processor, "-Wno-unused-function", *files, *libraries]

@@ -19,11 +19,13 @@ from rov_fmu.vehicle.vehicle import Vehicle
 Array = NDArray[np.float64]
 _POLL = 0.5
 """The waiting thread looks for Ctrl-C after this number of seconds, because Ctrl-C does not end a wait on Windows."""
-_SHORT = 30
+_SHORT = 200
 """A simulation of at most this many steps takes less time than starting a thread, and is over before anyone presses
 Ctrl-C."""
 _BRIEF = 100_000
 """A simulation of at most this many steps takes about 0.1 s, so a single worker runs it without a thread of its own."""
+_FULL = 32
+"""A part of this many vehicles keeps the lanes of the vectors full for most of the time."""
 _PARTS = 8
 """The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
 
@@ -118,10 +120,12 @@ def simulate(
 
     workers = min(workers or usable_cores(), vehicles)
     size = -(-vehicles // (_PARTS * workers))
+    if lanes:
+        size = max(size, min(_FULL, -(-vehicles // workers)))
     firsts = range(0, vehicles, size)
     if vehicles * len(times) <= (_BRIEF if workers == 1 else _SHORT):
-        for first in firsts:
-            run_part(first)
+        size = vehicles
+        run_part(0)
     else:
         _run_parts(run_part, firsts, workers, stop)
     for one in np.flatnonzero(failed < len(times)):

@@ -137,9 +137,9 @@ class VehicleModel(Vehicle):
         `workers` is the number of threads; the default is the number of usable cores. The results do not depend on it.
 
         By default the results have the bits of the FMU. With `lanes=True`, the vectors of the processor step two to
-        eight vehicles at once. Steps of up to about 10 ms then take a third to two thirds of the time; long steps gain
-        nothing. The results differ from the default by rounding errors: by less than 1e-12 of the scale of each
-        variable. The first such simulation of a kind of vehicle compiles an engine of its own.
+        eight vehicles at once. Steps then take a third to three quarters of the time, but steps during which commands
+        wait for a dead time gain nothing. The results differ from the default by rounding errors: by less than 1e-12 of
+        the scale of each variable. The first such simulation of a kind of vehicle compiles an engine of its own.
 
         The arrays of the result have the shape (vehicles, times). Where the motion of a vehicle cannot be computed, its
         values are NaN from there on, and `result.failed` has its number.
