@@ -39,7 +39,7 @@ def place(objective: Objective) -> Array:
     louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
     found = minimise(objective, objective.mean + louder * objective.deviation)
     root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
-    z = found.z + 0.5 * root @ np.random.default_rng(1).standard_normal(len(root))
+    z = found.z + 0.3 * root @ np.random.default_rng(1).standard_normal(len(root))
     z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
     assert all(np.abs(run.innovations / np.sqrt(run.variances)).max() < 3.9 for run in objective.runs(z))
     return np.asarray(z, float)
@@ -69,7 +69,7 @@ def test_derivatives_are_those_of_other_differences(objective: Objective, place:
         for one, above, below in zip(data, up, down, strict=False):
             slopes = (above.innovations - below.innovations) / (2.0 * h)
             log_slopes = np.log(above.variances / below.variances) / (2.0 * h)
-            # Steps of 1e-7 leave rounding errors of 1e-12 in the logarithm of a variance.
+            # Steps of 3e-7 leave rounding errors of 1e-12 in the logarithm of a variance.
             for found, expected, rounding in ((one.slopes, slopes, 1e-9), (one.log_slopes, log_slopes, 1e-4)):
                 largest, errors = np.abs(expected).max(), np.abs(found[:, n] - expected)
                 assert np.quantile(errors, 0.85) <= (0.1 if p.kind == "logging width" else 0.03) * largest + rounding, p
@@ -86,7 +86,7 @@ def check_gradient(objective: Objective, z: Array) -> None:
     for n, name in enumerate(names(objective.table.parameters)):
         (h, z_up, up), (_, z_down, down) = both_ways(objective, z, n, runs)
         expected = (objective.value(z_up, up) - objective.value(z_down, down)) / (2.0 * h)
-        near = 0.01 if objective.table.parameters[n].of_motion else 0.2 if "width" in name else 0.06
+        near = 0.03 if objective.table.parameters[n].of_motion else 0.2 if "width" in name else 0.06
         assert abs(gradient[n] - expected) < near * abs(expected) + 0.01 * np.sqrt(information[n, n]), name
         assert abs(expected) > 1e-6, name
 
@@ -119,17 +119,24 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
 
 
 def test_a_common_scale_of_all_forces_changes_nothing(objective: Objective, place: Array) -> None:
-    """Thrust, drag, load and inertia times a factor: only the prior tells. This holds with frozen gains as well."""
-    runs, table, factor = objective.runs(place), objective.table, 1e-3
-    scaled = place.copy()
-    for n, p in enumerate(table.parameters):
+    """Thrust, drag, load and inertia times a factor: only the prior and measured forces tell.
+
+    The information says so too, although it is a sum of large numbers that cancel, if slow forces are scaled as well.
+    """
+    runs, factor, scale = objective.runs(place), 1e-3, np.zeros(len(place))
+    for n, p in enumerate(objective.table.parameters):
         if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
-            scaled[n] += factor
+            scale[n] = 1.0
         elif p.kind == "load":
-            scaled[n] *= np.exp(factor)
+            scale[n] = place[n]
     for n, run in enumerate(runs):
-        moved = objective.run(scaled, n, repeated=run, frozen=True)
+        moved = objective.run(place + factor * scale, n, repeated=run, frozen=True)
         assert np.abs((moved.innovations - run.innovations) / np.sqrt(run.variances)).max() < 1e-6
+    scale += [p.kind == "slow force" for p in objective.table.parameters]
+    of_logs = [one.information()[1] for one in objective.data(place, runs)[: len(runs)]]
+    told = sum(scale @ H @ scale for H in of_logs)
+    parts = [(scale @ np.sqrt(np.diag(H))) ** 2 for H in of_logs]
+    assert told < 10.0 < 1e-4 * sum(parts), "a prior of 10 % is an information of 200"
 
 
 def test_a_parameter_changes_only_the_logs_that_it_concerns(objective: Objective, place: Array) -> None:
