@@ -2,7 +2,7 @@
  *
  * The model is a stochastic differential equation around the vehicle's equation of motion:
  *
- *     x' = f(x, (1 + g) thrust, force)     the states of the vehicle
+ *     x' = f(x, exp(g) thrust, force)      the states of the vehicle
  *     force_i, g, drift_i                  a slow force along each axis, a slow change of all thrust, and a slow velocity over ground:
  *                                          Ornstein-Uhlenbeck processes, each with a size and a time constant
  *     y = h(x, drift) + n + e              a sample: n is the sensor's coloured noise, also such a process, and e is white
@@ -186,6 +186,7 @@ static void rates(const filter *f, const double x[N_X], const double held[N_HELD
 {
     double at[N_VARIABLES], scaled[N_HELD], R[3][3];
     const bool tilts = f->log->tilts >= 2;
+    const double gain = exp(x[GAIN]); /* above 0: thrust never changes its direction */
     model_held q;
     memcpy(at, f->set->at, sizeof at);
     memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
@@ -201,7 +202,7 @@ static void rates(const filter *f, const double x[N_X], const double held[N_HELD
         }
     }
     for (int i = 0; i < N_HELD; i++) {
-        scaled[i] = held[i] * (1.0 + x[GAIN]);
+        scaled[i] = held[i] * gain;
     }
     memcpy(&q, scaled, sizeof q);
 #if !HAS_LAG

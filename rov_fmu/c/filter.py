@@ -82,7 +82,7 @@ class Parameters:
     forces: tuple[Slow, ...]
     """The slow force along each axis of the layout, N or N m."""
     gain: Slow
-    """The slow relative change of all thrust."""
+    """The slow change of the logarithm of all thrust."""
     drifts: tuple[Slow, Slow, Slow]
     """The slow velocity over ground to the north, to the east and down, m/s."""
     white: tuple[float, ...]
@@ -239,6 +239,7 @@ class Filter:
     def _arrays(self, record: Record, acting: Sequence[bool]) -> tuple[_Record, list[object]]:
         """Return the struct `record` with its arrays, which must stay alive."""
         kinds = [self._kind(sensor) for sensor in record.sensors]
+        first = float(record.time[0])  # the numbers near 1e9 of a clock are too coarse for small changes of a delay
         start, error = np.zeros(self.states), np.zeros(self.states)
         active = np.zeros(self.states, np.intc)
         for n, name in enumerate(self.vehicle_states):
@@ -247,14 +248,14 @@ class Filter:
         active[self.force : self.force + len(acting)] = acting
         active[-1] = 1
         arrays: list[Array | Indices] = [
-            *(np.ascontiguousarray(array, np.float64) for array in (record.time, record.value)),
+            *(np.ascontiguousarray(array, np.float64) for array in (record.time - first, record.value)),
             np.ascontiguousarray(record.sensor, np.intc),
             *(np.array(column, np.intc) for column in zip(*kinds, strict=True)),
-            *(np.ascontiguousarray(array, np.float64) for array in (record.since, record.told)),
+            *(np.ascontiguousarray(array, np.float64) for array in (record.since - first, record.told - first)),
             *(start, error, active),
         ]
         sizes = len(record.time), len(record.told), len(record.sensors)
-        tilt = [np.ascontiguousarray(row) for row in record.tilt]
+        tilt = [np.ascontiguousarray(row) for row in record.tilt - np.array([[first], [0.0], [0.0]])]
         pointers = [array.ctypes.data for array in arrays], [array.ctypes.data for array in tilt]
         return _Record(*sizes, *pointers[0], len(tilt[0]), *pointers[1], *self._steps), [*arrays, *tilt]
 

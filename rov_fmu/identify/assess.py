@@ -84,7 +84,7 @@ def predictions(
         if count > 1:
             others = [other for other in objective.logs if other is not one]
             rest = Objective(objective.table, others, objective.rows, thinned=True)
-            again = minimise(rest, posterior.z, most=_REFIT_STEPS, with_noise=False)
+            again = minimise(rest, posterior.z, most=_REFIT_STEPS, with_noise=False, last=False)
             words = "the other log" if count == 2 else f"the other {count - 1} logs"
             _, information = total(objective, again.z, [data for m, data in enumerate(best.data) if m != n])
             covariance = Posterior.of(objective.table, again.z, information).averaged.covariance

@@ -58,6 +58,7 @@ def held_out_rows(fit: Fit) -> HeldOut:
             fit.best.z,
             most=_ROW_STEPS,
             with_noise=False,
+            last=False,
         ).z
         vehicle = Vehicle(objective.table.layout, objective.table.coefficients(z.tolist()))
         shapes = objective.table.shapes(z.tolist())

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import cos, inf, pi, sin
+from math import cos, exp, inf, pi, sin
 from typing import Any
 
 import numpy as np
@@ -98,7 +98,7 @@ class Diver:
     def rates(self, time: float, x: Array) -> Array:
         k, (w, _, F, force, gain, drift, *_) = self.k, x.tolist()
         c = float(self.commands[np.searchsorted(self.switches, time) - 1])
-        steady = (k["a_t_top"] * abs(c) + k["b_t_top"]) * c * (1.0 + gain)
+        steady = (k["a_t_top"] * abs(c) + k["b_t_top"]) * c * exp(gain)
         drag = (k["a_d_w"] * abs(w) + k["b_d_w"]) * w
         load = k["alpha_w"] * F + k["F_0_w"] + force - drag
         moved = [load * k["beta_w"] / k["m_rov"], w + drift, (steady - F) / k["T_top"]]
@@ -323,6 +323,21 @@ def test_frozen_gains_reproduce_the_run_that_they_come_from() -> None:
     other = replace(known, coefficients={**LAGGING.coefficients, "a_d_w": 20.0})
     moved = of_heave.run(log, other, repeated=first, frozen=True)
     assert np.abs(moved.innovations - first.innovations).max() > 1e-4
+
+
+def test_a_small_change_of_the_delay_counts_with_the_times_of_any_clock() -> None:
+    """The clock of a ROS bag has numbers near 1.5e9, with steps of 2e-7 s. The samples are those of a clock from 0."""
+    log, known, of_heave = measured(LAGGING, record((DEPTH, VELOCITY), sampled())), with_all(LAGGING), Filter(LAGGING)
+    late = 1.5e9
+    told = replace(log, time=log.time + late, since=log.since + late, told=log.told + late)
+
+    def slopes(one: Record) -> Array:
+        first = of_heave.run(one, known)
+        return (of_heave.run(one, replace(known, offset=5e-8), repeated=first).innovations - first.innovations) / 5e-8
+
+    expected = slopes(log)
+    assert np.abs(expected).max() > 0.1
+    assert slopes(told) == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
 
 
 def with_a_gap() -> list[tuple[float, int]]:

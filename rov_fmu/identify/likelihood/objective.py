@@ -3,7 +3,7 @@
 The model of a log is a stochastic differential equation around the vehicle's equation of motion (Kristensen, Madsen and
 Jorgensen 2004, doi:10.1016/j.automatica.2003.10.001; Ljung, System Identification, 1999, chapter 7):
 
-    x' = f(x, (1 + g) F(c), theta) + slow force      y_k = h(x(t_k)) + n_k + e_k
+    x' = f(x, exp(g) F(c), theta) + slow force      y_k = h(x(t_k)) + n_k + e_k
 
 An extended Kalman filter (fmu_src/engine/filter.c) predicts each sample from the samples before it, and gives the
 innovation eps_k and its variance S_k. The coefficients theta and the noise phi minimise together
@@ -18,6 +18,7 @@ is the square of their noise.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -177,13 +178,21 @@ class Objective:
         return total if np.isfinite(total) else np.inf
 
     def data(
-        self, z: Array, runs: Sequence[Run], earlier: Sequence[Data] | None = None, *, with_noise: bool = True
+        self,
+        z: Array,
+        runs: Sequence[Run],
+        earlier: Sequence[Data] | None = None,
+        *,
+        with_noise: bool = True,
+        exact: bool = True,
     ) -> list[Data]:
         """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
 
-        Those with respect to the motion, except the scale of the thrust, are derivatives with the gains of the filter
-        frozen: they take a tenth of the time, and the change of the gains adds nothing to them on average. Without
-        those with respect to the noise, these are the ones of earlier data, or 0.
+        Exact ones contain the changes of the gains of the filter, and are differences to both sides. The others guide
+        the steps of a fit: their gains are frozen, and they are differences to one side, which takes a twentieth of the
+        time. They are no measure of the information: their errors make the common scale of all forces, which the motion
+        does not tell, look determined, and where the model does not explain a log, half of a gradient with frozen gains
+        had the wrong sign. Without derivatives with respect to the noise, those of earlier data are returned, or 0.
         """
         found = [Data.of(run, len(z)) for run in runs]
         work: list[Callable[[], None]] = []
@@ -192,7 +201,7 @@ class Objective:
                 if not self.concerns(parameter, n):
                     continue
                 if with_noise or parameter.of_motion:
-                    work.append(lambda n=n, k=k, run=run: self.differentiate(z, n, k, run, found[n]))  # type: ignore[misc]
+                    work.append(partial(self.differentiate, z, n, k, run, found[n], exact=exact))
                 elif earlier:
                     found[n].slopes[:, k] = earlier[n].slopes[:, k]
                     found[n].log_slopes[:, k] = earlier[n].log_slopes[:, k]
@@ -203,15 +212,19 @@ class Objective:
             found.append(self._rows_data(z))
         return found
 
-    def differentiate(self, z: Array, n: int, k: int, run: Run, into: Data) -> None:
-        """Compute the derivatives of the innovations of a log with respect to one parameter."""
-        parameter = self.table.parameters[k]
-        moved = z.copy()
-        moved[k] += parameter.step
-        above = self.run(moved, n, repeated=run, frozen=parameter.keeps_gains)
-        into.slopes[:, k] = (above.innovations - run.innovations) / parameter.step
-        if not parameter.keeps_gains:
-            into.log_slopes[:, k] = np.log(above.variances / run.variances) / parameter.step
+    def differentiate(self, z: Array, n: int, k: int, run: Run, into: Data, *, exact: bool = True) -> None:
+        """Compute the derivatives of the innovations of a log with respect to one parameter, within its lower bound."""
+        parameter, step = self.table.parameters[k], self.table.parameters[k].step
+        frozen = parameter.keeps_gains and not exact
+        up, down = z.copy(), z.copy()
+        up[k] += step
+        down[k] -= step
+        above, below, width = self.run(up, n, repeated=run, frozen=frozen), run, step
+        if exact and down[k] >= parameter.low:
+            below, width = self.run(down, n, repeated=run), 2.0 * step
+        into.slopes[:, k] = (above.innovations - below.innovations) / width
+        if not frozen:
+            into.log_slopes[:, k] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
         off, variances = self.row_values(z)

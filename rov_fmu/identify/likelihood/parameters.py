@@ -64,9 +64,9 @@ USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
 """The usual time constant of the lag of thrusters, s."""
-_MOTION_STEP = 1e-5
-"""The relative change of z for the derivatives of the motion. Much larger ones make the common scale of all forces,
-which the motion does not tell, look determined."""
+_MOTION_STEP = 3e-7
+"""The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add a few
+per cent at most."""
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
 
@@ -102,7 +102,7 @@ class Parameter:
 
     @property
     def keeps_gains(self) -> bool:
-        """True if the gains of the filter are frozen for its derivative.
+        """True if the gains of the filter are frozen for the derivative that guides a step of the fit.
 
         A slow change of the thrust makes up for the scale of the thrust, as far as the gains let it. Frozen gains give
         the derivative by the scale the wrong sign where this change is large.

@@ -62,7 +62,7 @@ def minimise(
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
     place = _Place(z, objective.value(z, runs), runs)
-    data = objective.data(z, runs, with_noise=with_noise)
+    data = objective.data(z, runs, with_noise=with_noise, exact=False)
     damping, has_converged, count = _FIRST_DAMPING, False, 0
     for count in range(1, most + 1):
         on_step(count)
@@ -75,8 +75,9 @@ def minimise(
         if (has_failed or has_converged) and (moves_noise or not with_noise):
             break
         damping = _FIRST_DAMPING if has_failed else damping
-        data = objective.data(place.z, place.runs, data, with_noise=with_noise and count % 2 == 0)
-    data = objective.data(place.z, place.runs, data, with_noise=with_noise and last)
+        data = objective.data(place.z, place.runs, data, with_noise=with_noise and count % 2 == 0, exact=False)
+    if last:
+        data = objective.data(place.z, place.runs, data, with_noise=with_noise)
     _, information = total(objective, place.z, data)
     return Minimum(place.z, place.value, place.runs, data, information, has_converged, count)
 

@@ -77,7 +77,9 @@ def _disturbance(
     states, deviations = run.states[:, columns], run.deviations[:, columns]
     size = float(np.sqrt(np.mean(np.sum(states**2, axis=1))))
     time, unit, usual = objective.records[number].time, "1", 1.0
-    if parameter.kind == "slow force":
+    if parameter.kind == "slow gain":
+        size = _rms(np.expm1(states))
+    elif parameter.kind == "slow force":
         assert axis
         unit = axis.load
         usual = max(

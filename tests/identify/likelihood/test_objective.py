@@ -2,19 +2,20 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rov_fmu.c.filter import Run
-from rov_fmu.equation.catalogue import HEAVE, YAW
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.objective import Data, Objective, cost
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, total
 from rov_fmu.tank.arrays import Array
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled, responses
-from tests.recordings import clean, write_log
+from tests.recordings import Measured, clean, write_log
 from tests.vehicles import VIDEORAY
 
 PLAN = ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0), (0.2, 2.0))
@@ -38,7 +39,7 @@ def place(objective: Objective) -> Array:
     louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
     found = minimise(objective, objective.mean + louder * objective.deviation)
     root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
-    z = found.z + 0.5 * root @ np.random.default_rng(1).standard_normal(len(root))
+    z = found.z + 0.3 * root @ np.random.default_rng(1).standard_normal(len(root))
     z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
     assert all(np.abs(run.innovations / np.sqrt(run.variances)).max() < 3.9 for run in objective.runs(z))
     return np.asarray(z, float)
@@ -59,75 +60,83 @@ def names(parameters: Sequence[Parameter]) -> list[str]:
     return [" ".join(filter(None, (p.kind, p.of, p.part))) for p in parameters]
 
 
-def test_derivatives_of_noise_are_those_of_other_differences(objective: Objective, place: Array) -> None:
+def test_derivatives_are_those_of_other_differences(objective: Objective, place: Array) -> None:
     """With another step, to both sides. Near rest, where drag has a kink, some samples have other derivatives."""
     runs = objective.runs(place)
     data = objective.data(place, runs)
     for n, p in enumerate(objective.table.parameters):
-        if p.of_motion:
-            continue
         (h, _, up), (_, _, down) = both_ways(objective, place, n, runs)
         for one, above, below in zip(data, up, down, strict=False):
             slopes = (above.innovations - below.innovations) / (2.0 * h)
             log_slopes = np.log(above.variances / below.variances) / (2.0 * h)
-            for found, expected in ((one.slopes, slopes), (one.log_slopes, log_slopes)):
+            # Steps of 3e-7 leave rounding errors of 1e-12 in the logarithm of a variance.
+            for found, expected, rounding in ((one.slopes, slopes, 1e-9), (one.log_slopes, log_slopes, 1e-4)):
                 largest, errors = np.abs(expected).max(), np.abs(found[:, n] - expected)
-                assert np.quantile(errors, 0.85) <= (0.1 if p.kind == "logging width" else 0.03) * largest + 1e-9, p
-                assert errors.max() <= 0.2 * largest + 1e-9, p
+                assert np.quantile(errors, 0.85) <= (0.1 if p.kind == "logging width" else 0.03) * largest + rounding, p
+                assert errors.max() <= 0.2 * largest + rounding, p
 
 
-def test_derivatives_of_motion_are_those_with_frozen_gains(objective: Objective, place: Array) -> None:
-    runs = objective.runs(place)
-    data = objective.data(place, runs)
-    for n, p in enumerate(objective.table.parameters):
-        if not p.keeps_gains:
-            continue
-        (h, above, _), (_, below, _) = both_ways(objective, place, n, runs)
-        for number, one in enumerate(data[: len(runs)]):
-            up, down = (
-                objective.run(z, number, repeated=runs[number], frozen=True).innovations for z in (above, below)
-            )
-            expected = (up - down) / (2.0 * h)
-            assert np.abs(one.slopes[:, n] - expected).max() <= 5e-3 * np.abs(expected).max() + 1e-9, p
-            assert not one.log_slopes[:, n].any()
-
-
-def test_the_gradient_is_that_of_j(objective: Objective, place: Array) -> None:
-    """For the motion, J is that with frozen gains. Steps of 1 % in the size of noise give it to a few per cent.
+def check_gradient(objective: Objective, z: Array) -> None:
+    """Compare the gradient of J with differences of J itself. Steps of 1 % in the size of noise give a few per cent.
 
     A width has kinks, where the ends of windows meet samples.
     """
-    runs = objective.runs(place)
-    gradient, information = total(objective, place, objective.data(place, runs))
-
-    def value(z: Array, moved: list[Run], *, of_motion: bool) -> float:
-        if of_motion:
-            numbers = range(len(runs))
-            frozen = [objective.run(z, n, repeated=runs[n], frozen=True).innovations for n in numbers]
-            moved = [replace(runs[n], innovations=frozen[n]) for n in numbers]
-        return objective.value(z, moved)
-
+    runs = objective.runs(z)
+    gradient, information = total(objective, z, objective.data(z, runs))
     for n, name in enumerate(names(objective.table.parameters)):
-        of_motion = objective.table.parameters[n].of_motion
-        (h, z_up, up), (_, z_down, down) = both_ways(objective, place, n, runs)
-        expected = (value(z_up, up, of_motion=of_motion) - value(z_down, down, of_motion=of_motion)) / (2.0 * h)
-        near = 0.005 if of_motion else 0.2 if "width" in name else 0.06
+        (h, z_up, up), (_, z_down, down) = both_ways(objective, z, n, runs)
+        expected = (objective.value(z_up, up) - objective.value(z_down, down)) / (2.0 * h)
+        near = 0.03 if objective.table.parameters[n].of_motion else 0.2 if "width" in name else 0.06
         assert abs(gradient[n] - expected) < near * abs(expected) + 0.01 * np.sqrt(information[n, n]), name
         assert abs(expected) > 1e-6, name
 
 
+def test_the_gradient_is_that_of_j(objective: Objective, place: Array) -> None:
+    check_gradient(objective, place)
+
+
+def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> None:
+    """The thrust of the log is 3 times that of the file, and the slow change of thrust makes up for it.
+
+    The log has a voltage and a distance over ground. With frozen gains, the gradient has other signs.
+    """
+    path = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", {"thrust_rear.csv": pulled(43.0, 2.7)})
+    stronger = VIDEORAY.replaced({name: 3.0 * VIDEORAY[name] for name in ("a_t_rear", "b_t_rear")})
+    c = clean(stronger, SURGE, PLAN, 5.0)
+    noise = 0.02 * np.random.default_rng(0).standard_normal(len(c.time))
+    log = write_log(path, "0", Measured("log.csv", SURGE, "distance", c.time, c.command, c.position + noise))
+    head, *lines = log.read_text().splitlines()
+    volts = [f"{line},{16.0 - 0.03 * n:.2f}" for n, line in enumerate(lines)]
+    log.write_text("\n".join([f"{head},voltage [V]", *volts]) + "\n")
+    known, logs, rows = begin(load_tests(path))
+    objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+    kinds = [p.kind for p in objective.table.parameters]
+    assert {"voltage", "current", "slow gain", "slow velocity"} <= {*kinds}
+    z = objective.mean.copy()
+    z[kinds.index("slow gain")] = np.log(0.2)
+    z[kinds.index("slow force")] = np.log(0.02)
+    check_gradient(objective, z)
+
+
 def test_a_common_scale_of_all_forces_changes_nothing(objective: Objective, place: Array) -> None:
-    """Thrust, drag, load and inertia times a factor: only the prior tells. This holds with frozen gains as well."""
-    runs, table, factor = objective.runs(place), objective.table, 1e-3
-    scaled = place.copy()
-    for n, p in enumerate(table.parameters):
+    """Thrust, drag, load and inertia times a factor: only the prior and measured forces tell.
+
+    The information says so too, although it is a sum of large numbers that cancel, if slow forces are scaled as well.
+    """
+    runs, factor, scale = objective.runs(place), 1e-3, np.zeros(len(place))
+    for n, p in enumerate(objective.table.parameters):
         if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
-            scaled[n] += factor
+            scale[n] = 1.0
         elif p.kind == "load":
-            scaled[n] *= np.exp(factor)
+            scale[n] = place[n]
     for n, run in enumerate(runs):
-        moved = objective.run(scaled, n, repeated=run, frozen=True)
+        moved = objective.run(place + factor * scale, n, repeated=run, frozen=True)
         assert np.abs((moved.innovations - run.innovations) / np.sqrt(run.variances)).max() < 1e-6
+    scale += [p.kind == "slow force" for p in objective.table.parameters]
+    of_logs = [one.information()[1] for one in objective.data(place, runs)[: len(runs)]]
+    told = sum(scale @ H @ scale for H in of_logs)
+    parts = [(scale @ np.sqrt(np.diag(H))) ** 2 for H in of_logs]
+    assert told < 10.0 < 1e-4 * sum(parts), "a prior of 10 % is an information of 200"
 
 
 def test_a_parameter_changes_only_the_logs_that_it_concerns(objective: Objective, place: Array) -> None:

@@ -46,6 +46,7 @@ class Small(Objective):
         earlier: Sequence[Data] | None = None,  # noqa: ARG002
         *,
         with_noise: bool = True,  # noqa: ARG002
+        exact: bool = True,  # noqa: ARG002
     ) -> list[Data]:
         off, step = runs[0].innovations, 1e-6
         slopes = np.column_stack([(self.innovations(z + row) - off) / step for row in step * np.eye(len(z))])

@@ -97,7 +97,7 @@ COMPLETE: dict[str, Tank] = {
     "gaps while turning": _usual(Logs(gaps=2)),
     "depth of 1 cm": _usual(sensors=_with(USUAL, replace(DEPTH, noise=0.003, resolution=0.01))),
     "wrap at 180 degrees": _usual(sensors=_with(USUAL, replace(HEADING, wraps=True))),
-    "pilot": _usual(_PILOT, expected=Expected(seconds=15.0)),
+    "pilot": _usual(_PILOT, expected=Expected(seconds=20.0)),
     "pilot in a current": _usual(_PILOT, "current", conditions=_FLOW),
     "two depth sensors": _usual(_PILOT, sensors=(*USUAL, Sensor(HEAVE, "velocity", 0.01))),
     "slow depth by a late clock": _usual(_PILOT, "dead time", sensors=_with(USUAL, replace(DEPTH, every=4, late=0.15))),
