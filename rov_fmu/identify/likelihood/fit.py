@@ -12,7 +12,7 @@ from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
+from rov_fmu.identify.likelihood.solve import Minimum, minimise
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.tank.arrays import Array
@@ -89,10 +89,8 @@ def fit_all(
     def show_full(step: int) -> None:
         on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
 
-    best = minimise(full, _scaled(full, ends[0].z), on_step=show_full)
-    scaled = _scaled(full, best.z)
-    if scaled is not best.z:
-        best = minimise(full, scaled, on_step=show_full, most=2)
+    near = minimise(full, _scaled(full, ends[0].z), on_step=show_full, last=False)
+    best = minimise(full, _scaled(full, near.z), on_step=show_full, most=2)
     posterior = Posterior.of(table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
@@ -120,7 +118,5 @@ def _scaled(objective: Objective, z: Array) -> Array:
     change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
     moved = z + direction * np.where(loads, np.expm1(change), change)  # the others are logarithms
     moved = np.clip(moved, objective.low, objective.high)
-    if objective.prior(moved) > objective.prior(z) - ENOUGH:
-        return z
     before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
     return moved if after < before else z
