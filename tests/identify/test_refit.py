@@ -50,7 +50,9 @@ def by_paper(vehicle: Vehicle, some: list[Point]) -> float:
 
 
 def test_the_shipped_file_is_that_of_its_tests(refit: Identification, tmp_path: Path) -> None:
-    """The files are equal except for the last digits, which depend on the processor, the digest and the version.
+    """The files are equal but for the digest, the version, and digits that are far below the standard errors.
+
+    These depend on the processor and on where a version of the command ends its fit.
 
     The file that ships has its ranges in words, as earlier versions wrote them, because its FMU keeps its variables.
     """
@@ -69,7 +71,8 @@ def test_the_shipped_file_is_that_of_its_tests(refit: Identification, tmp_path: 
     assert made == shipped
     one, other = load_vehicle(path), load_vehicle(REFIT)
     for name in VIDEORAY.layout.coefficients:
-        assert one[name] == pytest.approx(other[name], rel=1e-3)
+        low, high = other.intervals.get(name, (other[name], other[name]))
+        assert one[name] == pytest.approx(other[name], rel=1e-3, abs=0.05 * (high - low) / 4.0)
         assert one.intervals.get(name, nan) == pytest.approx(other.intervals.get(name, nan), rel=1e-2, nan_ok=True)
     assert one.provenance
     assert other.provenance
