@@ -583,8 +583,9 @@ def _prove(
         print_claims(proof)
         print_end([report], "open it in a browser")
         if failed := proof.with_result("fails"):
-            reasons = "; ".join(f"{claim.name.lower()}: {one.sentence.rstrip('.')}" for claim, one in failed)
-            raise ProofError(f"{fmu}: {len(failed)} of {len(proof.evidence)} claims do not hold: {reasons}")
+            raise ProofError(
+                *(f"{fmu}: {claim.name.lower()} fails: {one.sentence.rstrip('.')}" for claim, one in failed)
+            )
         return
 
     from rov_fmu.fmu.evidence.check import check_evidence

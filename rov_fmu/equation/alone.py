@@ -12,7 +12,7 @@ the time from rest until p V_ss is reached, p = 1 - 1/e:
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import e, inf
+from math import e, inf, isfinite, log
 
 from .attitude import entry
 from .catalogue import REVERSE
@@ -135,3 +135,11 @@ class AxisAlone:
     def time_constant(self) -> float:
         """Return Tau of (17), from rest."""
         return time_constant(*self.drag(self.C), self.C)
+
+    def stopping_way(self, v: float, share: float) -> float:
+        """Return the way from v until `share` of it without any force, m or rad: the integral of 1 / (A |v| + B)."""
+        A, B = self.drag(v)
+        speed = abs(v)
+        if A > 0.0 and isfinite(speed) and speed > 0.0:
+            return log((A * speed + B) / (A * share * speed + B)) / A
+        return (1.0 - share) * speed / B if B > 0.0 else inf

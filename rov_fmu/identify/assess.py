@@ -241,16 +241,19 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 # ---- Answers ---------------------------------------------------------------------------------------------------------
 
 
-def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle) -> tuple[Answer, ...]:
+def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle, pushes: Sequence[float] = ()) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
-    The values are those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the
-    fit, whose curves bend freely, the intervals are wider by the difference.
+    If `pushes` are given, these commands push by such shares of the full push of the fit. The values are those of the
+    vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit, whose curves bend freely,
+    the intervals are wider by the difference.
     """
     table = posterior.table
 
     def values(vehicle: Vehicle, shapes: Shapes) -> Array:
-        return np.array([_response(shapes.motion(vehicle, axis, c)) for c in ANSWERED])
+        rest, full = (shapes.motion(vehicle, axis, c) for c in (0.0, 1.0))
+        motions = [replace(full, C=rest.C + push * (full.C - rest.C)) for push in pushes]
+        return np.array([*map(_response, motions or (shapes.motion(vehicle, axis, c) for c in ANSWERED))])
 
     def logarithms(z: Array) -> Array:
         fitted = values(Vehicle(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
@@ -283,6 +286,21 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle) -> tuple[Answer,
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 
+def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[float, ...]:
+    """Return how hard the usual commands of the thrusters push along an axis, relative to the full force of a wrench.
+
+    It is empty unless the logs have a wrench, whose full command is its largest force, and the vehicle has thrusters.
+    """
+    if not (wrench.layout.has_wrench and own.layout.thrusters):
+        return ()
+
+    def push(vehicle: Vehicle, command: float) -> float:
+        at_rest, pushed = (NO_SHAPES.motion(vehicle, axis, c).C for c in (0.0, command))
+        return pushed - at_rest
+
+    return tuple(push(own, command) / push(wrench, 1.0) for command in ANSWERED)
+
+
 def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     """Return the answers of a vehicle file, without those that are not finite.
 
@@ -305,14 +323,8 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
 
 def _response(motion: AxisAlone) -> tuple[float, float, float]:
     """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force."""
-    V, Tau = motion.steady_velocity(), motion.time_constant()
-    A, B = motion.drag(V)
-    speed = abs(V)
-    if A > 0.0 and isfinite(speed) and speed > 0.0:
-        stop = log((A * speed + B) / (A * _STOPPED * speed + B)) / A
-    else:
-        stop = (1.0 - _STOPPED) * speed / B if B > 0.0 else inf
-    return V, Tau, stop
+    V = motion.steady_velocity()
+    return V, motion.time_constant(), motion.stopping_way(V, _STOPPED)
 
 
 # ---- Verdicts --------------------------------------------------------------------------------------------------------

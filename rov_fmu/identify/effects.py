@@ -56,7 +56,7 @@ _WORDS = {
 
 
 def loggers_of(fit: Fit) -> Iterator[Logging]:
-    """Yield how long after their rows the commands of each log act, s, without the dead time of the vehicle."""
+    """Yield how long after their rows the commands of each log act, s, without the dead time and lag of the vehicle."""
     posterior, table = fit.posterior, fit.posterior.table
     for one in fit.objective.logs:
         place = table.place("logging offset", one.log.file)
@@ -64,9 +64,10 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
             continue
         total = np.zeros(len(posterior.z))
         total[place] = 1.0
-        dead = table.place("dead time")
-        if dead is not None and dead in posterior.absent:  # the vehicle keeps none, so the logger has all of it
-            total[dead] = 1.0
+        for kind in ("dead time", "lag"):  # what the vehicle does not keep is of the logger
+            later = table.place(kind)
+            if later is not None and later in posterior.absent:
+                total[later] = 1.0
         offset, error = float(total @ posterior.z), float(np.sqrt(total @ posterior.covariance @ total))
         width = table.get(posterior.z.tolist(), "logging width", one.log.file) * one.interval
         yield Logging(one.log.file, one.interval, offset, around(offset, error), width)

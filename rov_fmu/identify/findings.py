@@ -536,7 +536,8 @@ def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
 
 def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
     """Yield findings about full commands, and about turns that the model takes for independent of the other motion."""
-    if one.commands:
+    wrench = identification.folder.rov_file.description
+    if one.commands and not (wrench and wrench.layout.has_wrench):  # whose full command is its largest force
         values = np.abs(one.commands.at(one.commands.rows))
         share = float(np.mean(np.any(values >= _FULL, axis=1)))
         if share > _SATURATED:

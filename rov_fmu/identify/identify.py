@@ -55,15 +55,17 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = slips(tests, known, fit.objective, fit.best.z)
     held_out = held_out_rows(fit)
+    of_file = with_own_inputs(vehicle, tests.given)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
         one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out)
+        if pushes := assess.pushes_of_thrusters(vehicle, of_file, axis):
+            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes))
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
     names = tuple(vehicle.estimates)
-    of_file = with_own_inputs(vehicle, tests.given)
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,

@@ -28,15 +28,19 @@ def part(on_progress: Progress, low: float, high: float) -> Progress:
     return lambda step, share: on_progress(step, low + (high - low) * share)
 
 
-class FileError(ValueError):
-    """A file that cannot be used. Each reason is a line with the file, the place, the value and what is allowed."""
+class _LinesError(Exception):
+    """An exception whose message has a line for each reason."""
 
     def __init__(self, *reasons: str) -> None:
         super().__init__("\n".join(map(one_line, reasons)))
 
-    def __reduce__(self) -> tuple[type["FileError"], tuple[str, ...]]:
+    def __reduce__(self) -> tuple[type["_LinesError"], tuple[str, ...]]:
         """Return what pickle needs: the lines."""
         return type(self), tuple(str(self).split("\n"))
+
+
+class FileError(_LinesError, ValueError):
+    """A file that cannot be used. Each reason is a line with the file, the place, the value and what is allowed."""
 
 
 class _OneLineError(Exception):
@@ -56,8 +60,8 @@ class UnknownNameError(InputError, KeyError):
     __str__ = ValueError.__str__
 
 
-class ProofError(_OneLineError):
-    """An FMU that does not reproduce the results that it contains."""
+class ProofError(_LinesError):
+    """An FMU that does not keep what it claims, such as the results that it contains. Each reason is a line."""
 
 
 class StudyError(_OneLineError):

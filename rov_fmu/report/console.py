@@ -168,10 +168,10 @@ def print_proof(findings: "Sequence[Finding]") -> None:
 def print_evidence(evidence: "MetaData") -> None:
     """Print what the hashes in an FMU and its signature say, if it has any."""
     lines = []
-    if evidence.files:
-        lines.append(f"All {len(evidence.files)} files are as they were built.")
     if evidence.signer:
-        lines.append(f"Signed with the key {evidence.signer}.")
+        lines.append(f"All {len(evidence.files)} files are as they were built. Signed with the key {evidence.signer}.")
+    elif evidence.files:
+        lines.append(f"All {len(evidence.files)} files match the hashes in the FMU, which is not signed.")
     if lines:
         paragraph(console(), " ".join(lines))
 

@@ -144,7 +144,8 @@ class Folder:
         self.rov_file = replace(self.rov_file, description=replace(description, known={**description.known, **known}))
         if self.logs:
             loads = {form.axis.external: form.axis.load for form in description.layout.axes}
-            told = [f"{name} = {most:.3g} {loads[name]}" for name, most in full.items() if name in loads]
+            commanded = {name for one in largest for name, most in one.items() if most}
+            told = [f"{name} = {full[name]:.3g} {loads[name]}" for name in full if name in loads.keys() & commanded]
             inputs = _OWN_THRUSTERS if description.thrusters else _LOADS
             self.findings.append(Finding("wrench", names={"full": listed(told), "inputs": inputs}))
 

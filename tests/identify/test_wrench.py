@@ -15,7 +15,7 @@ from rov_fmu import load
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import by_heading
+from rov_fmu.identify.findings import by_heading, findings_of
 from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
@@ -166,6 +166,13 @@ def test_logs_without_a_wrench_are_refused(tmp_path: Path, capsys: pytest.Captur
     assert line.startswith(f"{place}X_ext, Y_ext, Z_ext, K_ext, M_ext, N_ext, in [N] or [N.m]")
 
 
+def test_forces_on_a_vehicle_with_thrusters_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_dives(tmp_path, MIX.replace("wrench = true", ""))
+    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
+    line = capsys.readouterr().err.splitlines()[0]
+    assert "X_ext [N]' and 'Z_ext [N]' are forces on the body, if wrench = true stands in [logs]" in line
+
+
 TOE, TILT = 0.6, 0.2
 """The angles of the rear thrusters to the bow, and of the vertical one to straight down, rad."""
 QUADRATIC_THRUST, LINEAR_THRUST = 40.0, 8.0
@@ -205,13 +212,26 @@ def write_dives(folder: Path, rov: str = MIX) -> None:
         write(folder / f"dive_{n}.csv", header, d.time, d.X, d.Z, d.u, d.z)
 
 
-def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The motion under commands is that of the simulation under the sum of the thrusters, written by hand."""
+def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
+    """The motion under commands is that of the simulation under the sum of the thrusters, written by hand.
+
+    So are the steady velocities that the result tells, whose commands are those of the thrusters.
+    """
     write_dives(tmp_path)
-    out = tmp_path / "mixer.toml"
-    assert main(["identify", str(tmp_path), "-o", str(out)]) == 0
-    assert "the thrusters of rov.toml give" not in capsys.readouterr().out
-    vehicle = load(out)
+    found = identify(load_tests(tmp_path))
+    assert not {"beyond thrusters", "saturation"} & {finding.kind for finding in findings_of(found)}
+    (wrench,) = (finding for finding in found.findings if finding.kind == "wrench")
+    assert wrench.names["full"].count(" = ") == 2, "only of the forces that the logs command"
+    for answer in found.axes[0].answers:
+        thrust = (QUADRATIC_THRUST * abs(answer.command) + LINEAR_THRUST) * abs(answer.command)
+        force = (2.0 * np.cos(TOE) + np.sin(TILT)) * thrust
+        a, b = QUADRATIC["u"], LINEAR["u"]
+        steady = np.copysign((np.sqrt(b * b + 4.0 * a * force) - b) / (2.0 * a), answer.command)
+        assert answer.steady[0] == pytest.approx(steady, rel=0.01)
+        low, high = answer.steady[1]
+        assert low <= steady <= high
+    write_vehicle(found.vehicle, tmp_path / "mixer.toml")
+    vehicle = load(tmp_path / "mixer.toml")
     assert [*vehicle.layout.commands] == ["u_l", "u_r", "u_t"]
     assert (vehicle["a_t_all"], vehicle.sources["a_t_all"]) == (40.0, "Bollard pull")
     assert vehicle.command_range == (0.0, 1.0)

@@ -224,7 +224,7 @@ down = "a - u / 1000"
     few, many = (pages[runs].xpath("string(//body)") for runs in (12, 800))
     cells = "//h2[@id='sensitivity']/following::table[1]//td[@class='number same' or @class='number first same']"
     for text in (
-        "An index whose interval is as wide as itself (grey) tells nothing",
+        "An index whose whole interval is wider than itself (grey) is uncertain",
         "With so few blocks, the indices",
     ):
         assert text in few

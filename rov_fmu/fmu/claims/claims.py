@@ -48,7 +48,7 @@ CLAIMS = (
     ),
     Claim(
         "Conservation",
-        "Without thrust, energy comes from nowhere; without drag, none is lost.",
+        "Without thrust, the energy never rises; without drag, none is lost.",
         measures.conservation,
         "the parameters a_d, b_d, F_0, W and B in modelDescription.xml, set to 0",
     ),
@@ -66,14 +66,14 @@ CLAIMS = (
     ),
     Claim(
         "Hashes and signature",
-        "Nobody has changed the FMU since it was built.",
+        "The files are those that were built, and a signature says by whom.",
         measures.integrity,
         f"{META_DATA} in the FMU, and the file .sig beside it; rov-fmu prove FMU --key KEY.pub or "
         "ssh-keygen -Y check-novalidate -n rov-fmu -s FMU.sig < FMU checks the signature",
     ),
     Claim(
         "Unseen data",
-        "Motion that the identification had not seen is predicted, or the axis is named that is not to be used.",
+        "The errors on data that the fit did not see are known, and axes that must not be used are named.",
         measures.unseen,
         "documentation/model_card.txt in the FMU",
     ),

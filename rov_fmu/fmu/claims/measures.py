@@ -30,7 +30,7 @@ _WAIT = 5.0
 """The longest time for an answer to something impossible, s."""
 _GLIDE, _GLIDE_STEPS = 10.0, 100
 """The length of a motion without thrust (s), and its number of steps."""
-_DRAG, _LOAD = re.compile(r"[ab]_d_\w+"), re.compile(r"F_0_\w+|[WB]")
+_DRAG, _LOAD = re.compile(r"[a-z]_d_\w+"), re.compile(r"F_0_\w+|[WB]")
 """The parameters of drag, and those of constant loads, weight and buoyancy."""
 _LOSS = 1e-12
 """The increase of an energy, relative to the energy, that is a rounding error."""
@@ -89,8 +89,9 @@ def expected(subject: Subject) -> Evidence:
     words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(experiments)} experiments are as expected"
     words += f", within {max(f.tolerance for f in findings):.0e} of the largest value of each variable."
     if subject.is_ours and Path(subject.folder, "sources", "step.c").exists():
-        words += " They come from a second implementation of the equation: an explicit Runge-Kutta method of order 8 "
-        words += "(DOP853) in Python, run when the FMU was built, and not the Taylor series in C that the FMU runs."
+        words += " They come from a second solver of the same equation: an explicit Runge-Kutta method of order 8 "
+        words += "(DOP853) in Python, run when the FMU was built, and not the Taylor series in C that the FMU runs. So "
+        words += "they test the integration and the compiled code, and not the physics."
     for f in wrong[:1]:
         words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {_tiny(f.deviation)}'}."
     rows = [(f.experiment, f.error or f.variable, _tiny(f.deviation), f"{f.tolerance:.0e}") for f in worst]
@@ -310,7 +311,10 @@ def integrity(subject: Subject) -> Evidence:
     found = check_evidence(subject.path, subject.key)
     if not (found.files or found.signer):
         return _not("the FMU carries no hashes of its files, and no signature lies beside it")
-    words = f"All {len(found.files)} files are as they were built; it is not signed, so whoever built it is unknown."
+    words = (
+        f"All {len(found.files)} files match the hashes in the FMU. It is not signed: whoever changed a file may have "
+        "changed its hash too."
+    )
     if found.signer:
         known = "given with --key" if subject.key else "compare it with the fingerprint that its maker gives"
         words = (

@@ -87,12 +87,12 @@ def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str
             yield f"{shown(name)}: is {times} times in the archive"
     for name in sorted({*members, *files}, key=lambda name: (name != META_DATA, name)):
         if name not in members:
-            yield f"{shown(name)}: is missing; it was there when the FMU was built"
+            yield f"{shown(name)} is missing; it was there when the FMU was built"
         elif name not in files and name != META_DATA:
-            yield f"{shown(name)}: was added after the FMU was built"
+            yield f"{shown(name)} was added after the FMU was built"
         elif (found := _hash(archive, name)) != (given := files.get(name, "unknown")):
-            differs = f"its SHA3-256 is {found[:16]}..., and was {given[:16]}..." if found else "it is damaged"
-            yield f"{shown(name)}: was altered after the FMU was built: {differs}"
+            differs = f"its SHA3-256 is {found[:16]}…, and was {given[:16]}…" if found else "it is damaged"
+            yield f"{shown(name)} was altered after the FMU was built: {differs}"
 
 
 def _hash(archive: zipfile.ZipFile, name: str) -> str:

@@ -218,8 +218,8 @@ def test_one_altered_byte_is_named(
     out, err = capsys.readouterr()
     assert out == ""
     assert re.fullmatch(
-        re.escape(f"rov-fmu: {fmu}: '{names[0]}': was altered after the FMU was built: ")
-        + r"its SHA3-256 is [0-9a-f]{16}\.\.\., and was [0-9a-f]{16}\.\.\.\n",
+        re.escape(f"rov-fmu: {fmu}: '{names[0]}' was altered after the FMU was built: ")
+        + r"its SHA3-256 is [0-9a-f]{16}…, and was [0-9a-f]{16}…\n",
         err,
     )
 
@@ -253,13 +253,13 @@ def test_an_identified_vehicle_whose_data_were_altered_fails(tmp_path: Path, cap
         fmu = tmp_path / "altered.fmu"
         fmu.write_bytes(archive({**files, path: content[:-2] + bytes([content[-2] ^ 1]) + content[-1:]}))
         assert main(["prove", str(fmu)]) == 1
-        assert capsys.readouterr().err.startswith(f"rov-fmu: {fmu}: '{path}': was altered after the FMU was built")
+        assert capsys.readouterr().err.startswith(f"rov-fmu: {fmu}: '{path}' was altered after the FMU was built")
 
 
 def test_files_that_were_added_or_taken_away_are_named(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
     for words, change in (
-        ("'resources/more.txt': was added after", lambda files: files.update({"resources/more.txt": b""})),
-        (f"'{MANIFEST}': is missing", lambda files: files.pop(MANIFEST)),
+        ("'resources/more.txt' was added after", lambda files: files.update({"resources/more.txt": b""})),
+        (f"'{MANIFEST}' is missing", lambda files: files.pop(MANIFEST)),
     ):
         fmu = _altered(videoray_fmu, tmp_path / "altered.fmu", change)
         assert main(["prove", str(fmu)]) == 1
@@ -282,7 +282,7 @@ def test_a_byte_changed_in_the_archive_itself_names_the_file(
     content[entry.header_offset + 1000] ^= 1
     (tmp_path / "damaged.fmu").write_bytes(content)
     assert main(["prove", str(tmp_path / "damaged.fmu")]) == 1
-    assert f"'{entry.filename}': was altered after the FMU was built: " in capsys.readouterr().err
+    assert f"'{entry.filename}' was altered after the FMU was built: " in capsys.readouterr().err
 
 
 # ---- Signatures ------------------------------------------------------------------------------------------------------
