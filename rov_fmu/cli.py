@@ -4,6 +4,7 @@ Each command is a short function that imports its modules only when it is called
 fast.
 """
 
+import logging
 import warnings
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -641,6 +642,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     from rov_fmu.report.console import print_end
     from rov_fmu.report.progress import StudyParts, parts
 
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
     check_place(output)
     vehicle = load_plan(plan).vehicle if run is not None else None
     if run is not None and not vehicle:

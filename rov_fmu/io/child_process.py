@@ -88,16 +88,19 @@ class ChildProcess:
     in a terminal does not reach it; it ends with this process.
     """
 
-    def __init__(self, make: Callable[..., object], *arguments: Any, limits: Limits = Limits()) -> None:
+    def __init__(
+        self, make: Callable[..., object], *arguments: Any, limits: Limits = Limits(), temporary: str | None = None
+    ) -> None:
         """Start the process and make the object there. Raises ChildError, and what `make` raises.
 
-        The limits hold for `make` and for each call. The time does not include the start of Python.
+        The limits hold for `make` and for each call. The time does not include the start of Python. The temporary files
+        lie in the folder `temporary`, if it is given. A process that may be killed gives one that another one removes.
         """
         self._limits = limits
         self._answers: SimpleQueue[Any] = SimpleQueue()
         self._open = ExitStack()
-        folder = self._open.enter_context(temporary_folder("rov-fmu-child-"))
-        temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP", "SQLITE_TMPDIR"), folder)
+        folder = self._open.enter_context(temporary_folder("rov-fmu-child-", temporary))
+        places = dict.fromkeys(("TMPDIR", "TEMP", "TMP", "SQLITE_TMPDIR"), folder)
         # A thread of OpenBLAS for each processor would reserve some 40 MB each.
         threads = {"OPENBLAS_NUM_THREADS": "1"} if limits.memory else {}
         with UNINTERRUPTED:
@@ -105,7 +108,7 @@ class ChildProcess:
                 [sys.executable, "-c", _PROGRAM.format(sys.path)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                env={**os.environ, **temporary, **threads},
+                env={**os.environ, **places, **threads},
                 start_new_session=True,
             )
             self._open.enter_context(cleaned_up(self._kill))

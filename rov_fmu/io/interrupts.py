@@ -42,11 +42,14 @@ def cleaned_up(clean: Callable[[], object], note: str = "") -> Iterator[None]:
 
 
 @contextmanager
-def temporary_folder(prefix: str) -> Iterator[str]:
-    """Make a folder for temporary files; it is removed when the block ends or an interrupt ends the process."""
+def temporary_folder(prefix: str, parent: str | None = None) -> Iterator[str]:
+    """Make a folder for temporary files; it is removed when the block ends or an interrupt ends the process.
+
+    It lies in `parent`, or where the system has temporary files.
+    """
     with ExitStack() as stack:
         with UNINTERRUPTED:
-            folder = tempfile.mkdtemp(prefix=prefix)
+            folder = tempfile.mkdtemp(prefix=prefix, dir=parent)
             stack.enter_context(cleaned_up(partial(_remove, folder)))
         yield folder
 

@@ -65,7 +65,8 @@ def test_the_archive_has_only_files_of_its_version(either_dir: Path, fmi: int) -
     page = (either_dir / "documentation" / "index.html").read_text(encoding="utf-8")
     for claim in (f"FMI {fmi}.0 ", f"fmi{fmi}Discard", f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"):
         assert claim in page
-    assert not re.findall(f"FMI {5 - fmi}|fmi{5 - fmi}", page)
+    words = re.sub(r"[A-Za-z0-9+/=]{200,}", "", page)  # without the binary of the page that flies
+    assert not re.findall(f"FMI {5 - fmi}|fmi{5 - fmi}", words)
     license_ = (either_dir / "documentation" / "licenses" / "fmi-headers.txt").read_text(encoding="utf-8")
     header = (fmu_compile.fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     assert license_.startswith("Copyright (C) 2008-2011 MODELISAR")

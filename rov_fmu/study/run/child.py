@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import fmpy
@@ -69,7 +70,8 @@ class Child:
         limits = Limits(time=time, memory=MEMORY, disk=DISK)
         if not self._process:
             try:
-                self._process = ChildProcess(_Runner, self._folder, self._job, limits=limits)
+                beside = str(Path(self._folder).parent)  # in the folder of the worker, which Dask may kill
+                self._process = ChildProcess(_Runner, self._folder, self._job, limits=limits, temporary=beside)
             except ChildError as error:
                 raise LoadError(f"the FMU {_predicate(error, time)}") from error
         try:
