@@ -100,6 +100,8 @@ YAW = Axis(
 )
 AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, ROLL, PITCH, YAW)}
 """All kinds of axes by name, in the order of their states."""
+EXTERNAL = frozenset(axis.external for axis in AXES.values())
+"""The names of the forces and moments on the body: X_ext ..."""
 COUPLED_AXES = (SURGE, SWAY, YAW)
 """The axes that the Coriolis and Munk terms couple in a vehicle without roll and pitch."""
 

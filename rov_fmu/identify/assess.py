@@ -244,16 +244,17 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle, pushes: Sequence[float] = ()) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
-    If `pushes` are given, these commands push by such shares of the full push of the fit. The values are those of the
-    vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit, whose curves bend freely,
-    the intervals are wider by the difference.
+    `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit. The values are
+    those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit, whose curves
+    bend freely, the intervals are wider by the difference.
     """
     table = posterior.table
 
     def values(vehicle: Vehicle, shapes: Shapes) -> Array:
+        if not pushes:
+            return np.array([_response(shapes.motion(vehicle, axis, c)) for c in ANSWERED])
         rest, full = (shapes.motion(vehicle, axis, c) for c in (0.0, 1.0))
-        motions = [replace(full, C=rest.C + push * (full.C - rest.C)) for push in pushes]
-        return np.array([*map(_response, motions or (shapes.motion(vehicle, axis, c) for c in ANSWERED))])
+        return np.array([_response(replace(full, C=rest.C + push * (full.C - rest.C))) for push in pushes])
 
     def logarithms(z: Array) -> Array:
         fitted = values(Vehicle(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))

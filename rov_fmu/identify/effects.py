@@ -64,7 +64,7 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
             continue
         total = np.zeros(len(posterior.z))
         total[place] = 1.0
-        for kind in ("dead time", "lag"):  # what the vehicle does not keep is of the logger
+        for kind in ("dead time", "lag"):  # a delay that the vehicle does not keep belongs to the logger
             later = table.place(kind)
             if later is not None and later in posterior.absent:
                 total[later] = 1.0

@@ -536,8 +536,9 @@ def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
 
 def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
     """Yield findings about full commands, and about turns that the model takes for independent of the other motion."""
-    wrench = identification.folder.rov_file.description
-    if one.commands and not (wrench and wrench.layout.has_wrench):  # whose full command is its largest force
+    description = identification.folder.rov_file.description
+    # The full command of a wrench is its largest force in the logs, so it says nothing about what thrusters can follow.
+    if one.commands and not (description and description.layout.has_wrench):
         values = np.abs(one.commands.at(one.commands.rows))
         share = float(np.mean(np.any(values >= _FULL, axis=1)))
         if share > _SATURATED:

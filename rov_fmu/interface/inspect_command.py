@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
-from rov_fmu.equation.catalogue import AXES, BODY, PITCH, ROLL
+from rov_fmu.equation.catalogue import AXES, BODY, EXTERNAL, PITCH, ROLL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
@@ -127,7 +127,7 @@ def _draft(folder: Path, found: Sequence[Inspection], tables: TableHeaders, thru
         quoted=_quoted,
         names=one_line(brief(", ".join(dict.fromkeys(one.path.name for one in found)))),
         is_own=not base and len(thrusters) > 1,
-        is_wrench=not {*thrusters}.isdisjoint(axis.external for axis in AXES.values()),
+        is_wrench=not EXTERNAL.isdisjoint(thrusters),
         thrusters=thrusters,
         shipped=SHIPPED,
         base=base,

@@ -169,6 +169,20 @@ _VIDEORAY = Manoeuvre(
     },
 )
 
+# The beginning and the end of a flight of the BlueROV2s: commands along four axes, and two thrusters in a current.
+_FOUR_AXES: dict[float, dict[str, float]] = {
+    0.0: {},
+    1.0: {"surge": 0.4, "heave": 0.3},
+    4.0: {"surge": 0.3, "yaw": 0.15, "heave": 0.2},
+    8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
+    11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
+    14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
+}
+_IN_A_CURRENT = {
+    25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
+    28.0: {"u_2": 0.2, **_CURRENT},
+}
+
 # Buoyancy acts high above the centre of mass, so that the vehicle tilts but does not turn over.
 _HEAVY = Manoeuvre(
     "bluerov2_heavy",
@@ -188,16 +202,10 @@ _HEAVY = Manoeuvre(
         "beta_r": 0.8,
     },
     {
-        0.0: {},
-        1.0: {"surge": 0.4, "heave": 0.3},
-        4.0: {"surge": 0.3, "yaw": 0.15, "heave": 0.2},
-        8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
-        11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
-        14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
+        **_FOUR_AXES,
         17.0: {"surge": 0.35, "sway": 0.1, **_LOADS_OF_SIX},
         21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS_OF_SIX},
-        25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
-        28.0: {"u_2": 0.2, **_CURRENT},
+        **_IN_A_CURRENT,
     },
 )
 
@@ -217,16 +225,10 @@ _IDENTIFIED = Manoeuvre(
         "beta_r": 0.8,
     },
     {
-        0.0: {},
-        1.0: {"surge": 0.4, "heave": 0.3},
-        4.0: {"surge": 0.3, "yaw": 0.15, "heave": 0.2},
-        8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
-        11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
-        14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
+        **_FOUR_AXES,
         17.0: {"surge": 0.35, "sway": 0.1, "Y_ext": 8.0, **_LOADS},
         21.0: {"yaw": 1.0, "heave": 1.0, "Y_ext": 8.0, **_LOADS},
-        25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
-        28.0: {"u_2": 0.2, **_CURRENT},
+        **_IN_A_CURRENT,
     },
 )
 

@@ -311,18 +311,16 @@ def integrity(subject: Subject) -> Evidence:
     found = check_evidence(subject.path, subject.key)
     if not (found.files or found.signer):
         return _not("the FMU carries no hashes of its files, and no signature lies beside it")
-    words = (
-        f"All {len(found.files)} files match the hashes in the FMU. It is not signed: whoever changed a file may have "
-        "changed its hash too."
-    )
+    count = len(found.files)
     if found.signer:
         known = "given with --key" if subject.key else "compare it with the fingerprint that its maker gives"
-        words = (
-            f"All {len(found.files)} files are as they were built; it is signed with the key {found.signer} ({known})."
-        )
+        words = f"All {count} files are as they were built; it is signed with the key {found.signer} ({known})."
+    else:
+        words = f"All {count} files match the hashes in the FMU. It is not signed: whoever changed a file may have "
+        words += "changed its hash too."
     rows = [("Program", name, digest) for name, digest in found.generator.items()]
     rows += [("File read", name, digest) for name, digest in found.inputs.items()]
-    return Evidence("holds", words, f"{len(found.files)} files", ("Made from", "Name", "Hash"), rows)
+    return Evidence("holds", words, f"{count} files", ("Made from", "Name", "Hash"), rows)
 
 
 def unseen(subject: Subject) -> Evidence:

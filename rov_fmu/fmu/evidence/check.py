@@ -84,7 +84,7 @@ def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str
     members = [name for name in archive.namelist() if not name.endswith("/")]
     for name, times in Counter(archive.namelist()).items():
         if times > 1:
-            yield f"{shown(name)}: is {times} times in the archive"
+            yield f"{shown(name)} is {times} times in the archive"
     for name in sorted({*members, *files}, key=lambda name: (name != META_DATA, name)):
         if name not in members:
             yield f"{shown(name)} is missing; it was there when the FMU was built"

@@ -90,6 +90,7 @@ def fit_all(
         on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
 
     near = minimise(full, _scaled(full, ends[0].z), on_step=show_full, last=False)
+    # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     best = minimise(full, _scaled(full, near.z), most=2)
     posterior = Posterior.of(table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf

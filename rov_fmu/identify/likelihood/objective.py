@@ -191,8 +191,9 @@ class Objective:
         Exact ones contain the changes of the gains of the filter, and are differences to both sides. The others guide
         the steps of a fit: their gains are frozen, and they are differences to one side, which takes a twentieth of the
         time. They are no measure of the information: their errors make the common scale of all forces, which the motion
-        does not tell, look determined, and where the model does not explain a log, half of a gradient with frozen gains
-        had the wrong sign. Without derivatives with respect to the noise, those of earlier data are returned, or 0.
+        does not tell, look determined. Where the model does not explain a log, half of the components of a gradient
+        with frozen gains had the wrong sign. Without derivatives with respect to the noise, those of earlier data are
+        returned, or 0.
         """
         found = [Data.of(run, len(z)) for run in runs]
         work: list[Callable[[], None]] = []

@@ -56,7 +56,7 @@ def minimise(
 
     Every other step moves all parameters, and the others those of the motion alone, which takes a fifth of the time.
     The fit ends when a step of all parameters reduces J by less than `enough`. Without the noise, its parameters keep
-    their values. If the fit is not the `last` one, its information may be that of the step before.
+    their values. Only the `last` fit has exact data and information; those of others may be of the step before.
     """
     of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
     z = np.clip(start, objective.low, objective.high)

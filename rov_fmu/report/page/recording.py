@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.catalogue import EXTERNAL
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import NO_FILE, FileError
@@ -75,7 +75,7 @@ def _commands(log: Log, layout: Layout) -> tuple[Array, dict[str, list[float]]]:
     assert isinstance(commands, Commands)
     times = np.unique([commands.rows[0], *commands.time, commands.rows[-1]])
     given = commands.at(times)
-    if {*commands.thrusters} <= {axis.external for axis in AXES.values()}:  # the forces of a wrench are loads
+    if EXTERNAL.issuperset(commands.thrusters):  # the forces of a wrench are loads
         return times, {name: _rounded(column) for name, column in zip(commands.thrusters, given.T, strict=True)}
     if commands.thrusters == (COMMAND,) and log.axis:
         signs = layout.signs(log.axis)

@@ -70,7 +70,8 @@ class Child:
         limits = Limits(time=time, memory=MEMORY, disk=DISK)
         if not self._process:
             try:
-                beside = str(Path(self._folder).parent)  # in the folder of the worker, which Dask may kill
+                # In the folder of the worker, which the study removes even where Dask kills the worker.
+                beside = str(Path(self._folder).parent)
                 self._process = ChildProcess(_Runner, self._folder, self._job, limits=limits, temporary=beside)
             except ChildError as error:
                 raise LoadError(f"the FMU {_predicate(error, time)}") from error

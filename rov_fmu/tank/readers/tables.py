@@ -14,7 +14,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, Axis
+from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
     NEUTRAL,
@@ -174,7 +174,7 @@ def _no_commands(
     hint = f"; is it the column {' or '.join(near)}?" if near else ""
     hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
     units = dict.fromkeys(f"[{unit}]" for one in known.values() if one.commands for unit in one.column.units)
-    if loads := [title for name, title in unread.items() if name in {axis.external for axis in AXES.values()}]:
+    if loads := [title for name, title in unread.items() if name in EXTERNAL]:
         hint = f"; {listed(loads)} are forces on the body, if wrench = true stands in [logs] of rov.toml"
     every = "each in [%], [1] or [us]" if "[%]" in units else f"in {listed(units, 'or')}"
     return f"there is no column of commands. Possible columns: {wanted}, {every}{hint or renaming}"

@@ -270,7 +270,7 @@ def test_files_that_were_added_or_taken_away_are_named(videoray_fmu: Path, tmp_p
     with zipfile.ZipFile(fmu, "a") as twice, pytest.warns(UserWarning, match="Duplicate name"):
         twice.writestr("a", b"2")
     assert main(["prove", str(fmu)]) == 1
-    assert capsys.readouterr().err == f"rov-fmu: {fmu}: 'a': is 2 times in the archive\n"
+    assert capsys.readouterr().err == f"rov-fmu: {fmu}: 'a' is 2 times in the archive\n"
 
 
 def test_a_byte_changed_in_the_archive_itself_names_the_file(
