@@ -20,7 +20,6 @@ import os
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -43,9 +42,8 @@ from rov_fmu.c.compile import C_FLAGS, UNITY_FILE, WARNINGS, compiler, fmi_heade
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from verification.new_tests import copy_checkout, environment
+from verification.checkouts import ROOT, copy_checkout, environment, run_limited
 
-ROOT = Path(__file__).parents[1]
 LEAST = 0.85
 """The share of the mutants that the tests must kill."""
 FILES = ("rov_fmu/**/*.py", "fmu_src/c/*.c")
@@ -274,41 +272,30 @@ def applied(row: Row) -> Mutant | None:
     The line is looked for with its neighbours in its file, then alone in its file, then with its neighbours anywhere.
     """
     texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in files()}
+    neighbours = [row["above"], row["before"], row["below"]]
 
-    def places(file: str, with_neighbours: bool) -> list[tuple[str, int]]:
+    def places(file: str, number_above: int) -> list[tuple[str, int]]:
+        """Return where a file has the line with so many of its neighbours above, and as many below."""
         lines = ["", *texts.get(file, "").splitlines(), ""]
-        wanted = [row["above"], row["before"], row["below"]]
-        return [
-            (file, n)
-            for n in range(1, len(lines) - 1)
-            if lines[n] == wanted[1] and (not with_neighbours or lines[n - 1 : n + 2] == wanted)
-        ]
+        wanted = neighbours[1 - number_above : 2 + number_above]
+        numbers = range(1, len(lines) - 1)
+        return [(file, n) for n in numbers if lines[n - number_above : n + 1 + number_above] == wanted]
 
-    for found in (
-        places(row["file"], True),
-        places(row["file"], False),
-        [place for file in texts for place in places(file, True)],
-    ):
+    anywhere = [place for file in texts for place in places(file, 1)]
+    for found in (places(row["file"], 1), places(row["file"], 0), anywhere):
         if len(found) == 1:
             file, line = found[0]
             return Mutant(file, line, row["before"], row["after"], with_line(texts[file], line, row["after"]))
     return None
 
 
+_PYTEST = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider"]
+
+
 def _baseline(tests: Sequence[str], folder: Path, jobs: int) -> dict[str, float]:
     """Run tests without a mutant. Return the time of each file of tests in which all pass."""
     report = folder / "report.xml"
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-n",
-        str(jobs),
-        "-p",
-        "no:cacheprovider",
-        f"--junitxml={report}",
-        *tests,
-    ]
+    command = [*_PYTEST, "-n", str(jobs), f"--junitxml={report}", *tests]
     subprocess.run(command, cwd=folder, env=environment(folder), stdout=subprocess.DEVNULL, check=False)
     if not report.exists():
         raise click.ClickException(f"the tests cannot be run without a mutant: pytest {' '.join(tests)}")
@@ -342,24 +329,9 @@ def _verdict(mutant: Mutant, folder: Path, seconds: Mapping[str, float]) -> tupl
     """Run the tests of a mutant in a copy of the checkout until one fails; return the verdict and the failing test."""
     tests = _quickest_first(mutant.file, seconds)
     limit = ["-o", "faulthandler_timeout=60", "-o", "faulthandler_exit_on_timeout=true"]
-    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-vv", "-p", "no:cacheprovider", *limit, *tests]
-    with (folder / "output").open("w+", encoding="utf-8") as output:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=environment(folder) | {"COLUMNS": "500"},
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        try:
-            code: int | None = process.wait(_LIMIT)
-        except subprocess.TimeoutExpired:
-            code = None
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-    begun = _BEGUN.findall((folder / "output").read_text(encoding="utf-8", errors="replace"))
+    command = [*_PYTEST, "-n", "0", "-x", "-vv", *limit, *tests]
+    code, output = run_limited(command, folder, environment(folder) | {"COLUMNS": "500"}, _LIMIT)
+    begun = _BEGUN.findall(output)
     if code == 0 or (code is None and begun):
         return "survived", ""
     return "killed", begun[-1][0] if begun else "the import"
@@ -395,11 +367,15 @@ def run(rows: Sequence[Row], jobs: int, save: Callable[[], None] = lambda: None)
 
 
 def run_kept(results: Path, reference: Sequence[Row], jobs: int = 1) -> list[Row]:
-    """Give every kept mutant without a verdict its verdict in a file of results, and return all rows."""
+    """Give the rows of the reference verdicts in a file of results, which may have some of them. Return all rows."""
     new = [row | dict.fromkeys(("verdict", "seconds", "test"), "") for row in reference]
     rows = read_rows(results) if results.exists() else new
     run(rows, jobs, lambda: _write_rows(results, rows))
     return rows
+
+
+def _print_change(row: Row) -> None:
+    click.echo(f"{row['file']}:{row['line']}\n    - {row['before'].strip()}\n    + {row['after'].strip()}")
 
 
 def _compare(rows: Sequence[Row], reference: Sequence[Row]) -> bool:
@@ -407,8 +383,10 @@ def _compare(rows: Sequence[Row], reference: Sequence[Row]) -> bool:
     for verdict, number in Counter(row["verdict"] for row in rows).items():
         click.echo(f"{number} of {len(rows)}: {verdict}")
     lost = [now for was, now in zip(reference, rows, strict=True) if (was["verdict"], now["verdict"]) == _LOST]
+    if lost:
+        click.echo("killed before:")
     for row in lost:
-        click.echo(f"was killed: {row['file']}:{row['line']}\n    - {row['before']}\n    + {row['after']}")
+        _print_change(row)
     return not lost
 
 
@@ -442,7 +420,7 @@ def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, re
     run(rows, jobs)
     left = [row for row in rows if row["verdict"] == "survived"]
     for row in left:
-        click.echo(f"{row['file']}:{row['line']}\n    - {row['before'].strip()}\n    + {row['after'].strip()}")
+        _print_change(row)
     killed = 1.0 - len(left) / len(rows)
     click.echo(f"{100.0 * killed:.0f} % of the mutants are killed; at least {100.0 * LEAST:.0f} % must be")
     sys.exit(0 if killed >= LEAST else 1)

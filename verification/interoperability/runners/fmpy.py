@@ -7,72 +7,35 @@ call, with the FMU compiled from its sources (`fmpy compile`).
 
 import subprocess
 import sys
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-from fmpy import extract, read_model_description, simulate_fmu
-from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
+from fmpy import extract, simulate_fmu
 from fmpy.util import read_csv, write_csv
 
 from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, detour, fly, parameters
+from verification.references.fmpy_slave import Slave
 
 
-class Slave:
-    """A slave whose variables are accessed by name."""
-
-    def __init__(self, fmu: str, values: Mapping[str, float], **options: object) -> None:
-        """Start with these parameters."""
-        description = read_model_description(fmu)
-        self.reference = {variable.name: variable.valueReference for variable in description.modelVariables}
-        slave = FMU2Slave if description.fmiVersion == "2.0" else FMU3Slave
-        self.fmu: Any = slave(
-            guid=description.guid,
-            unzipDirectory=extract(fmu),
-            instanceName="rov",
-            modelIdentifier=description.coSimulation.modelIdentifier,
-        )
-        self.fmu.instantiate(**options)
-        if slave is FMU2Slave:
-            self.fmu.setupExperiment(startTime=0.0)
-            self._get, self._set = self.fmu.getReal, self.fmu.setReal
-        else:
-            self._get, self._set = self.fmu.getFloat64, self.fmu.setFloat64
-        self.put(values)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-
-    def put(self, values: Mapping[str, float]) -> None:
-        self._set([self.reference[name] for name in values], list(values.values()))
-
-    def get(self, *names: str) -> list[float]:
-        return list(self._get([self.reference[name] for name in names]))
-
-    def step(self, start: float, length: float) -> None:
-        self.fmu.doStep(currentCommunicationPoint=start, communicationStepSize=length)
-
-    def end(self) -> None:
-        self.fmu.terminate()
-        self.fmu.freeInstance()
+def started(**options: object) -> Slave:
+    """Return an instance with the parameters of the manoeuvre."""
+    rov = Slave(extract(FMU), **options)
+    rov.initialize(parameters())
+    return rov
 
 
 def by_hand() -> None:
     """Step the FMU, with the detour."""
-    rov = Slave(FMU, parameters())
+    rov = started()
 
     def advance(step: Step) -> None:
         if step.detour:
-            state = rov.fmu.getFMUState()
-            kept = rov.fmu.serializeFMUState(state)
-            rov.fmu.freeFMUState(state)
+            kept = rov.saved()
             rov.put(detour())
             rov.step(step.start, 1.0)
-            state = rov.fmu.deserializeFMUState(kept)
-            rov.fmu.setFMUState(state)
-            rov.fmu.freeFMUState(state)
+            rov.restore(kept)
         rov.put(step.inputs)
         rov.step(step.start, step.length)
 
@@ -105,7 +68,7 @@ def with_events() -> None:
             if event or end or early != (expected == half) or time != expected:
                 raise RuntimeError(f"a step from {start} ended at {time}, early: {early}")
 
-    rov = Slave(FMU, parameters(), eventModeUsed=True, earlyReturnAllowed=True, intermediateUpdate=update)
+    rov = started(eventModeUsed=True, earlyReturnAllowed=True, intermediateUpdate=update)
     update_discrete_states()
     fly(advance, partial(rov.get, *OUTPUTS))
     rov.end()

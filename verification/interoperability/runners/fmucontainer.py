@@ -6,10 +6,10 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from fmpy import read_model_description
+from fmpy import extract, read_model_description
 
 from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, fly, parameters, steps
-from verification.interoperability.runners.fmpy import Slave
+from verification.references.fmpy_slave import Slave
 
 ROVS = ("port", "starboard")
 
@@ -36,7 +36,8 @@ def build() -> str:
 
 
 if __name__ == "__main__":
-    pair = Slave(build(), {})
+    pair = Slave(extract(build()))
+    pair.initialize({})
 
     def advance(step: Step) -> None:
         pair.put({f"{rov}_{name}": value for rov in ROVS for name, value in step.inputs.items()})
