@@ -1,11 +1,10 @@
-"""Copies of this checkout, checkouts of other commits, and programs that run in them."""
+"""Copies of this checkout, and checkouts of other commits."""
 
 import os
 import shutil
-import signal
 import subprocess
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -39,30 +38,3 @@ def environment(tree: Path) -> dict[str, str]:
     """Return the environment in which Python imports the package of a checkout, in child processes too."""
     own = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
     return own | {"PYTHONPATH": str(tree)}
-
-
-def run_limited(
-    command: Sequence[str], folder: Path, environment: Mapping[str, str], seconds: float
-) -> tuple[int | None, str]:
-    """Run a program in a folder. Return its exit code, or None after so many seconds, and what it printed.
-
-    It runs in a session of its own, so that whatever it has started ends with it.
-    """
-    with (folder / "output.txt").open("w+", encoding="utf-8", errors="replace") as output:
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        code: int | None = None
-        with suppress(subprocess.TimeoutExpired):
-            code = process.wait(seconds)
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        output.seek(0)
-        return code, output.read()

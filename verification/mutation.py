@@ -42,7 +42,8 @@ from rov_fmu.c.compile import C_FLAGS, UNITY_FILE, WARNINGS, compiler, fmi_heade
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from verification.checkouts import ROOT, copy_checkout, environment, run_limited
+from verification.checkouts import ROOT, copy_checkout, environment
+from verification.references.limited import run_limited
 
 LEAST = 0.85
 """The share of the mutants that the tests must kill."""

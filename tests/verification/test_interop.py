@@ -159,7 +159,7 @@ def test_incomplete_result_is_an_error(
 # ---- The command -----------------------------------------------------------------------------------------------------
 
 PRETEND = Importer(
-    "pretend", "Pretend", "CS", "python", ("requirements.txt", "fmpy"), "pretend", ("{python}", "-c", "pass"), EXACT
+    "pretend", "Pretend", "CS", "python", "fmpy", "pretend", "requirements.txt", "pretend", ("{python}", "-c", "pass")
 )
 COPY = "import shutil; shutil.copy({source!r}, 'result.csv')"
 

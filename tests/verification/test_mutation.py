@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 
 from verification import mutation
+from verification.checkouts import ROOT
 
 
 def test_every_file_has_tests() -> None:
     files = mutation.files()
     assert {"rov_fmu/equation/step.py", "rov_fmu/identify/likelihood/objective.py", "fmu_src/c/step.c"} <= {*files}
-    assert not [test for file in files for test in mutation.tests_of(file) if not (mutation.ROOT / test).exists()]
+    assert not [test for file in files for test in mutation.tests_of(file) if not (ROOT / test).exists()]
     tests = mutation.tests_of("rov_fmu/equation/alone.py")
     assert tests[0] == "tests/equation/test_alone.py", "those that import it are the first"
     assert mutation.tests_of("rov_fmu/process.py"), "every file of the product has tests"
@@ -72,7 +73,7 @@ def test_verdicts_are_written_one_by_one(tmp_path: Path, monkeypatch: pytest.Mon
     file = "rov_fmu/equation/alone.py"
     monkeypatch.setattr(mutation, "tests_of", lambda _: ["tests/equation/test_alone.py"])
     before = "from dataclasses import dataclass"
-    line = 1 + (mutation.ROOT / file).read_text(encoding="utf-8").splitlines().index(before)
+    line = 1 + (ROOT / file).read_text(encoding="utf-8").splitlines().index(before)
     mutants = [mutation.Mutant(file, line, before, after, "") for after in (f"{before}  # same", "1 / 0")]
     rows = [*map(mutation.kept, mutants), mutation.kept(mutants[0]) | {"before": "no such line"}]
     results = tmp_path / "results.csv"

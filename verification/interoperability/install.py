@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from .importers import HERE, IMPORTERS, RUNNERS, Importer, environment
+from .importers import HERE, IMPORTERS, Importer, environment
 from .run import without_places
 
 # The programs that each kit needs from the system, and the Debian packages that contain them.
@@ -37,7 +37,7 @@ def install(kit: str, tools: Path, say: Callable[[str], None]) -> None:
 def _install(kit: str, programs: tuple[str, ...], tools: Path, say: Callable[[str], None]) -> None:
     if missing := [name for name in programs if shutil.which(name) is None]:
         raise InstallError(f"there is no {missing[0]}")
-    wanted = {i.pin: i for i in IMPORTERS if i.kit == kit and not i.is_installed(tools)}
+    wanted = {(i.pin_file, i.package): i for i in IMPORTERS if i.kit == kit and not i.is_installed(tools)}
     if not wanted:
         say(f"{kit}: all is there")
     elif kit == "python":
@@ -61,15 +61,14 @@ def _install_python(requirements: str, tools: Path) -> None:
 
 
 def _install_java(importer: Importer, tools: Path) -> None:
-    goal = "unpack-dependencies" if importer.name == "vdmcheck" else "copy-dependencies"
-    project = RUNNERS / importer.name / "pom.xml"
-    folder = tools / "java" / importer.name
+    goal = "unpack-dependencies" if importer.program == "vdmcheck" else "copy-dependencies"
+    project, folder = HERE / importer.pin_file, tools / "java" / importer.program
     places = [f"-DoutputDirectory={folder}", f"-DmarkersDirectory={folder}"]
     _call(["mvn", "-q", "-B", "-f", str(project), f"{MAVEN}:{goal}", *places], tools)
 
 
 def _install_rust(importer: Importer, tools: Path) -> None:
-    package = importer.pin[1]
+    package = importer.package
     folder = tools / "rust" / f"{package}-{importer.version}"
     # Without optimization, because it would take longer than it saves.
     options = ["--quiet", "--config", "profile.dev.debug=false"]
@@ -78,7 +77,7 @@ def _install_rust(importer: Importer, tools: Path) -> None:
         _call(["cargo", "install", *options, "--debug", "--locked", program, "--root", str(folder)], tools)
         return
     with tempfile.TemporaryDirectory() as name:  # Cargo.lock names the registry, so it must not be in the sources
-        project = shutil.copytree((HERE / importer.pin[0]).parent, Path(name) / "fly") / "Cargo.toml"
+        project = shutil.copytree((HERE / importer.pin_file).parent, Path(name) / "fly") / "Cargo.toml"
         _call(["cargo", "build", *options, "--manifest-path", str(project), "--target-dir", str(folder)], tools)
 
 

@@ -22,6 +22,8 @@ from math import isfinite
 from pathlib import Path
 
 from rov_fmu.equation.catalogue import AXES
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.toml_file import read_toml
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.vehicles import EVERY_OPTION, IDENTIFIED
@@ -48,11 +50,7 @@ class Manoeuvre:
     parameters: Mapping[str, float]
     """The parameters that differ from the vehicle file."""
     phases: Mapping[float, Mapping[str, float]]
-    """The inputs from each time (s) on. The name of an axis stands for a command to all thrusters that drive it.
-    Commands are fractions, also if the vehicle takes pulse widths.
-
-    The first phase has no inputs, so that it does not matter when an importer sets the first inputs.
-    """
+    """The inputs from each time (s) on, as manoeuvres.toml explains them."""
 
     @cached_property
     def rov(self) -> Vehicle:
@@ -139,140 +137,8 @@ def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[object]]) 
         csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
-_CURRENT = {"V_N": 0.3, "V_E": -0.2}
-_LOADS = {"X_ext": -6.0, "Z_ext": 3.0, "N_ext": 0.2, **_CURRENT}
-_LOADS_OF_SIX = {**_LOADS, "Y_ext": 8.0, "K_ext": 0.5, "M_ext": -0.4, "V_D": 0.1}
-
-_VIDEORAY = Manoeuvre(
-    "videoray",
-    {
-        "m_rov": 7.2,
-        "I_r": 0.12,
-        "a_d_u": 3.5,
-        "b_d_w": 0.9,
-        "alpha_u": 1.0,
-        "beta_w": 0.7,
-        "alpha_r": 1.1,
-        "beta_r": 0.25,
-    },
-    {
-        0.0: {},
-        1.0: {"surge": 0.3},
-        4.0: {"u_l": 0.7, "u_r": 0.6, "u_t": 0.4},
-        8.0: {"u_l": 0.5, "u_r": 0.2, "u_t": 0.2},
-        11.0: {"yaw": -0.3, "heave": -0.5},
-        14.0: {"u_l": -0.5, "u_r": -0.4, "u_t": -0.2},
-        17.0: {"surge": 0.4, **_LOADS},
-        21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS},
-        25.0: {"surge": -0.2, **_CURRENT},
-        28.0: _CURRENT,
-    },
-)
-
-# The beginning and the end of a flight of the BlueROV2s: commands along four axes, and two thrusters in a current.
-_FOUR_AXES: dict[float, dict[str, float]] = {
-    0.0: {},
-    1.0: {"surge": 0.4, "heave": 0.3},
-    4.0: {"surge": 0.3, "yaw": 0.15, "heave": 0.2},
-    8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
-    11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
-    14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
+MANOEUVRES = {
+    name: Manoeuvre(name, found["parameters"], {float(start): inputs for start, inputs in found["phases"].items()})
+    for name, found in read_toml(Path(__file__).with_name("manoeuvres.toml"), FileError).items()
 }
-_IN_A_CURRENT = {
-    25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
-    28.0: {"u_2": 0.2, **_CURRENT},
-}
-
-# Buoyancy acts high above the centre of mass, so that the vehicle tilts but does not turn over.
-_HEAVY = Manoeuvre(
-    "bluerov2_heavy",
-    {
-        "m_rov": 14.5,
-        "a_d_v": 190.0,
-        "b_d_r": 0.1,
-        "m_a_u": 7.0,
-        "B": 134.0,
-        "z_B": -0.2,
-        "a_t_t200_reverse": 20.0,
-        "c_0_t200": 0.1,
-        "T_t200": 0.15,
-        "alpha_v": 0.9,
-        "beta_w": 0.7,
-        "alpha_r": 1.1,
-        "beta_r": 0.8,
-    },
-    {
-        **_FOUR_AXES,
-        17.0: {"surge": 0.35, "sway": 0.1, **_LOADS_OF_SIX},
-        21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS_OF_SIX},
-        **_IN_A_CURRENT,
-    },
-)
-
-# Beyond what was identified in the middle, so that the output `outside` changes.
-_IDENTIFIED = Manoeuvre(
-    "identified",
-    {
-        "m_rov": 12.0,
-        "a_d_v": 24.0,
-        "b_d_r": 0.1,
-        "m_a_u": 6.0,
-        "c_0_t200": 0.1,
-        "T_t200": 0.15,
-        "alpha_v": 0.9,
-        "beta_w": 0.7,
-        "alpha_r": 1.1,
-        "beta_r": 0.8,
-    },
-    {
-        **_FOUR_AXES,
-        17.0: {"surge": 0.35, "sway": 0.1, "Y_ext": 8.0, **_LOADS},
-        21.0: {"yaw": 1.0, "heave": 1.0, "Y_ext": 8.0, **_LOADS},
-        **_IN_A_CURRENT,
-    },
-)
-
-_EVERY_OPTION = Manoeuvre(
-    "every_option",
-    {
-        "m_rov": 21.0,
-        "a_d_v": 80.0,
-        "B": 206.5,
-        "W": 206.0,
-        "T_d": 0.17,
-        "d_pair": 5.0,
-        "lift_rudder": 8.0,
-        "beta_u": 0.9,
-    },
-    {
-        0.0: {},
-        1.0: {"u_ahead": 0.4, "u_down": 0.3, "u_rudder": 0.3, "u_turn": 0.1, "u_side": 0.2, "u_plane": 0.2},
-        4.0: {
-            "u_ahead": 0.3,
-            "u_down": 0.2,
-            "u_rudder": 0.1,
-            "u_turn": 0.05,
-            "u_side": 0.1,
-            "u_plane": 0.1,
-            "voltage": 13.0,
-        },
-        8.0: {
-            "u_ahead": 0.5,
-            "u_down": -0.5,
-            "u_rudder": -0.7,
-            "u_turn": -0.3,
-            "u_side": -0.6,
-            "u_plane": -0.5,
-            "voltage": 15.5,
-        },
-        11.0: {"u_ahead": -0.5, "u_down": 0.4, "u_turn": 0.4, "u_side": 0.7, "K_ext": 1.5, "M_ext": 2.0},
-        14.0: {"u_ahead": -0.3, "u_rudder": 0.5, "u_plane": 0.6, "K_ext": -2.0, "M_ext": -3.0, "voltage": 17.0},
-        17.0: {"u_ahead": 0.6, "u_turn": -0.2, **_LOADS_OF_SIX},
-        21.0: {"u_ahead": 1.0, "u_down": 1.0, "u_rudder": 1.2, **_LOADS_OF_SIX},
-        25.0: {"u_side": 0.3, "u_plane": -0.2, "voltage": 14.0, **_CURRENT},
-        28.0: _CURRENT,
-    },
-)
-
-MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY, _IDENTIFIED, _EVERY_OPTION)}
 """The manoeuvres by the name of the vehicle."""

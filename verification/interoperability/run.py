@@ -4,7 +4,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import tempfile
 from dataclasses import dataclass
 from enum import Enum
@@ -13,6 +12,7 @@ from pathlib import Path
 
 from rov_fmu.build import build
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.references.limited import run_limited
 
 from .importers import HERE, Importer
 from .manoeuvre import VEHICLES, Manoeuvre, ResultError
@@ -67,16 +67,13 @@ def run(importer: Importer, fmu: Path, tools: Path, manoeuvre: Manoeuvre) -> Out
         log = without_places(log, folder, tools)
         if code != 0:
             return outcome(Verdict.FAILED, reason=code_name(code), log=log)
-        if importer.tolerance is None:
+        if (tolerance := importer.tolerance_for(manoeuvre.rov.layout)) is None:
             return outcome(Verdict.NO_FINDING)
         try:
             results = sorted(folder.glob("result*.csv")) or [folder / "result.csv"]
             largest = max(map(manoeuvre.difference, results))
         except ResultError as error:
             return outcome(Verdict.FAILED, reason=str(error), log=log)
-    tolerance = importer.tolerance
-    if importer.lagging_tolerance and manoeuvre.rov.layout.lagging:
-        tolerance = importer.lagging_tolerance
     verdict = Verdict.AGREES if largest <= tolerance else Verdict.DIFFERS
     return outcome(verdict, largest)
 
@@ -85,7 +82,7 @@ def obstacle(importer: Importer, tools: Path) -> str:
     """Return the reason why an importer cannot run, or an empty text."""
     if not importer.is_installed(tools):
         return f"python -m verification.interoperability --install {importer.kit}"
-    missing = [name for name in (importer.command[0], *importer.programs) if "{" not in name and not shutil.which(name)]
+    missing = [name for name in (importer.command[0], *importer.needs) if "{" not in name and not shutil.which(name)]
     return f"there is no {missing[0]}" if missing else ""
 
 
@@ -114,21 +111,5 @@ def _call(importer: Importer, folder: Path, tools: Path) -> tuple[int, str]:
         "TMPDIR": str(temporary),
         "LD_LIBRARY_PATH": str(tools / "python" / "lib"),  # TBB for Ecos
     }
-    with (folder / "log.txt").open("w+", errors="replace") as log:
-        # In a new session, so that a time-out also ends the programs that the runner has started.
-        process = subprocess.Popen(
-            importer.command_line(tools),
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        try:
-            code = process.wait(TIMEOUT)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            code = process.wait()
-        log.seek(0)
-        return code, log.read()
+    code, log = run_limited(importer.command_line(tools), folder, environment, TIMEOUT)
+    return -signal.SIGKILL if code is None else code, log
