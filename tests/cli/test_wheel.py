@@ -164,17 +164,7 @@ def lowest(folder: Path) -> Path:
     return path
 
 
-QUICK = [
-    "cli/test_start.py",
-    "fmu/test_build.py",
-    "report/test_report.py",
-    "vehicle/test_vehicle.py",
-    "vehicle/test_writer.py",
-    *(f"identify/test_{part}.py" for part in ("refit", "tuning")),
-    "study/test_kinds.py",
-]
-"""Tests of every part that uses a dependency."""
-MORE = [
+PARTS = [
     "cli/test_start.py",
     "fmu/test_build.py",
     "fmu/test_osp.py",
@@ -184,18 +174,15 @@ MORE = [
     *(f"identify/test_{part}.py" for part in ("identify", "refit", "tuning")),
     "study",
 ]
+"""Tests of every part that uses a dependency."""
 
 
-@pytest.mark.parametrize(
-    "tests",
-    [pytest.param(QUICK, marks=pytest.mark.long), pytest.param(MORE, marks=pytest.mark.weekly)],
-    ids=["some", "more"],
-)
-def test_the_lowest_versions_are_enough(tests: list[str], tmp_path: Path) -> None:
+@pytest.mark.weekly
+def test_the_lowest_versions_are_enough(tmp_path: Path) -> None:
     python = interpreter("3.10")
     if python is None:
         pytest.skip("there is no Python 3.10 here")
     made = environment(tmp_path / "venv", "-c", lowest(tmp_path), f"{ROOT}[test]", python=python)
-    command = [made.python, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *(f"tests/{part}" for part in tests)]
+    command = [made.python, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *(f"tests/{part}" for part in PARTS)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout[-3000:]

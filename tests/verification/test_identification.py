@@ -246,8 +246,11 @@ def test_the_command_writes_the_scores(
     assert "<svg" in (tmp_path / "scores.svg").read_text(encoding="utf-8")
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("known", [CALM, ROUGH], ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "known",
+    [pytest.param(CALM, marks=pytest.mark.long), pytest.param(ROUGH, marks=pytest.mark.weekly)],
+    ids=lambda one: one.name,
+)
 def test_our_bands_cover_on_the_simulated_vehicle(known: Simulated, tmp_path: Path) -> None:
     outcome = run(Identified(), load(known, None, tmp_path))
     rows = [*scores(outcome)]

@@ -275,10 +275,12 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
     return cache(partial(build_fmu, folder=tmp_path_factory.mktemp("FMU für Tests")))
 
 
+# The identified vehicle flies nearly as the BlueROV2 Heavy does, so weekly.yml flies it.
 @pytest.mark.interop
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
-@pytest.mark.parametrize("manoeuvre", MANOEUVRES.values(), ids=list(MANOEUVRES))
-def test_importer(importer: Importer, fmu: Callable[[str, int], Path], manoeuvre: Manoeuvre) -> None:
+@pytest.mark.parametrize("name", [name for name in MANOEUVRES if name != "identified"])
+def test_importer(importer: Importer, fmu: Callable[[str, int], Path], name: str) -> None:
+    manoeuvre = MANOEUVRES[name]
     if not importer.suits(manoeuvre.rov.layout):
         pytest.skip("it sets no inputs in events, or sets them late")
     outcome = run(importer, fmu(manoeuvre.vehicle, importer.fmi), TOOLS, manoeuvre)
