@@ -7,18 +7,18 @@ under "Compatibility information". Beside them stands tools.json, the entry of t
 `check` says where a folder breaks these rules, and how far FMPy's run of an FMU is from its reference solution.
 """
 
-import csv
 import json
 from collections.abc import Iterable, Iterator, Sequence
+from csv import QUOTE_NONNUMERIC
 from pathlib import Path
 
 import click
 import fmpy
 import numpy as np
+import pandas as pd
 from fmpy.validation import validate_fmu
 
 from rov_fmu.build import build
-from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -107,47 +107,58 @@ def _write_fmu(folder: Path, name: str, version: int, platforms: str | None) -> 
     problems = validate_fmu(str(fmu))
     report = [f"FMPy {fmpy.__version__}, validate_fmu: {len(problems)} problems", *problems]
     (folder / "fmpy-validate.txt").write_text("\n".join(report) + "\n", encoding="utf-8")
-    (folder / "Readme.txt").write_text(_readme(vehicle, version), encoding="utf-8")
+    axes = ", ".join(vehicle.layout.kinds)
+    readme = README.format(name=vehicle.name, about=vehicle.description, version=version, axes=axes, step=STEP)
+    (folder / "Readme.txt").write_text(readme, encoding="utf-8")
 
 
 def _write_csv(path: Path, names: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
     """Write a table by the CSV rules: quoted names, and numbers as in C."""
-    lines = [",".join(f'"{name}"' for name in names), *(",".join(map(repr, map(float, row))) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _readme(vehicle: Vehicle, version: int) -> str:
-    return README.format(
-        name=vehicle.name, about=vehicle.description, version=version, axes=", ".join(vehicle.layout.kinds), step=STEP
-    )
+    table = pd.DataFrame([*rows], columns=[*names], dtype=float)
+    path.write_text(table.to_csv(index=False, quoting=QUOTE_NONNUMERIC, lineterminator="\n"), encoding="utf-8")
 
 
 def check(folder: Path) -> Iterator[str]:
     """Yield a line for each rule that the folder of an FMU breaks; if it breaks none, run the FMU and compare."""
-    broken = [*_form_mistakes(folder)]
-    yield from broken or _run_mistakes(folder)
-
-
-def _form_mistakes(folder: Path) -> Iterator[str]:
-    """Yield a line for each rule about files and tables that a folder breaks."""
     name = folder.name
-    needed = [f"{name}.fmu", f"{name}_ref.csv", f"{name}_in.csv", f"{name}_ref.opt", "Readme.txt"]
-    if missing := [file for file in needed if not (folder / file).is_file()]:
-        yield from (f"{file}: this file is missing" for file in missing)
-        return
+    files = [f"{name}.fmu", f"{name}_ref.csv", f"{name}_in.csv", f"{name}_ref.opt", "Readme.txt"]
+    missing = [f"{file}: this file is missing" for file in files if not (folder / file).is_file()]
+    yield from missing or _broken_rules(folder) or _wrong_results(folder)
+
+
+def _broken_rules(folder: Path) -> list[str]:
+    """Return a line for each rule about tables that a folder breaks."""
+    name, lines = folder.name, []
     description = fmpy.read_model_description(str(folder / f"{name}.fmu"))
     known = {variable.name: variable.causality for variable in description.modelVariables}
-    for suffix in ("_ref.csv", "_in.csv"):
-        yield from _table_mistakes(folder / f"{name}{suffix}", known, inputs=suffix == "_in.csv")
-    options, time = _options(folder), _table(folder / f"{name}_ref.csv")[0]
-    if (time[0], time[-1]) != (options["StartTime"], options["StopTime"]):
-        yield f"{name}_ref.csv: must run from StartTime to StopTime of {name}_ref.opt"
+    inputs = {variable for variable, causality in known.items() if causality == "input"}
+    options = _options(folder)
+    for path in (folder / f"{name}_ref.csv", folder / f"{name}_in.csv"):
+        head, table = path.read_text(encoding="utf-8").partition("\n")[0], pd.read_csv(path)
+        first, *others = table.columns
+        time = table[first]
+        is_reference = path.stem.endswith("_ref")
+        strange = next((other for other in others if other not in known), "")
+        rules = {
+            f"must have at most {MOST_BYTES:,} bytes": path.stat().st_size <= MOST_BYTES,
+            "all names must be in quotation marks": head == ",".join(f'"{column}"' for column in table),
+            "the first column must be the time": first == "time",
+            f"{strange} is no variable of the FMU": not strange,
+            "must have all inputs of the FMU": is_reference or {*others} == inputs,
+            f"must have at most {MOST_VARIABLES} variables": not is_reference or len(others) <= MOST_VARIABLES,
+            "every row must have a number for each name": not table.isna().any(axis=None),
+            "the times must not fall": time.is_monotonic_increasing,
+            f"must run from StartTime to StopTime of {name}_ref.opt": not is_reference
+            or (time.iloc[0], time.iloc[-1]) == (options["StartTime"], options["StopTime"]),
+        }
+        lines += [f"{path.name}: {rule}" for rule, is_kept in rules.items() if not is_kept]
+    return lines
 
 
-def _run_mistakes(folder: Path) -> Iterator[str]:
+def _wrong_results(folder: Path) -> Iterator[str]:
     """Yield a line for each variable that FMPy's run of the FMU computes differently."""
     name, options = folder.name, _options(folder)
-    time, reference = _table(folder / f"{name}_ref.csv")
+    reference = pd.read_csv(folder / f"{name}_ref.csv", index_col="time")
     result = fmpy.simulate_fmu(
         str(folder / f"{name}.fmu"),
         stop_time=options["StopTime"],
@@ -156,8 +167,8 @@ def _run_mistakes(folder: Path) -> Iterator[str]:
         output=[*reference],
     )
     for column, expected in reference.items():
-        off = float(np.max(np.abs(np.interp(time, result["time"], result[column]) - expected)))
-        if off > options["RelTol"] * float(np.max(np.abs(expected))):
+        off = float(np.abs(np.interp(reference.index, result["time"], result[column]) - expected).max())
+        if off > options["RelTol"] * float(expected.abs().max()):
             yield f"{name}_ref.csv: {column} differs by {off:.2g} from the run of the FMU by FMPy"
 
 
@@ -166,38 +177,6 @@ def _options(folder: Path) -> dict[str, float]:
     lines = (folder / f"{folder.name}_ref.opt").read_text(encoding="utf-8").splitlines()
     pairs = (line.split(", ") for line in lines)
     return {key: float(value) for key, value in pairs if key != "SolverType"}
-
-
-def _table(path: Path) -> tuple[Array, dict[str, Array]]:
-    """Return the times, and the values of each variable by name."""
-    head, *lines = path.read_text(encoding="utf-8").splitlines()
-    (names,) = csv.reader([head])
-    time, *columns = np.array([line.split(",") for line in lines], float).T
-    return time, dict(zip(names[1:], columns, strict=True))
-
-
-def _table_mistakes(path: Path, known: dict[str, str], *, inputs: bool) -> Iterator[str]:
-    """Yield a line for each rule that a CSV file breaks."""
-    if path.stat().st_size > MOST_BYTES:
-        yield f"{path.name}: must have at most {MOST_BYTES:,} bytes"
-    head, *lines = path.read_text(encoding="utf-8").splitlines()
-    (names,) = csv.reader([head])
-    if head != ",".join(f'"{name}"' for name in names):
-        yield f"{path.name}: all names must be in quotation marks"
-    if names[0] != "time":
-        yield f"{path.name}: the first column must be the time"
-    if strange := [name for name in names[1:] if name not in known]:
-        yield f"{path.name}: {strange[0]} is no variable of the FMU"
-    if inputs and set(names[1:]) != {name for name, causality in known.items() if causality == "input"}:
-        yield f"{path.name}: must have all inputs of the FMU"
-    if not inputs and len(names) - 1 > MOST_VARIABLES:
-        yield f"{path.name}: must have at most {MOST_VARIABLES} variables"
-    rows = [[float(cell) for cell in line.split(",")] for line in lines]
-    if any(len(row) != len(names) for row in rows):
-        yield f"{path.name}: every row must have {len(names)} numbers"
-    times = [row[0] for row in rows]
-    if times != sorted(times):
-        yield f"{path.name}: the times must not fall"
 
 
 @click.command(help=__doc__)

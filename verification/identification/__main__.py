@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
+import pandas as pd
 from rich.console import Console
 
 from rov_fmu.io.messages import FileError
@@ -24,7 +25,7 @@ from verification.identification.methods.least_squares import LeastSquares
 from verification.identification.methods.output_error import OutputError
 from verification.identification.methods.unchanged import ConstantVelocity, Unchanged
 from verification.identification.protocol import Method, run
-from verification.identification.scores import from_csv, numbers, scores, to_csv
+from verification.identification.scores import Table, numbers, scores
 from verification.identification.show import picture, print_scores
 
 DATA_SETS: Sequence[DataSet] = (EXJOBB, TAUV, CALM, ROUGH)
@@ -76,12 +77,17 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
             for make in METHODS:
                 outcome = run(make(), split)
                 log.print(f"{one.name}: {outcome.method.name}, {outcome.seconds:.1f} s")
-                rows += [*scores(outcome)]
-                found += [*numbers(outcome)]
+                rows.append(scores(outcome))
+                found.append(numbers(outcome))
+    if not rows:
+        raise click.UsageError("nothing was run")
     if only and files[0].exists():
-        rows = [row for row in from_csv(files[0]) if row.data not in only] + rows
-    print_scores(rows, found)
-    texts = to_csv(rows), to_csv(found), picture(rows)
+        before = pd.read_csv(files[0])
+        rows.insert(0, before[~before.data.isin(only)])
+    tables: list[Table] = [pd.concat(rows), pd.concat(found)]
+    print_scores(*tables)
+    texts = [table.to_csv(index=False, float_format="%.6g", lineterminator="\n") for table in tables]
+    texts.append(picture(tables[0]))
     write_whole(*(Output(path, text.encode()) for path, text in zip(files, texts, strict=True)))
 
 

@@ -1,144 +1,76 @@
-"""The scores: errors, bands, time and coefficients, one row each, which is also the row of a CSV file."""
+"""The scores as tables of pandas, which are also the CSV files: errors, bands, time and coefficients.
 
-import csv
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
-from io import StringIO
-from math import nan
-from pathlib import Path
+`scores` has a row for each quantity and span: `error` is the root mean square of measured minus predicted and `noise`
+the standard deviation of the sensor's white noise, in SI units; `inside_50` and `inside_95` are the shares of the
+samples in the bands, and `width_50` and `width_95` the mean widths of these; `seconds` is the processor time of the
+method with this data set, and `edits` the number of values that a person entered into rov.toml for it. The span of open
+loop is infinite.
+"""
+
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.stats import norm
 
 from rov_fmu.tank.arrays import Array
 from verification.identification.protocol import Outcome
 
-_HALF = {level: float(norm.ppf(0.5 + 0.5 * level)) for level in (0.5, 0.95)}
-"""Half the width of a band in standard deviations."""
+Table = Any
+"""A DataFrame. Its published types do not know what its groups and rows have."""
+REFERENCE = "no change"
+"""The method that errors are relative to."""
 
 
-@dataclass(frozen=True)
-class Score:
-    """How well a method predicts one quantity over one span, in SI units."""
-
-    data: str
-    method: str
-    quantity: str
-    unit: str
-    span: float
-    """s; infinite for open loop."""
-    samples: int
-    error: float
-    """Root mean square of measured minus predicted."""
-    noise: float
-    """The standard deviation of the sensor's white noise."""
-    inside_50: float
-    inside_95: float
-    """The share of the samples in the bands."""
-    width_50: float
-    width_95: float
-    """The mean width of the bands."""
-    seconds: float
-    """Processor time of the method with this data set: fit and all predictions."""
-    edits: int
-    """The number of values that a person entered into rov.toml for this method."""
-
-
-@dataclass(frozen=True)
-class Number:
-    """A coefficient beside its true value."""
-
-    data: str
-    method: str
-    axis: str
-    name: str
-    true: float
-    value: float
-    low: float
-    high: float
-    """The ends of the 95 % interval."""
-
-
-def bands(error: Array, deviation: Array) -> tuple[float, float, float, float, float]:
+def bands(error: Array, deviation: Array) -> dict[str, float]:
     """Return the RMS error, the shares of samples in the bands of 50 and 95 %, and the mean widths of these bands."""
-    inside = [float(np.mean(np.abs(error) <= half * deviation)) for half in _HALF.values()]
-    widths = [float(np.mean(2.0 * half * deviation)) for half in _HALF.values()]
-    return float(np.sqrt(np.mean(error**2))), inside[0], inside[1], widths[0], widths[1]
+    found = {"error": float(np.sqrt(np.mean(error**2)))}
+    for level in (50, 95):
+        half = norm.ppf(0.5 + 0.005 * level) * deviation
+        found[f"inside_{level}"] = float(np.mean(np.abs(error) <= half))
+        found[f"width_{level}"] = float(np.mean(2.0 * half))
+    return found
 
 
-def scores(outcome: Outcome) -> Iterator[Score]:
-    """Yield a row for each quantity and span. The samples of all test recordings count equally."""
-    found: dict[tuple[str, str, float], list[tuple[Array, Array, float]]] = {}
+def scores(outcome: Outcome) -> Table:
+    """Return the scores of a method with a data set. The samples of all test recordings count equally."""
+    samples = []
     for one in outcome.predictions:
-        for number, m in enumerate(one.recording.channels):
-            own = one.counts & (one.recording.log.record.sensor == number)
-            key = m.channel.quantity.name, m.channel.quantity.unit, one.span
-            found.setdefault(key, []).append((one.error[own], one.deviation[own], m.noise))
+        channels, sensor = one.recording.channels, one.recording.log.record.sensor
+        of_sensor: dict[str, Any] = {
+            "quantity": [m.channel.quantity.name for m in channels],
+            "unit": [m.channel.quantity.unit for m in channels],
+            "noise": [m.noise for m in channels],
+        }
+        columns = {name: np.array(values)[sensor] for name, values in of_sensor.items()}
+        made = pd.DataFrame({**columns, "span": one.span, "error": one.error, "deviation": one.deviation})
+        samples.append(made[one.counts])
     method, split = outcome.method, outcome.split
-    for (quantity, unit, span), some in found.items():
-        error, deviation = (np.concatenate([one[k] for one in some]) for k in (0, 1))
-        noise = float(np.median([one[2] for one in some]))
-        rms, *shares = bands(error, deviation)
-        in_50, in_95, width_50, width_95 = shares
-        who, edits = (split.name, method.name, quantity, unit), split.edits[method.uses_thrust]
-        yield Score(*who, span, len(error), rms, noise, in_50, in_95, width_50, width_95, outcome.seconds, edits)
+    rows = []
+    for (quantity, unit, span), own in pd.concat(samples).groupby(["quantity", "unit", "span"], sort=False):
+        row = {"data": split.name, "method": method.name, "quantity": quantity, "unit": unit, "span": span}
+        row |= {"samples": len(own), "noise": own.noise.drop_duplicates().median()}
+        row |= bands(own.error.to_numpy(), own.deviation.to_numpy())
+        rows.append(row | {"seconds": outcome.seconds, "edits": split.edits[method.uses_thrust]})
+    return pd.DataFrame(rows)
 
 
-def numbers(outcome: Outcome) -> Iterator[Number]:
-    """Yield a row for each coefficient whose true value is known."""
+def numbers(outcome: Outcome) -> Table:
+    """Return a row for each coefficient whose true value is known: this, the value, and its 95 % interval."""
+    rows = []
     for axis in outcome.split.known.fitted:
         true = {name: value for (of, name), value in outcome.split.truth.items() if of == axis.name}
-        known = outcome.method.coefficients(axis) if true else {}
-        for name, values in known.items():
-            yield Number(outcome.split.name, outcome.method.name, axis.name, name, true[name], *values)
+        for name, (value, low, high) in (outcome.method.coefficients(axis) if true else {}).items():
+            row = {"data": outcome.split.name, "method": outcome.method.name, "axis": axis.name, "name": name}
+            rows.append(row | {"true": true[name], "value": value, "low": low, "high": high})
+    return pd.DataFrame(rows)
 
 
-@dataclass(frozen=True)
-class Summary:
-    """A method with one data set: over all quantities."""
+def relative_errors(rows: Table) -> Table:
+    """Return the errors of each method (row) and span (column) with one data set, relative to those of no change.
 
-    errors: dict[float, float]
-    """By span: the geometric mean over the quantities of the error relative to that of no change."""
-    inside_50: float
-    inside_95: float
-    """The mean share over quantities and spans."""
-    lowest: tuple[float, str, float]
-    """The least share in the 95 % bands with its quantity and span."""
-    seconds: float
-    edits: int
-
-
-def summary(rows: Sequence[Score], data: str, method: str, reference: str) -> Summary:
-    """Return the summary of a method, relative to the errors of a reference."""
-    own = [row for row in rows if (row.data, row.method) == (data, method)]
-    usual = {(row.quantity, row.span): row.error for row in rows if (row.data, row.method) == (data, reference)}
-    ratios: dict[float, list[float]] = {}
-    for row in own:
-        ratios.setdefault(row.span, []).append(row.error / usual.get((row.quantity, row.span), nan))
-    lowest = min((row.inside_95, row.quantity, row.span) for row in own)
-    return Summary(
-        {span: float(np.exp(np.mean(np.log(some)))) for span, some in ratios.items()},
-        float(np.mean([row.inside_50 for row in own])),
-        float(np.mean([row.inside_95 for row in own])),
-        lowest,
-        own[0].seconds,
-        own[0].edits,
-    )
-
-
-def to_csv(rows: Iterable[Score | Number]) -> str:
-    """Return a CSV file."""
-    text = StringIO()
-    several = [asdict(row) for row in rows]
-    writer = csv.DictWriter(text, [*several[0]] if several else [], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in several)
-    return text.getvalue()
-
-
-def from_csv(path: Path) -> list[Score]:
-    """Read the scores of an earlier run."""
-    kinds: dict[str, Any] = {field.name: field.type for field in fields(Score)}
-    with path.open(encoding="utf-8", newline="") as file:
-        return [Score(**{name: kinds[name](text) for name, text in row.items()}) for row in csv.DictReader(file)]
+    It is the geometric mean over the quantities.
+    """
+    logs: Any = np.log(rows.pivot(index=["span", "quantity"], columns="method", values="error"))
+    means = np.exp(logs.sub(logs[REFERENCE], axis=0).groupby("span").mean()).T
+    return means.reindex(rows.method.unique())
