@@ -11,15 +11,11 @@ from math import nan
 from pathlib import Path
 
 import pytest
-from lxml import etree
 
-from rov_fmu.fmu.model_description import NATIVE, model_description
-from rov_fmu.fmu.variables import variables
-from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
 from verification.interoperability.__main__ import main
 from verification.interoperability.importers import EXACT, HERE, IMPORTERS, RUNNERS, Importer, pinned
-from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, VEHICLES, Manoeuvre, ResultError
+from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre, ResultError
 from verification.interoperability.page import PageError, write_table
 from verification.interoperability.run import Outcome, Verdict, build_fmu, run
 
@@ -27,23 +23,18 @@ TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
 
 
-_QUICK = [name for name in MANOEUVRES if name != "every_option"]
-
-
-@pytest.fixture(scope="session", params=[MANOEUVRES[name] for name in _QUICK], ids=_QUICK)
-def manoeuvre(request: pytest.FixtureRequest) -> Manoeuvre:
-    found: Manoeuvre = request.param
-    return found
-
-
 # ---- The manoeuvre ---------------------------------------------------------------------------------------------------
 
 
-def test_manoeuvre_shows_what_it_promises(manoeuvre: Manoeuvre) -> None:
+@pytest.mark.parametrize(
+    "manoeuvre",
+    [pytest.param(m, marks=pytest.mark.long if name == "every_option" else ()) for name, m in MANOEUVRES.items()],
+    ids=list(MANOEUVRES),
+)
+def test_a_manoeuvre_uses_every_input_and_turns_every_velocity_around(manoeuvre: Manoeuvre) -> None:
     layout, starts = manoeuvre.rov.layout, sorted(manoeuvre.phases)
     phases = [manoeuvre.inputs_at(start) for start in starts]
-    assert TIMES[0] == 0.0
-    assert TIMES[-1] == 30.0
+    assert (TIMES[0], TIMES[-1]) == (0.0, 30.0)
     assert {*starts, DETOUR} <= set(TIMES), "the inputs change, and the detour starts, at communication points"
     assert phases[0] == layout.usual_inputs, "it does not matter when an importer sets the first inputs"
     for name in layout.inputs:
@@ -60,61 +51,28 @@ def test_manoeuvre_shows_what_it_promises(manoeuvre: Manoeuvre) -> None:
     assert {layout.coefficients[name].tunable for name in manoeuvre.parameters} == {True, False}
 
 
-def test_there_is_a_manoeuvre_with_sway_lag_coupling_and_dead_band() -> None:
+def test_the_manoeuvres_have_sway_lag_coupling_dead_band_and_leave_what_was_identified() -> None:
     heavy = MANOEUVRES["bluerov2_heavy"]
     assert heavy.rov.layout.coupled
     assert set(heavy.rov.layout.lagging) == {f"F_{n}" for n in range(1, 9)}
-    dead = heavy.parameters["c_0_t200"]
     held = [heavy.inputs_at(time)[name] for time in heavy.phases for name in heavy.rov.layout.commands]
-    assert any(0.0 < command < dead for command in held)
-
-
-def test_the_manoeuvre_of_the_identified_vehicle_leaves_what_was_identified() -> None:
+    assert any(0.0 < command < heavy.parameters["c_0_t200"] for command in held)
     outside = [row["outside"] for row in MANOEUVRES["identified"].reference]
     assert outside[0] == 0.0
     assert max(outside) > 0.1
     assert len({*outside}) > 20
 
 
-@pytest.mark.long
-def test_a_vehicle_with_every_option_joins_the_importers_that_can_run_it() -> None:
-    every = MANOEUVRES["every_option"]
-    layout = every.rov.layout
+def test_a_vehicle_with_every_option_joins_the_importers_that_set_inputs_in_events() -> None:
+    layout = MANOEUVRES["every_option"].rov.layout
     assert len(layout.axes) == 6
     assert all((layout.coupled, layout.cross, layout.restoring, layout.fins, layout.mix, layout.pulse, layout.lagging))
     assert layout.has_dead_time
     assert "voltage" in layout.inputs
     assert any(curve.tables for curve in layout.curves)
-    test_manoeuvre_shows_what_it_promises(every)
-    left_out = {importer.title for importer in IMPORTERS if not importer.suits(layout)}
-    assert left_out == {"CasADi", "PathSim", "fmi-sim", "fmi-rs"}
-    assert {i.name for i in IMPORTERS if not i.suits(layout) and i.interface == "CS"} == {
-        "fmi-sim-cs",
-        "fmi-sim-cs-fmi3",
-    }
-    vehicle = load_vehicle(VEHICLES["every_option"])
-    root = etree.fromstring(model_description(vehicle, variables(vehicle), guid="", interfaces=NATIVE[3], fmi=3))
-    discrete = [v for v in root.iter("Float64") if v.get("variability") == "discrete"]
-    assert {v.get("name") for v in discrete} == {*layout.commands, *layout.delayed}
-    assert not any(v.get("intermediateUpdate") for v in discrete)
-
-
-def test_files_say_the_same(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
-    manoeuvre.write_files(tmp_path)
-    with (tmp_path / "manoeuvre.csv").open(newline="") as file:
-        held = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
-    with (tmp_path / "jumps.csv").open(newline="") as file:
-        corners = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
-    for time, *inputs, detour in held:
-        assert inputs == list(manoeuvre.inputs_at(time).values())
-        assert detour == (time == DETOUR)
-        if time < 30.0:
-            assert inputs == next(after for at, *after in reversed(corners) if at <= time)
-    with (tmp_path / "detour.csv").open(newline="") as file:
-        detour_commands = {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
-    assert list(detour_commands) == list(manoeuvre.rov.layout.commands)
-    assert set(detour_commands.values()) == {1.0, -1.0}
-    assert (tmp_path / "outputs.txt").read_text().split() == list(manoeuvre.reference[0])[1:]
+    left_out = [importer for importer in IMPORTERS if not importer.suits(layout)]
+    assert {importer.title for importer in left_out} == {"CasADi", "PathSim", "fmi-sim", "fmi-rs"}
+    assert {i.name for i in left_out if i.interface == "CS"} == {"fmi-sim-cs", "fmi-sim-cs-fmi3"}
 
 
 # ---- The comparison --------------------------------------------------------------------------------------------------
@@ -129,11 +87,11 @@ def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
 
 
 @pytest.mark.parametrize("point", [0, 150, 300])
-def test_difference_is_noticed(tmp_path: Path, manoeuvre: Manoeuvre, point: int) -> None:
-    for name in manoeuvre.outputs:
-        rows = [*manoeuvre.reference]
+def test_difference_is_noticed(tmp_path: Path, point: int) -> None:
+    for name in SIMPLE.outputs:
+        rows = [*SIMPLE.reference]
         rows[point] = rows[point] | {name: rows[point][name] + 1e-6}
-        assert manoeuvre.difference(write_result(tmp_path / "result.csv", rows)) == pytest.approx(1e-6), name
+        assert SIMPLE.difference(write_result(tmp_path / "result.csv", rows)) == pytest.approx(1e-6), name
 
 
 @pytest.mark.parametrize(
