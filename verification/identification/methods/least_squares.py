@@ -5,7 +5,15 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from verification.identification.data import Recording, Split
-from verification.identification.methods.motion import features, largest, linear, measured, predicted, solved
+from verification.identification.methods.motion import (
+    Accelerations,
+    features,
+    largest,
+    linear,
+    measured,
+    predicted,
+    solved,
+)
 from verification.identification.protocol import Known
 
 _DRAWS = 20
@@ -47,3 +55,18 @@ class LeastSquares:
         """Return what follows from the weights."""
         n = self.axes.index(axis)
         return solved(self.split, axis, self.weights[n], self.covariances[n])
+
+
+class BeyondRegression(LeastSquares):
+    """The accelerations of the regression plus what another method learns, which has no coefficients."""
+
+    rates: Accelerations
+
+    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
+        """Simulate the mean."""
+        values = predicted(self.rates, recording, begin, span, self.limit)[0]
+        return values, np.zeros(len(values))
+
+    def coefficients(self, axis: Axis) -> Known:  # noqa: ARG002
+        """There are none."""
+        return {}

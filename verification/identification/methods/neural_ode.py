@@ -5,14 +5,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.example_libraries import optimizers
 
-from rov_fmu.equation.catalogue import PITCH, ROLL, Axis
+from rov_fmu.equation.catalogue import PITCH, ROLL
 from rov_fmu.tank.arrays import Array
-from verification.identification.data import STEP, Recording, Split
-from verification.identification.methods.least_squares import LeastSquares
-from verification.identification.methods.motion import Accelerations, linear, predicted
+from verification.identification.data import STEP, Split
+from verification.identification.methods.least_squares import BeyondRegression
+from verification.identification.methods.motion import Accelerations, linear
 from verification.identification.methods.output_error import spreads, windows
-from verification.identification.protocol import Known
 
 _HIDDEN, _STEPS, _BATCH, _RATE = 32, 600, 32, 3e-3
 _WINDOW = 40
@@ -22,7 +22,7 @@ Net = dict[str, Any]
 State = tuple[jax.Array, jax.Array]
 
 
-class NeuralODE(LeastSquares):
+class NeuralODE(BeyondRegression):
     """A network of all velocities, thrusts, and the sines of the angles, trained by Adam through the integration."""
 
     name = "neural ODE"
@@ -59,18 +59,13 @@ class NeuralODE(LeastSquares):
             off = (jnp.moveaxis(path, 0, 2) - goal[:, :, 1:]) / spread[:, None, None]
             return jnp.mean(off**2)
 
-        gradient = jax.jit(jax.grad(loss))
-        random = np.random.default_rng(1)
-        mean, square = ({name: jnp.zeros_like(x) for name, x in net.items()} for _ in range(2))
-        for k in range(1, _STEPS + 1):
+        start, update, net_of = optimizers.adam(_RATE, b2=0.99)
+        gradient, change = jax.jit(jax.grad(loss)), jax.jit(update)
+        random, state = np.random.default_rng(1), start(net)
+        for k in range(_STEPS):
             some = random.integers(0, len(p), _BATCH)
-            g = gradient(net, goal[:, some], thrust[some])
-            for name in net:
-                mean[name] = 0.9 * mean[name] + 0.1 * g[name]
-                square[name] = 0.99 * square[name] + 0.01 * g[name] ** 2
-                change = mean[name] / (1 - 0.9**k) / (jnp.sqrt(square[name] / (1 - 0.99**k)) + 1e-8)
-                net[name] = net[name] - _RATE * change
-        self.net = {name: np.asarray(x) for name, x in net.items()}
+            state = change(k, gradient(net_of(state), goal[:, some], thrust[some]), state)
+        self.rates = self._rates({name: np.asarray(x) for name, x in net_of(state).items()}, np)
 
     def _rates(self, net: Net, library: Any) -> Accelerations:
         """Return the accelerations, for NumPy or JAX."""
@@ -82,12 +77,3 @@ class NeuralODE(LeastSquares):
             return base(p, v, thrust) + found  # type: ignore[no-any-return]
 
         return of
-
-    def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
-        """Simulate with the network."""
-        values = predicted(self._rates(self.net, np), recording, begin, span, self.limit)[0]
-        return values, np.zeros(len(values))
-
-    def coefficients(self, axis: Axis) -> Known:  # noqa: ARG002
-        """A network has none."""
-        return {}
