@@ -16,6 +16,8 @@ from scipy.stats import norm
 from rov_fmu.tank.arrays import Array
 from verification.identification.protocol import Outcome
 
+_COLUMNS = ["data", "method", "quantity", "unit", "span", "samples", "error", "noise"]
+_COLUMNS += ["inside_50", "inside_95", "width_50", "width_95", "seconds", "edits"]
 Table = Any
 """A DataFrame. Its published types do not know what its groups and rows have."""
 REFERENCE = "no change"
@@ -52,7 +54,7 @@ def scores(outcome: Outcome) -> Table:
         row |= {"samples": len(own), "noise": own.noise.drop_duplicates().median()}
         row |= bands(own.error.to_numpy(), own.deviation.to_numpy())
         rows.append(row | {"seconds": outcome.seconds, "edits": split.edits[method.uses_thrust]})
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_COLUMNS)
 
 
 def numbers(outcome: Outcome) -> Table:
