@@ -39,6 +39,8 @@ DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", 
 """The vehicles with a drawing. The refit of the VideoRay has the same thrusters."""
 
 _KEYS = ("key", "value", "what")
+_WIDEST = 48
+"""The characters of a name with its arguments in a table; of longer ones the arguments are left out."""
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
 
@@ -205,7 +207,7 @@ def _interface() -> str:
 
 
 def _described(name: str, value: Any) -> tuple[str, str]:
-    """The row of a function or a class: its name with the names of its arguments, and its first sentence."""
+    """The row of a function or a class: its name, those of its arguments where they fit, and its first sentence."""
     arguments = ""
     if isfunction(value):
         own = [
@@ -214,6 +216,8 @@ def _described(name: str, value: Any) -> tuple[str, str]:
             if p.name != "self"
         ]
         arguments = f"({', '.join(own)})"
+    if len(name + arguments) > _WIDEST:
+        arguments = "(…)"
     return f"`{name}{arguments}`", _first_sentence(getdoc(value) or "")
 
 

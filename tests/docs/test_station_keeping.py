@@ -17,7 +17,6 @@ from examples.station_keeping import engines, run
 from examples.station_keeping.engines import ENGINES, NAMES, Trajectory
 from examples.station_keeping.system import (
     DEFAULT,
-    GROUPS,
     SEA,
     STEP,
     build_system,
@@ -238,21 +237,6 @@ def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None
         validate_tree(values, "SystemStructureParameterValues.xsd")
     (master,) = root.iter("{*}FixedStepMaster")  # for OMSimulator
     assert dict(master.attrib) == {"description": "oms-ma", "stepSize": "0.05", "relativeTolerance": "1e-4"}
-
-
-@pytest.mark.parametrize("parameters", SETS)
-def test_the_groups_of_the_osp_configuration_fit(folder: Path, parameters: str) -> None:
-    root = etree.parse(str(system_files(folder, parameters)[1])).getroot()
-    assert [e.get("name") for e in root.iter("{*}VariableGroup")] == [name for name in GROUPS for _ in range(2)]
-    causality = []
-    for model in ("videoray", "Autopilot"):
-        description = fmpy.read_model_description(str(folder / f"{model}.fmu"), validate=False)
-        variables = {v.name: v.causality for v in description.modelVariables}
-        osp = etree.parse(str(folder / f"{model}_OspModelDescription.xml")).getroot()
-        groups = {e.get("name"): e for e in next(osp.iter("{*}VariableGroups"))}
-        causality.append([[variables[v.get("ref")] for v in groups[name]] for name in GROUPS])
-    opposite = {"input": "output", "output": "input"}
-    assert [[opposite[c] for c in group] for group in causality[0]] == causality[1]
 
 
 # ---- Engines that have to be installed -------------------------------------------------------------------------------
