@@ -66,6 +66,15 @@ def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
     assert np.corrcoef(drawn.T) == pytest.approx(expected, abs=0.04)
 
 
+def test_what_the_fmu_does_not_take_is_not_drawn() -> None:
+    has = _has(MADE) | {"a_d_u": replace(_has(MADE)["a_d_u"], minimum=8.5, maximum=9.25)}
+    plan, found = _estimates(MADE, has)
+    a_d, b_d, _ = Design(plan, has, found.known).rows(0, 512).T
+    assert [a_d.min(), a_d.max()] == [8.5, 9.25]
+    at_most = a_d == 9.25
+    assert b_d[at_most].mean() == pytest.approx(5.0 - 0.8 * 0.3 / 0.5 * 0.25, abs=0.02), "what a fit with it held finds"
+
+
 # ---- Messages --------------------------------------------------------------------------------------------------------
 
 
