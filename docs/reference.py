@@ -6,7 +6,8 @@ end, in comments. The drawings are files of their own.
 
 import re
 from html import escape
-from inspect import cleandoc
+from importlib import import_module
+from inspect import getdoc, getsource, isfunction, signature
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 
 Table = list[tuple[str, ...]]
 _NAMES = (
-    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "vehicles.md"),
+    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "api.md", "vehicles.md"),
     *("identify-formats.md", "identify-method.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
@@ -38,6 +39,8 @@ DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", 
 """The vehicles with a drawing. The refit of the VideoRay has the same thrusters."""
 
 _KEYS = ("key", "value", "what")
+_WIDEST = 48
+"""The characters of a name with its arguments in a table; of longer ones the arguments are left out."""
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
 
@@ -148,6 +151,8 @@ def filled(page: str) -> str:
         kind, name = match[2], match[3]
         if kind == "commands":
             content = _command_reference()
+        elif kind == "api":
+            content = _interface()
         elif kind == "drawings":
             content = _gallery()
         elif kind == "equations":
@@ -157,7 +162,7 @@ def filled(page: str) -> str:
         return f"{match[1]}\n\n{content}\n\n"
 
     return re.sub(
-        r"(<!-- (commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
+        r"(<!-- (api|commands|drawings|equations|table)(?:: (\w+))? -->)\n.*?(?=<!-- end -->)",
         text,
         page,
         flags=re.DOTALL,
@@ -176,18 +181,54 @@ def _gallery() -> str:
 
 
 def _command_reference() -> str:
-    """Every command with its arguments and options, in the words of --help."""
-    root, found = click.Context(_commands, info_name="rov-fmu"), []
+    """Every command with its arguments and its first sentence; --help prints the options."""
+    root, rows = click.Context(_commands, info_name="rov-fmu"), []
     for name, command in _commands.commands.items():
         with click.Context(command, root, name) as context:
             usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
-            options = [one for one in command.params if isinstance(one, click.Option)]
-            records = [record for one in options if (record := one.get_help_record(context))]
-        rows = [(f"`{_escaped(option)}`", _escaped(escape(what, quote=False))) for option, what in records]
-        words = escape(cleandoc(command.help or ""), quote=False)
-        table = [markdown([("option", "what"), ("---",) * 2, *rows])] if rows else []
-        found.append("\n\n".join([f"### rov-fmu {name}", f"`{usage}`", words, *table]))
+        rows.append((f"`{usage}`", escape(command.get_short_help_str(limit=1000), quote=False)))
+    return markdown([("command", "what it does"), ("---",) * 2, *rows])
+
+
+def _interface() -> str:
+    """The public functions and classes with the first sentence of each, by the headings of the site's page."""
+    page = Path(__file__).with_name("api-in-full.rst").read_text(encoding="utf-8")
+    found: list[str] = []
+    rows: Table = []
+    for heading, directives in re.findall(r"^([^\n]+)\n-+\n\n(.*?)(?=\n\n|\Z)", page, re.MULTILINE | re.DOTALL):
+        rows = [("name", "what it is"), ("---",) * 2]
+        for kind, path, members in re.findall(r"auto(\w+):: (\S+)(?:\n +:members: (.*))?", directives):
+            module, _, name = path.rpartition(".")
+            value = getattr(import_module(module), name)
+            rows.append(_described(path, value) if kind != "data" else (f"`{path}`", _said_of_data(module, name)))
+            rows += [_described(f"{name}.{of}", getattr(value, of)) for of in members.split(", ") if members]
+        found.append(f"## {heading}\n\n{markdown(rows)}")
     return "\n\n".join(found)
+
+
+def _described(name: str, value: Any) -> tuple[str, str]:
+    """The row of a function or a class: its name, those of its arguments where they fit, and its first sentence."""
+    arguments = ""
+    if isfunction(value):
+        own = [
+            f"{'*' if p.kind is p.VAR_POSITIONAL else '**' if p.kind is p.VAR_KEYWORD else ''}{p.name}"
+            for p in signature(value).parameters.values()
+            if p.name != "self"
+        ]
+        arguments = f"({', '.join(own)})"
+    if len(name + arguments) > _WIDEST:
+        arguments = "(…)"
+    return f"`{name}{arguments}`", _first_sentence(getdoc(value) or "")
+
+
+def _said_of_data(module: str, name: str) -> str:
+    """The first sentence of the text below an assignment of a module."""
+    (words,) = re.findall(rf'^{name}\b.*?^"""(.*?)"""', getsource(import_module(module)), re.MULTILINE | re.DOTALL)
+    return _first_sentence(words)
+
+
+def _first_sentence(words: str) -> str:
+    return _escaped(words.partition("\n\n")[0]).partition(". ")[0].rstrip(".") + "."
 
 
 def _equations(name: str) -> str:

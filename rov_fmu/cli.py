@@ -460,7 +460,7 @@ def _open(path: Path, option: str) -> None:
     "--log",
     metavar="LOG.csv",
     help="Log to write, which identify reads, or .mcap for Foxglove and PlotJuggler. Each restart of the autopilot "
-    "begins another log: LOG_2.csv, or the next free name.",
+    "begins another log.",
 )
 @click.option("--force", is_flag=True, help="Replace logs that exist.")
 @click.option(
@@ -473,7 +473,7 @@ def _open(path: Path, option: str) -> None:
 @click.option(
     "--duration",
     type=_seconds("0.001"),
-    help="End after this time of the simulation, s (real time without packets). Without this option, end with Ctrl-C.",
+    help="End after this time of the simulation, s (real time without packets). The default is to end with Ctrl-C.",
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all.")
 @click.option(
@@ -558,8 +558,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
 @_file_option(
     "--report",
     metavar="FILE",
-    help="Page (HTML) to write with more evidence: step size, repeatability, conservation, cost, limits, hashes, "
-    "errors on unseen data.",
+    help="Page (HTML) to write, with more evidence.",
 )
 def _prove(
     fmu: Path, interface: str | None, tolerance: float | None, time_limit: float, key: Path | None, report: Path | None
@@ -685,8 +684,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
 @_file_option(
     "--mcap",
     metavar="LOGS.mcap",
-    help="File to write for Foxglove and PlotJuggler: what was commanded, measured and predicted, bands, and the "
-    "unknown force.",
+    help="File to write for Foxglove and PlotJuggler: commands, measurements, predictions, bands, unknown forces.",
 )
 @click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
 @click.option(

@@ -94,11 +94,3 @@ def test_vehicles_tilt_as_the_page_says(computed: dict[str, Table]) -> None:
     heavy, higher = ([cell == "turns over" for cell in row[1:]] for row in computed["tilting"][2:])
     assert heavy == [False, False, True, True, True]
     assert higher == [False, False, False, False, True]
-
-
-def test_the_heavy_turns_over_where_its_righting_moment_ends() -> None:
-    """A quarter of full command: the thrust times 8.5 cm is the buoyancy times 1 cm."""
-    rov = load_vehicle(SHIPPED["bluerov2_heavy"])
-    curve = rov.layout.curves[0]
-    thrust = sqrt(2.0) * (rov.curve_force(curve, 0.254) - rov.curve_force(curve, -0.254))
-    assert thrust * 0.085 == pytest.approx(rov["B"] * 0.01, rel=0.01)

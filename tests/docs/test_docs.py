@@ -17,7 +17,6 @@ from math import hypot, pi, sin
 from pathlib import Path
 
 import pytest
-import tomlkit
 
 from docs import compared, reference
 from rov_fmu import __version__
@@ -111,13 +110,10 @@ def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
     return ("-m", words[2]), words[3:]
 
 
-def test_readme_is_read_in_five_minutes() -> None:
+def test_readme_and_changelog_are_short() -> None:
     text = README.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 70
     assert len(text.split()) <= 500
-
-
-def test_the_changelog_is_short() -> None:
     assert len(CHANGELOG.read_text(encoding="utf-8").split()) <= 900
 
 
@@ -125,7 +121,8 @@ def test_pages_that_begin_with_a_task_are_short_and_every_page_is_in_one_part() 
     parts = re.findall(r":caption: (.*?)\n\n(.*?)```", (ROOT / "docs" / "index.md").read_text("utf-8"), re.DOTALL)
     assert [part for part, _ in parts] == ["Use", "Reference", "Evidence and development"]
     named = [page for _, pages in parts for page in pages.split()]
-    assert sorted([*named, "index"]) == sorted(page.stem for page in (ROOT / "docs").glob("*.md"))
+    pages = [page.stem for page in (ROOT / "docs").iterdir() if page.suffix in (".md", ".rst")]
+    assert sorted([*named, "index"]) == sorted(pages)
     for page in parts[0][1].split():
         text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
         assert len(re.sub(r"^```\{code-cell\}.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL).split()) <= 1200, page
@@ -171,16 +168,6 @@ def test_commands_and_options_exist(page: Path) -> None:
         assert not unknown, f"{' '.join(words)}: {unknown}"
 
 
-def test_there_are_commands_to_look_at() -> None:
-    said = {" ".join(module_of(words)[0]) for page in PAGES for words in commands(page)}
-    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables")]
-    wanted += [
-        "-m examples.videoray.figures",
-        *(f"-m verification.{name}" for name in ("interoperability", "fuzzing", "benchmarks", "identification")),
-    ]
-    assert {*wanted, "build_fmu.py"} <= said
-
-
 # ---- Run -------------------------------------------------------------------------------------------------------------
 
 
@@ -224,9 +211,11 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 
 
 def test_the_pages_with_commands_are_found() -> None:
-    pages = ("drive", "identify", "many-runs", "model", "platforms", "tune")
-    wanted = {"README.md", "docs/tutorial-stopping-distance.md", *(f"docs/{page}.md" for page in pages)}
-    assert wanted <= {name(page) for page in SHELL_PAGES}
+    pages = ("drive", "identify", "many-runs", "model", "platforms", "tune", "tutorial-stopping-distance")
+    assert {"README.md", *(f"docs/{page}.md" for page in pages)} <= {name(page) for page in SHELL_PAGES}
+    assert {f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables")} <= {
+        " ".join(module_of(words)[0]) for page in PAGES for words in commands(page)
+    }
 
 
 @pytest.mark.long
@@ -333,14 +322,6 @@ def test_tables_that_follow_from_the_code_are_as_it_has_them(page: Path) -> None
     assert text == reference.filled(text)
 
 
-def test_no_page_of_the_repository_has_a_placeholder() -> None:
-    """The tables of vehicles.md are compared with the computed ones in test_compared.py."""
-    assert not [
-        page.name for page in PAGES if re.search(r"\{\{|placeholder|:: click", page.read_text(encoding="utf-8"))
-    ]
-    assert {page.name for page in reference.PAGES} >= {"cli.md", "vehicles.md"}
-
-
 def test_every_such_table_stands_in_a_page() -> None:
     pages = "".join(page.read_text(encoding="utf-8") for page in reference.PAGES)
     for name, table in reference.tables().items():
@@ -354,40 +335,20 @@ def test_version_is_that_of_the_package() -> None:
     assert newest == f"[Unreleased] – {__version__}" or newest.startswith(f"[{__version__}] – ")
 
 
-def test_workflow_runs_the_two_commands() -> None:
-    workflow = (ROOT / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
-    two = [line.split("#")[0].strip() for line in lines(blocks(README, "sh")[0])]
-    assert len(two) == 2
-    assert all(f"- run: {command}\n" in workflow for command in two)
-    oldest = re.search(r'requires-python = ">=([\d.]+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert oldest
-    assert f'python: ["{oldest[1]}", ' in workflow
-
-
-def test_every_set_of_tests_is_run_and_told() -> None:
-    """The long tests and the importers on every change, the exhaustive tests every week."""
-    lines_of = {name: (ROOT / name).read_text(encoding="utf-8").splitlines() for name in (".ci/run", WEEKLY)}
-    found = tomlkit.parse((ROOT / "pyproject.toml").read_text(encoding="utf-8")).unwrap()["tool"]["pytest"]
-    markers = {marker.partition(":")[0] for marker in found["ini_options"]["markers"]}
-    assert markers == {"long", "interop", "weekly"}
-    assert found["ini_options"]["addopts"].endswith("-m 'not long and not weekly and not interop'")
-    assert {"pytest -rs -m long --durations=20", "pytest -rs -m interop"} <= {*lines_of[".ci/run"]}
-    assert not any("-m weekly" in line and not line.startswith("#") for line in lines_of[".ci/run"])
-    assert {"  schedule:", "      - run: pytest -rs -m weekly", "      - run: .ci/run"} <= {*lines_of[WEEKLY]}
-    contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    assert all(f"`pytest -m {marker}`" in contributing for marker in markers)
-
-
-def test_the_site_is_built_by_the_command_of_the_readme_in_an_environment_with_nothing_else() -> None:
-    script, run, workflow = (
-        (ROOT / path).read_text(encoding="utf-8")
-        for path in (".ci/build-site", ".ci/run", ".github/workflows/test.yml")
+def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() -> None:
+    """The long tests, the importers and the site on every change, the exhaustive tests every week."""
+    every_change, weekly, workflow, site = (
+        (ROOT / name).read_text(encoding="utf-8")
+        for name in (".ci/run", WEEKLY, ".github/workflows/test.yml", ".ci/build-site")
     )
-    readme = README.read_text(encoding="utf-8")
-    assert '`pip install -e ".[docs]" && sphinx-build docs site`' in readme
-    assert script.endswith('\n. "$1/bin/activate"\npip install -e ".[docs]" && sphinx-build -W docs site\n')
-    assert ".ci/build-site" in run
-    assert "- run: .ci/build-site" in workflow
+    assert all(f"\npytest -rs -m {marker}" in every_change for marker in ("long", "interop"))
+    assert "- run: pytest -rs -m weekly" in weekly
+    contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert all(f"`pytest -m {marker}`" in contributing for marker in ("long", "interop", "weekly"))
+    for line in lines(blocks(README, "sh")[0]):
+        assert f"- run: {line.split('#')[0].strip()}\n" in workflow
+    assert site.endswith('pip install -e ".[docs]" && sphinx-build -W docs site\n')
+    assert all(".ci/build-site" in text for text in (every_change, workflow))
 
 
 @pytest.mark.long
@@ -403,7 +364,7 @@ def test_the_site_is_complete_and_fetches_nothing() -> None:
     assert all("live-vehicles" in (folder / page).read_text(encoding="utf-8") for page in flown)
     drawn = re.findall(r'src="_images/([^"]+)\.svg"', pages["vehicles.html"])
     assert {name for name in SHIPPED if name != "videoray_refit"} == {*drawn}
-    assert {f"rov-fmu-{name}" for name in _commands.commands} <= {*re.findall(r'id="(rov-fmu-\w+)"', pages["cli.html"])}
+    assert {*_commands.commands} <= {*re.findall(r">rov-fmu</span> <span class=\"pre\">(\w+)<", pages["cli.html"])}
     notebooks = {page.name: page.read_text(encoding="utf-8") for page in folder.glob("_downloads/*/*.ipynb")}
     assert {f"{page.stem}.ipynb" for page in NOTEBOOKS} == set(notebooks)
     assert all('"image/png"' in notebook for notebook in notebooks.values()), "executed, with their figures"

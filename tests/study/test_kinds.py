@@ -74,8 +74,6 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
         assert (last.t, last.u, last.psi) == pytest.approx((4.0, state["u"], state["psi"]), rel=1e-9)
     runs = pd.read_parquet(native.folder / "runs")  # other tools can read a folder of Parquet files as one table
     assert sorted(runs.columns) == ["V_N", "alpha_u", "drift", "final_x", "m_rov", "reason", "run", "status"]
-    assert len(runs) == RUNS
-    assert pd.read_parquet(native.folder / "trajectories").columns.tolist() == ["run", "t", "u", "psi"]
 
 
 def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were(
@@ -96,11 +94,9 @@ def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results
     _close(study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native)
 
 
-@pytest.mark.parametrize("workers", [pytest.param(n, marks=pytest.mark.weekly) for n in (1, 2, 4)])
-def test_any_number_of_workers_gives_the_same_rows(
-    tmp_path: Path, videoray_fmu: Path, native: Results, workers: int
-) -> None:
-    results = study(_plan(tmp_path, videoray_fmu), tmp_path / "results", workers=workers)
+@pytest.mark.long
+def test_more_workers_give_the_same_rows(tmp_path: Path, videoray_fmu: Path, native: Results) -> None:
+    results = study(_plan(tmp_path, videoray_fmu), tmp_path / "results", workers=3)
     pd.testing.assert_frame_equal(results.runs, native.runs, check_exact=True)
     pd.testing.assert_frame_equal(results.trajectories(), native.trajectories(), check_exact=True)
 

@@ -6,19 +6,12 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from lxml import html
-from matplotlib.colors import to_hex
-from matplotlib.container import BarContainer, ErrorbarContainer
-from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
-from rov_fmu.report.plots.svg import LIGHT
-from rov_fmu.report.templates import inline_script
 from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
-from rov_fmu.study.results.plots import draw_indices
 from tests.folders import beside
 from tests.report.conftest import Visit
 from tests.report.pages import check_breaks_long_words, check_is_whole
@@ -74,40 +67,11 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert labels == [*shown, "Trajectories of y"]
     check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
-    (script,) = page.iter("script")
-    assert script.text == inline_script("plots.js").text, "the only one, which the policy allows"
-    assert inline_script("plots.js").policy in page.xpath("string(//meta[@http-equiv]/@content)")
-    assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
     assert study_page(results) == text, "the page is the same for the same results"
 
 
 def test_long_words_break(done: Path, tmp_path: Path, visit: Callable[..., Visit]) -> None:
     check_breaks_long_words((done / "study.html").read_text(encoding="utf-8"), tmp_path / "study.html", visit)
-
-
-def test_a_bar_is_an_index_with_its_interval() -> None:
-    rows = [
-        {"name": "a, b", "S1": 0.6, "S1_95": 0.1, "S1_tells": True, "ST": 0.7, "ST_95": 0.05, "ST_tells": True},
-        {"name": "c", "S1": 0.2, "S1_95": 3.0, "S1_tells": False, "ST": 0.3, "ST_95": 0.02, "ST_tells": True},
-        *(
-            {"name": f"d{n}", "S1": 0, "S1_95": 0, "S1_tells": True, "ST": 0, "ST_95": 0, "ST_tells": True}
-            for n in range(20)
-        ),
-    ]
-    figure = Figure()
-    draw_indices(figure, rows)
-    (ax,) = figure.axes
-    alone, together = (container for container in ax.containers if isinstance(container, BarContainer))
-    assert [bar.get_width() for bar in alone][:2] == [0.6, 0.2]
-    assert [bar.get_width() for bar in together][:2] == [0.7, 0.3]
-    assert [to_hex(bar.get_facecolor()) for bar in alone][:2] == [LIGHT["blue"], LIGHT["grey"]]
-    lines = [line for container in ax.containers if isinstance(container, ErrorbarContainer) for line in container[2]]
-    ends = [segment[:, 0].tolist() for line in lines for segment in line.get_segments()[:2]]
-    assert np.array(ends) == pytest.approx(np.array([[0.5, 0.7], [-2.8, 3.2], [0.65, 0.75], [0.28, 0.32]]))
-    assert len(alone) == 12, "the others have smaller ones"
-    assert ax.get_xlim() == pytest.approx((-0.3, 1.3), abs=0.05), (
-        "an interval that tells nothing does not hide the others"
-    )
 
 
 def test_a_grid_shows_figures_over_what_varies(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
@@ -139,16 +103,10 @@ T = "Tau(u)"
     assert head == ["u_l", "m_rov (kg)", "V", "way", "sway", "T"]
     shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
     assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
-    assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
 
 
 @pytest.mark.parametrize(
-    ("sampler", "size"),
-    [
-        ("saltelli", 1e308),
-        ("grid", 3e-320),
-        *(pytest.param(*case, marks=pytest.mark.long) for case in (("saltelli", 3e-320), ("grid", 1e308))),
-    ],
+    ("sampler", "size"), [("saltelli", 1e308), pytest.param("grid", 3e-320, marks=pytest.mark.long)]
 )
 def test_extreme_values_and_foreign_text_do_not_cost_the_page(
     sampler: str, size: float, foreign: Callable[..., Path], tmp_path: Path, scheduler: str
@@ -189,11 +147,6 @@ wide = "y[-1]"
     page = html.parse(tmp_path / "results" / "study.html")
     runs = Results(tmp_path / "results").runs
     assert f"{len(runs)} of {len(runs)} runs, 0 failed" in page.xpath("string(//body)")
-    if size == 1.0:
-        assert "cannot be drawn" not in page.xpath("string(//body)")
-        labels = {" ".join(text.split()) for text in page.xpath("//svg//text/text()")}
-        assert "$^{" in labels
-        assert ("b ($_$)" in labels) == (sampler == "grid")
 
 
 def test_the_page_shows_which_sobol_indices_are_uncertain(

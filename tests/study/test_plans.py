@@ -24,7 +24,6 @@ COUNTED = "".join(f"{name}.range = {{ from = 1.0, to = 2.0, count = 1000 }}\n" f
 
 WHOLE = {
     "": "stop_time: this key is missing",
-    "fmu = 1": "fmu = 1: must be text in quotes",
     'stop = 3.0\nfmu = "videoray.fmu"': "stop: there is no such key; did you mean step?",
     PLAN: "must have [keep] or [figures]. Otherwise nothing of a run is stored",
     HEAD + 'sampler = "grid"\n' + TAIL: "runs = 4: a grid has one run for each point: leave this key out",
@@ -35,7 +34,6 @@ WHOLE = {
     + VARY
     + TAIL: "stop_time = 0.95: must be a whole number of steps of 0.1 s after the st",
     HEAD.replace("1.0", "-1.0") + VARY + TAIL: "stop_time = -1.0: must be after start_time = 0",
-    HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be greater than or equal to 1",
 }
 """Plans and the beginnings of the messages about them."""
 HEADS = {
@@ -48,8 +46,6 @@ HEADS = {
 VARIED = {
     "alpha_uu.uniform = [1.0, 1.2]": "vary.alpha_uu: the FMU has no variable 'alpha_uu' that is a number; did you mean",
     "alpha_u.uniform = [-1.0, 1.2]": "vary.alpha_u = -1.0: must be within 0 ... 1000",
-    "alpha_u.values = [1.0, 1e9]": "vary.alpha_u = 1000000000.0: must be within 0 ... 1000",
-    "m_rov.normal = { mean = -1.0, sd = 1.0 }": "vary.m_rov = -1.0: must be within 0.001 ... 1000000 kg",
     "alpha_u = { uniform = [1.0, 2.0], values = [1.0] }": "vary.alpha_u: must have one of normal, lognormal, uniform,",
     "F_l.uniform = [1.0, 2.0]": "vary.F_l: it cannot be set, because the FMU computes it",
 }
@@ -67,10 +63,6 @@ TABLES = {
     "[inputs]\nu_l.steps = [[0.2, 0.5], [0.55, 0.0]]": (
         "inputs.u_l = [0.55, 0.0]: a jump, as from 0.5 here, must be at a communication point, a multiple of step"
     ),
-    "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.45, 0.5], [0.45, 0.0]]": (
-        "inputs.u_l = [0.45, 0.0]: a jump, as from 0.5 here, must be at a communication point"
-    ),
-    '[keep]\noutputs = ["q"]': "keep.outputs: the FMU has no variable 'q' that is a number",
     '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each variable once",
     '[keep]\noutputs = ["u"]\nevery = 2.0': "keep.every = 2.0: must not be longer than a run",
     '[keep]\noutputs = ["u"]\nevery = 0.25': "keep.every = 0.25: must be a multiple of step = 0.1",
@@ -82,18 +74,10 @@ FIGURES = {
     'end = "q[-1]"': "figures.end = 'q[-1]': 'q' is neither a function nor a variable",
     'end = "np.max(u)"': "figures.end = 'np.max(u)': np.max is an attribute, which is not allowed: write max(...)",
     'end = "V_ss(u, 0, 100)"': "figures.end = 'V_ss(u, 0, 100)': there is no time 100 s in a run from 0 to 1 s",
-    'end = "open(1)"': "figures.end = 'open(1)': 'open' is neither a function nor a",
     'end = "final(alpha_u)"': "figures.end = 'final(alpha_u)': TypeError: 'float' object is not subscriptable; alpha_u",
     'end = "u"': "figures.end = 'u': must be one number, and not an array",
-    'end = "V_ss()"': "figures.end = 'V_ss()': V_ss takes 1 to 3 values (y, start, end), each once, and not 0",
-    'end = "(lambda: 1)()"': (
-        "figures.end = '(lambda: 1)()': lambda: 1 is not allowed; an expression has numbers, variables, operators, ind"
-    ),
     'end = "max"': "figures.end = 'max': max is a function: write max(...)",
     'end = "out[0]"': "figures.end = 'out[0]': out gives a variable by its name: write out[\"der(u)\"]",
-    'end = "final(out[\\"q\\"])"': "figures.end = 'final(out[\"q\"])': 'q' is neither a function nor a variable",
-    'end = "mex(u)"': "figures.end = 'mex(u)': 'mex' is neither a function nor a variable",
-    '" " = "u[-1]"': "figures.  = ' ': must not be blank",
     'alpha_u = "u[-1]"': "figures.alpha_u: the results have another column of this name",
 }
 """Entries of [figures]."""
@@ -182,9 +166,7 @@ def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
     {
         "time,u_l\n0,0\n\n0.1,1.5\n": "line 4, column 'u_l' = 1.5 at 0.1 s: must be within -1 ... 1",
         "time,u_l\n0.03,0.5\n0.1,0.5\n": "line 2, column 'u_l' = 0.5 at 0.03 s: a jump, as from 0 here, must be at a ",
-        "time,u_l\n0,0\n0.5,full\n": "line 3, column 'u_l' = 'full': must be a finite number",
         "time,u\n0,0\n": "column 'u': is no input of the FMU; its causality is output",
-        "time,u_r\n0,0\n": "column 'u_r': is given in [inputs] too",
     }.items(),
 )
 def test_a_mistake_in_a_file_of_inputs_is_reported_with_its_line(

@@ -72,7 +72,7 @@ class Estimates:
         alone = [name for name in self.names if name not in self._vehicle.estimates]
         if alone and len(self.names) > 1:
             yield (
-                f"no row in [estimates] of {file}: {_listed(alone)} vary as if correlated with nothing, which makes "
+                f"no row in [estimates] of {file}: {some_of(alone)} vary as if correlated with nothing, which makes "
                 "what was found together far too uncertain"
             )
         for name, row in zip(self._whole.names, self._whole.correlation, strict=True):
@@ -80,7 +80,7 @@ class Estimates:
                 other for other, value in zip(self._whole.names, row, strict=True) if value and other in self.names
             ]
             if self._given(name) and others:
-                yield f"the plan gives {name}: its correlation with {_listed(others)} in {file} is left out"
+                yield f"the plan gives {name}: its correlation with {some_of(others)} in {file} is left out"
         differ = [
             f"{name} ({has[name].start:g}, not {value:g})"
             for name, value in self._vehicle.coefficients.items()
@@ -90,8 +90,8 @@ class Estimates:
             and not isclose(has[name].start, value, rel_tol=1e-9)
         ]
         if differ:
-            yield f"the FMU has other values than {file} of {_listed(differ)}: the estimates were found beside those"
-        together = [_listed(group) for group in self._part.groups if len(group) > 1]
+            yield f"the FMU has other values than {file} of {some_of(differ)}: the estimates were found beside those"
+        together = [some_of(group) for group in self._part.groups if len(group) > 1]
         if self._plan.sampler == "saltelli" and together:
             yield f"what is correlated has one Sobol index together: {'; '.join(together)}"
 
@@ -100,7 +100,7 @@ class Estimates:
         return name in self._plan.vary or name in self._plan.set
 
 
-def _listed(words: Sequence[str]) -> str:
+def some_of(words: Sequence[str]) -> str:
     """Return the first words as a list in a sentence."""
     some = [*words[:_SHOWN]]
     if len(words) > _SHOWN:

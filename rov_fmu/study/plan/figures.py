@@ -15,7 +15,6 @@ from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, E
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
 """The share of a window, at its end, over which the steady value is the mean."""
-_MOST_WINDOWS = 1000
 _BAND = 0.05
 """The share of the whole change within which a response has settled."""
 
@@ -30,7 +29,6 @@ class Responses:
     def __init__(self, times: Array) -> None:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
-        self._windows: dict[tuple[float | None, float | None], tuple[slice, slice]] = {}
         named: dict[str, Callable[..., Any]] = {
             "V_ss": self.steady,
             "Tau": self.time_constant,
@@ -83,18 +81,14 @@ class Responses:
 
     def _window(self, start: float | None, end: float | None) -> tuple[slice, slice]:
         """Return the points from one time to another, within rounding, and those of the last tenth of that time."""
-        if (start, end) not in self._windows:
-            t, slack = self._times, self._slack
-            begin, finish = t[0] if start is None else start, t[-1] if end is None else end
-            self._check_times(begin, finish)
-            first, last = int(np.searchsorted(t, begin - slack)), int(np.searchsorted(t, finish + slack))
-            if first >= last:
-                raise TimeError(f"there is no communication point from {begin:g} to {finish:g}")
-            if len(self._windows) == _MOST_WINDOWS:  # times that vary from run to run would fill the memory
-                self._windows.clear()
-            steady = t[last - 1] - _STEADY * (t[last - 1] - t[first]) - slack
-            self._windows[start, end] = slice(first, last), slice(int(np.searchsorted(t, steady)), last)
-        return self._windows[start, end]
+        t, slack = self._times, self._slack
+        begin, finish = t[0] if start is None else start, t[-1] if end is None else end
+        self._check_times(begin, finish)
+        first, last = np.searchsorted(t, (begin - slack, finish + slack)).tolist()
+        if first >= last:
+            raise TimeError(f"there is no communication point from {begin:g} to {finish:g}")
+        steady = t[last - 1] - _STEADY * (t[last - 1] - t[first]) - slack
+        return slice(first, last), slice(int(np.searchsorted(t, steady)), last)
 
     def _check_times(self, *times: float) -> None:
         """Raise TimeError if a time is not in the run, or else ValueError if it is NaN."""

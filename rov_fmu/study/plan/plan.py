@@ -1,7 +1,7 @@
 """The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from math import prod
 from pathlib import Path
@@ -31,21 +31,23 @@ class PlanError(FileError):
     """A plan cannot be carried out; the text has a line for each reason."""
 
 
-def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
-    if limits[0] >= limits[1]:
-        raise ValueError("must be [low, high]")
-    return limits
+def _rule(words: str, holds: Callable[[Any], bool]) -> AfterValidator:
+    """Return a validator that raises ValueError with these words if a value does not keep a rule."""
+
+    def checked(given: Any) -> Any:
+        if not holds(given):
+            raise ValueError(words)
+        return given
+
+    return AfterValidator(checked)
 
 
-def _some(given: tuple[Any, ...]) -> tuple[Any, ...]:
-    if not given:
-        raise ValueError("must have an entry")
-    return given
-
-
+_SOME = _rule("must have an entry", bool)
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-_Limits = Annotated[tuple[Finite, Finite], BeforeValidator(as_tuple), AfterValidator(_increasing)]
-_List = Annotated[tuple[Finite, ...], BeforeValidator(as_tuple), AfterValidator(_some)]
+_Limits = Annotated[
+    tuple[Finite, Finite], BeforeValidator(as_tuple), _rule("must be [low, high]", lambda ends: ends[0] < ends[1])
+]
+_List = Annotated[tuple[Finite, ...], BeforeValidator(as_tuple), _SOME]
 
 
 class Normal(Strict):
@@ -135,9 +137,7 @@ def _in_order(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, flo
     return points
 
 
-Points = Annotated[
-    tuple[tuple[Finite, Finite], ...], BeforeValidator(_points), AfterValidator(_some), AfterValidator(_in_order)
-]
+Points = Annotated[tuple[tuple[Finite, Finite], ...], BeforeValidator(_points), _SOME, AfterValidator(_in_order)]
 """[time, value] pairs."""
 
 
@@ -196,26 +196,18 @@ class InputFile(Strict):
     """steps: a row is held until the next one; ramps: there are straight lines between the rows."""
 
 
-def _once(names: tuple[str, ...]) -> tuple[str, ...]:
-    if len(set(names)) < len(names):
-        raise ValueError("must name each variable once")
-    return names
-
-
-def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
-    if list(times) != sorted(set(times)):
-        raise ValueError("must be times in ascending order")
-    return times
+_ONCE = _rule("must name each variable once", lambda names: len({*names}) == len(names))
+_ASCENDING = _rule("must be times in ascending order", lambda times: [*times] == sorted({*times}))
 
 
 class Keep(Strict):
     """The trajectories that are kept; none without this table."""
 
-    outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_some), AfterValidator(_once)]
+    outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple), _SOME, _ONCE]
     """Names of variables."""
     every: Positive | None = None
     """The time between kept points, s; a multiple of the step. The default is every step."""
-    at: Annotated[_List, AfterValidator(_ascending)] | None = None
+    at: Annotated[_List, _ASCENDING] | None = None
     """The times of the kept points, s, in place of `every`."""
 
     @model_validator(mode="after")

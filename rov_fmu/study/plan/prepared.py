@@ -1,6 +1,6 @@
 """Combine a plan with its FMU: report what does not fit, and collect what the workers must know."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from rov_fmu.io.csv_table import read_series
 from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.study.plan.estimates import Estimates
+from rov_fmu.study.plan.estimates import Estimates, some_of
 from rov_fmu.study.plan.expression import CONSTANTS
 from rov_fmu.study.plan.expression import TIME as TIMES
 from rov_fmu.study.plan.figures import meaning, read_expression, unusable
@@ -68,7 +68,17 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     recorded = [*dict.fromkeys([*plan.kept, *sorted(named - {*design.names})])]
     trials = design.rows(0, min(_TRIALS, design.runs))
     job = Job(f"rov-fmu-{uuid4().hex}", model, plan, design.names, inputs, recorded, trials)
-    return Prepared(job, design, whole.mark | estimates.mark, [*estimates.warnings(), *design.warnings()])
+    warnings = [*_without_inputs(model, {*inputs, *design.names, *plan.set}), *estimates.warnings(), *design.warnings()]
+    return Prepared(job, design, whole.mark | estimates.mark, warnings)
+
+
+def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
+    """Yield a sentence if no input of the FMU is given, because then a vehicle usually stays where it is."""
+    names = [name for name, variable in model.variables.items() if variable.causality == "input"]
+    if not names:
+        yield f"{model.name} has no inputs: its parameters and start values alone determine its runs"
+    elif not {*names} & {*given}:
+        yield f"the plan gives no input: {some_of(names)} keep their start values"
 
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
@@ -225,12 +235,5 @@ def _sampled(signal: Signal, times: Array, before: float) -> Array:
     An input is held over a step. With the value at the middle of the step, the error is of second order in the step.
     """
     at, values = np.array(signal.points, np.float64).T
-    place = np.searchsorted(at, times, side="right") - 1
-    found: Array = np.where(place >= 0, values[np.maximum(place, 0)], before)
-    if signal.steps:
-        return found
-    inside = (place >= 0) & (place < len(at) - 1)
-    n = place[inside]
-    share = (times[inside] - at[n]) / (at[n + 1] - at[n])
-    found[inside] = values[n] + share * (values[n + 1] - values[n])
-    return found
+    held: Array = np.append(before, values)[np.searchsorted(at, times, side="right")]
+    return np.interp(times, at, values, left=before) if signal.ramps else held

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 from time import perf_counter
@@ -101,31 +101,27 @@ def execute(
     return spent
 
 
+@dataclass
 class _Runs:
     """Gives the missing runs to the workers and writes their rows."""
 
-    def __init__(
-        self,
-        client: Client,
-        job: Job,
-        design: Design,
-        store: Store,
-        missing: deque[tuple[int, int]],
-        spent: Spent,
-        on_progress: Callable[[Progress], None],
-    ) -> None:
-        self._client, self._job, self._design, self._store = client, job, design, store
-        self._missing, self._spent, self._on_progress = missing, spent, on_progress
-        self._done_before = design.runs - sum(end - first for first, end in missing)
-        self._futures: dict[Any, tuple[int, int]] = {}
-        """For each future: its first run, and the run after its last one."""
-        self._seconds = _TASK
-        """The time of a run, by the last task; the first tasks have one run each."""
+    client: Client
+    job: Job
+    design: Design
+    store: Store
+    missing: deque[tuple[int, int]]
+    spent: Spent
+    on_progress: Callable[[Progress], None]
+    seconds: float = _TASK
+    """The time of a run, by the last task; the first tasks have one run each."""
+    futures: dict[Any, tuple[int, int]] = field(default_factory=dict)
+    """For each future: its first run, and the run after its last one."""
 
     def do(self) -> None:
         """Do all missing runs."""
+        self.done_before = self.design.runs - sum(end - first for first, end in self.missing)
         self._report()
-        coming = as_completed(loop=self._client.loop, raise_errors=False)
+        coming = as_completed(loop=self.client.loop, raise_errors=False)
         try:
             self._submit_tasks(coming)
             for future in coming:
@@ -134,47 +130,45 @@ class _Runs:
                 self._submit_tasks(coming)
         finally:
             with suppress(Exception):  # a client that is closed raises
-                self._client.cancel(list(self._futures), force=True)
+                self.client.cancel(list(self.futures), force=True)
 
     def _submit_tasks(self, coming: Any) -> None:
         """Submit tasks until every thread has enough."""
         try:
-            threads = sum(self._client.nthreads().values()) or 1
+            threads = sum(self.client.nthreads().values()) or 1
         except OSError as error:
             raise CommClosedError("no answer") from error
-        while self._missing and len(self._futures) < _AHEAD * threads:
-            first, end = self._missing.popleft()
-            remaining = sum(b - a for a, b in self._missing) + end - first
-            size = max(min(ceil(_TASK / self._seconds), ceil(remaining / threads)), ceil(_LEAST / self._seconds))
+        while self.missing and len(self.futures) < _AHEAD * threads:
+            first, end = self.missing.popleft()
+            remaining = sum(b - a for a, b in self.missing) + end - first
+            size = max(min(ceil(_TASK / self.seconds), ceil(remaining / threads)), ceil(_LEAST / self.seconds))
             if end - first > size:
-                self._missing.appendleft((first + size, end))
+                self.missing.appendleft((first + size, end))
                 end = first + size
-            future = self._client.submit(do_runs, self._job.key, first, self._design.rows(first, end), pure=False)
-            self._futures[future] = first, end
+            future = self.client.submit(do_runs, self.job.key, first, self.design.rows(first, end), pure=False)
+            self.futures[future] = first, end
             coming.add(future)
 
     def _take(self, future: Any) -> None:
         """Write the rows of a task. Dask itself repeats a task whose worker died."""
-        first, end = self._futures.pop(future)
+        first, end = self.futures.pop(future)
         try:
             part: Part = future.result()
         except LoadError as error:
-            raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
+            raise FileError(f"{self.job.model.name}: cannot be run: {error}") from error
         except _GONE:
             raise
         except Exception as error:  # the cluster raises various exceptions
             raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
-        self._store.write(first, end, part.runs, part.trajectories)
-        self._spent.runs += end - first
-        self._spent.failed += part.failed
-        self._seconds = max(part.seconds / (end - first), 1e-6)
+        self.store.write(first, end, part.runs, part.trajectories)
+        self.spent.runs += end - first
+        self.spent.failed += part.failed
+        self.seconds = max(part.seconds / (end - first), 1e-6)
         self._report()
 
     def _report(self) -> None:
-        link = self._client.dashboard_link
-        self._on_progress(
-            Progress(self._done_before + self._spent.runs, self._design.runs, self._spent.failed, link or "")
-        )
+        link = self.client.dashboard_link
+        self.on_progress(Progress(self.done_before + self.spent.runs, self.design.runs, self.spent.failed, link or ""))
 
 
 @contextmanager
