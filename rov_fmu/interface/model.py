@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rov_fmu.bridges import arrays
-from rov_fmu.bridges.rates import force_names
+from rov_fmu.bridges.arrays import force_names
 from rov_fmu.c.simulation import Array, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.step import MOST_WAITING
