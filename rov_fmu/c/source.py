@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, takewhile
 
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.alone import response_formulas
@@ -93,7 +93,8 @@ class EquationSource:
         """
         if self.layout.has_attitude:
             return []
-        return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
+        turning = {name for name, others in self.equation.states_in_rate.items() if others & {"cos_psi", "sin_psi"}}
+        return [name for name in self.equation.states if name not in self.equation.used | turning]
 
     def turning(self) -> list[str]:
         """Return the entries of the rotation matrix that still change while all velocities are steady."""
@@ -104,10 +105,6 @@ class EquationSource:
     def first_rotation(self) -> str:
         """Return the first angular velocity."""
         return next(own.axis.velocity for own in self.layout.axes if own.axis.is_rotation)
-
-    def _turns(self, name: str) -> bool:
-        """Return True when the rate of a state depends on the heading."""
-        return "cos_psi" in self.equation.states_in_rate[name] or "sin_psi" in self.equation.states_in_rate[name]
 
     def size_group(self, name: str) -> str:
         """Return the first state of the group of a state. The sizes of a group are added.
@@ -216,18 +213,16 @@ class EquationSource:
         """Return the longest run among some products; of several, the first in the order of the states."""
         states = self.equation.states
         candidates = {*wanted, *((b, a) for a, b in wanted if a)}
-        best: tuple[str, str, int] = ("", "", 0)
-        for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
-            place, length = states.index(second), 0
-            while (
-                place + length < len(states)
-                and (first, states[place + length]) in candidates
-                and self.block_of[states[place + length]] == self.block_of[second]
-            ):
-                length += 1
-            if length > best[2]:
-                best = first, second, length
-        return best
+
+        def length(pair: tuple[str, str]) -> int:
+            """Return the number of neighbours from the second state on, of the same block, with which to multiply."""
+            first, second = pair
+            block = self.block_of[second]
+            neighbours = states[states.index(second) :]
+            return len([*takewhile(lambda y: (first, y) in candidates and self.block_of[y] == block, neighbours)])
+
+        best = max(sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))), key=length)
+        return *best, length(best)
 
     def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""

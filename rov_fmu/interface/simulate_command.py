@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.equation.layout import Layout
-from rov_fmu.interface.arguments import STEP, TIME, Array, result_times
+from rov_fmu.interface.arguments import STEP, TIME, result_times
 from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
@@ -67,18 +67,13 @@ def run(
     if stop is not None and step is None and stop / STEP > _MOST_RESULTS:
         ends = f"--stop {stop:g}" if commands is None or stop != inputs[TIME][-1] else f"{commands}, up to {stop:g} s,"
         raise InputError(f"{ends} needs a longer --step than {STEP:g} s: at least {_least_step(stop):g} s")
-    time = _result_times(_STOP if stop is None else stop, STEP if step is None else step)
+    stop, step = _STOP if stop is None else stop, STEP if step is None else step
+    if stop / step > _MOST_RESULTS:
+        raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
     layout = vehicle.layout
     record = [*layout.inputs, *layout.state, *layout.calculated] if with_inputs else None
     changed = vehicle.with_(**given.coefficients)
-    return changed.simulate(time, inputs | given.inputs, start=given.start, record=record)
-
-
-def _result_times(stop: float, step: float) -> Array:
-    """Return the times of the results. Raises InputError if there are too many."""
-    if stop / step > _MOST_RESULTS:
-        raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
-    return result_times(stop, step)
+    return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start, record=record)
 
 
 def _least_step(stop: float) -> float:
@@ -101,17 +96,6 @@ class Settings:
 
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     """Return the values of the options --set: inputs, initial values and coefficients. Raises InputError."""
-    at_start = {*layout.state, *layout.initial}
-    found = _read_values(settings, layout)
-    return Settings(
-        {name: value for name, value in found.items() if name in layout.inputs or name in layout.kinds},
-        {name: value for name, value in found.items() if name in at_start},
-        {name: value for name, value in found.items() if name in layout.coefficients},
-    )
-
-
-def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
-    """Return the values of the options --set by name. Raises InputError."""
     variables = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
     names = [*variables, *layout.kinds]
     found: dict[str, float] = {}
@@ -131,7 +115,8 @@ def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
         if not isfinite(found[name]):
             percent = _percent(value) if name in layout.kinds or variables[name].unit == "1" else ""
             raise InputError(f"--set {text}: {shown(value)} must be a finite number{percent}")
-    return found
+    kinds = (layout.inputs | layout.kinds, layout.state | layout.initial, layout.coefficients)
+    return Settings(*({name: value for name, value in found.items() if name in own} for own in kinds))
 
 
 def _percent(text: str) -> str:

@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from rov_fmu.fmu.model_description import NATIVE, model_description
+from rov_fmu.c.compile import INTERFACES
+from rov_fmu.fmu.model_description import model_description
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
@@ -93,7 +94,9 @@ def test_a_vehicle_with_every_option_joins_the_importers_that_can_run_it() -> No
         "fmi-sim-cs-fmi3",
     }
     vehicle = load_vehicle(VEHICLES["every_option"])
-    root = etree.fromstring(model_description(vehicle, variables(vehicle), guid="", interfaces=NATIVE[3], fmi=3))
+    root = etree.fromstring(
+        model_description(vehicle, variables(vehicle), guid="", interfaces=INTERFACES["both"], fmi=3)
+    )
     discrete = [v for v in root.iter("Float64") if v.get("variability") == "discrete"]
     assert {v.get("name") for v in discrete} == {*layout.commands, *layout.delayed}
     assert not any(v.get("intermediateUpdate") for v in discrete)

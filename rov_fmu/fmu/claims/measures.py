@@ -92,8 +92,7 @@ def expected(subject: Subject) -> Evidence:
     tolerances, deviations = [f.tolerance for f in worst], [f.deviation for f in worst]
     words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(worst)} experiments are as expected"
     words += f", within {max(tolerances):.0e} of the largest value of each variable."
-    if subject.is_ours and Path(subject.folder, "sources", "step.c").exists():
-        words += _SECOND_SOLVER
+    words += _SECOND_SOLVER * (subject.is_ours and Path(subject.folder, "sources", "step.c").exists())
     if wrong:
         f = wrong[0]
         words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {_tiny(f.deviation)}'}."
@@ -261,8 +260,7 @@ def limits(subject: Subject) -> Evidence:
         words += f". Not refused: {listed(accepted)}."
     else:
         words += "." if changed else ", and the old values stay."
-    if changed:
-        words += f" A refusal changes something: {listed(changed)}."
+    words += f" A refusal changes something: {listed(changed)}." * bool(changed)
     if is_free := bool(accepted) and not subject.is_ours:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
     rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in found]
