@@ -21,7 +21,7 @@ from rov_fmu.equation.expression import (
     written,
 )
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
+from rov_fmu.equation.terms import Equation, equation_of, rate_formula
 from rov_fmu.io.templates import render
 
 
@@ -116,21 +116,6 @@ class EquationSource:
             return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
-    def finish(self) -> list[str]:
-        """Return statements that assign the states of the vehicle after a step."""
-        lines = []
-        for name in self.layout.state:
-            if name in QUATERNION:
-                end = f"state[REF_{name} - FIRST_STATE]"
-            elif name in self.equation.lagging:
-                end = f"q->{name}"
-            elif name in self.equation.used:
-                end = f"y[Y_{name}]"
-            else:
-                end = f"state[REF_{name} - FIRST_STATE] + displacement[Y_{name}]"
-            lines.append(f"next[REF_{name} - FIRST_STATE] = {end};")
-        return lines
-
     def attitude(self) -> list[str]:
         """Return statements that set the quaternion to that of the rotation matrix in y."""
         places = {name: f"state[REF_{name} - FIRST_STATE]" for name in QUATERNION}
@@ -147,16 +132,14 @@ class EquationSource:
 
     def rate(self, name: str) -> str:
         """Write the rate of a state in terms of the states y of the table."""
-        return self._rate(self.equation.rows[name])
+        return self.by_states(rate_formula(self.equation.rows[name]))
 
     def size(self, name: str) -> str:
         """Write the sum of the sizes of the terms in the rate of a state."""
-        return " + ".join(f"fabs({self._rate([term])})" for term in self.equation.rows[name]) or "0.0"
+        sizes = (f"fabs({self.by_states(rate_formula([term]))})" for term in self.equation.rows[name])
+        return " + ".join(sizes) or "0.0"
 
-    def _rate(self, terms: Sequence[Term]) -> str:
-        return self._by_states(rate_formula(terms))
-
-    def _by_states(self, formula: Expression) -> str:
+    def by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
         known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, known.__getitem__)
@@ -264,10 +247,6 @@ class EquationSource:
                 partners |= sum(1 << self.equation.states.index(other) for other in others)
         return partners
 
-    def lagging_ends(self) -> list[tuple[str, str]]:
-        """Return each force that lags, and its formula in C after a piece that ends at y."""
-        return [(name, self._by_states(end)) for name, (_, end) in self.equation.lagging.items()]
-
     # ---- Derivatives of the vehicle's states ----
 
     def derivative_lines(self) -> list[str]:
@@ -293,11 +272,6 @@ class EquationSource:
         lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
         formulas = start_formulas() if self.layout.has_attitude else {}
         return lines + _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
-
-    def has_direction(self) -> str:
-        """Write the condition that the quaternion is not 0."""
-        parts = (f"state[REF_{name} - FIRST_STATE] != 0.0" for name in QUATERNION if name in self.layout.state)
-        return " || ".join(parts) or "true"
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
@@ -368,7 +342,7 @@ def generated_sources(layout: Layout) -> dict[str, str]:
         "parameters": len(layout.coefficients) + len(layout.initial),
     }
     given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
-    return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
+    return {name: render(f"{name}.j2", **given, quaternion=QUATERNION) for name in ("model.h", "equation.h")}
 
 
 def unused_sources(layout: Layout) -> list[str]:

@@ -138,7 +138,7 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
             related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
     files = {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}
     of_origin, roles = origin(vehicle)
-    return {**files, **of_origin, MANIFEST: manifest([*related, *roles])}
+    return {**files, **of_origin, MANIFEST: manifest(vehicle, [*related, *roles])}
 
 
 _EXPECTED = (

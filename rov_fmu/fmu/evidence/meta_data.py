@@ -29,27 +29,15 @@ _SOURCES = (".py", ".c", ".h", ".js", ".j2")
 
 def meta_data(vehicle: Vehicle, files: Mapping[str, bytes]) -> bytes:
     """Return the document for an FMU that has these other files. The same files give the same bytes."""
-    made = vehicle.provenance
+    made, generator = vehicle.provenance, f"rov-fmu {__version__}"
+    hashes = [(name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())]
     classifications = {
-        FILES: [
-            *((name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())),
-            (META_DATA, _ZEROS),
-        ],
+        FILES: [*hashes, (META_DATA, _ZEROS)],
         INPUTS: [(name, f"{made.hash}: {digest}") for name, digest in made.inputs.items()] if made else [],
-        GENERATOR: [(f"rov-fmu {__version__}", generator_hash())],
+        GENERATOR: [(generator, generator_hash())],
     }
-    head = {
-        "name": vehicle.name,
-        "description": vehicle.summary,
-        "author": vehicle.source,
-        "fileversion": vehicle.version,
-        "generationTool": f"rov-fmu {__version__}",
-    }
-    document = render(
-        "resourceMetaData.srmd.j2",
-        head=head,
-        classifications={name: entries for name, entries in classifications.items() if entries},
-    ).encode()
+    given = {"vehicle": vehicle, "generator": generator, "classifications": classifications}
+    document = render("resourceMetaData.srmd.j2", **given).encode()
     return _with_own_hash(document, own_hash(document))
 
 
