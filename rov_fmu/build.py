@@ -86,7 +86,7 @@ def build(
     _check_options(vehicle, backend, fmi, interface, osp=osp)
     native = backend == "native"
     interface = interface or ("both" if native else "cs")
-    version = "" if fmi == 2 else ".fmi3"
+    version = {2: "", 3: ".fmi3"}[fmi]
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
     beside = [Output(osp_path(output, vehicle.identifier), osp_model_description(vehicle.layout))] if osp else []
     key = private_key(sign) if sign else None

@@ -88,16 +88,6 @@ class _Propeller:
     lost: float
     """The moment per newton that no position can give, m."""
 
-    @property
-    def largest(self) -> float:
-        """The largest thrust, N."""
-        return max(self.newtons.values())
-
-    @property
-    def smallest(self) -> float:
-        """The smallest thrust, N: that in reverse."""
-        return min(self.newtons.values())
-
 
 @dataclass(frozen=True)
 class Link:
@@ -126,24 +116,21 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
     Raises InputError about a vehicle that Gazebo cannot have at all.
     """
-    if mistake := next(impossible(vehicle), None):
-        raise InputError(f"{vehicle.identifier}: {mistake}")
+    check_possible(vehicle)
     link = link_of(vehicle)
     added = added_mass(vehicle, link.matrix)
     propellers = [propeller for propeller in (_propeller(vehicle, t) for t in vehicle.layout.thrusters) if propeller]
-    notes = tuple(_notes(vehicle, added, propellers, explicit=explicit))
+    notes = (
+        *_notes_of_tuning(vehicle, added, propellers, explicit=explicit),
+        *_notes_of_commands(vehicle),
+        *_notes_of_motion(vehicle, propellers, explicit=explicit),
+    )
     small, radius = _PROPELLER
-    text = render(
+    text = written(
         "model.sdf.j2",
-        Path(__file__).parent / "templates",
-        number=number,
-        vector=vector,
-        comment=comment,
-        vehicle=vehicle,
-        version=__version__,
-        notes=notes,
+        vehicle,
+        notes,
         in_world=in_world,
-        density=DENSITY,
         gravity=gravity(vehicle),
         north=pi / 2.0,
         body=Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
@@ -157,7 +144,20 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
 
 
-def impossible(vehicle: Vehicle) -> Iterator[str]:
+def written(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: object) -> str:
+    """Return a model of a vehicle with notes, from its template."""
+    common = {"number": _number, "vector": _vector, "comment": _comment, "version": __version__, "density": DENSITY}
+    folder = Path(__file__).parent / "templates"
+    return render(template, folder, vehicle=vehicle, notes=notes, **common, **content)
+
+
+def check_possible(vehicle: Vehicle) -> None:
+    """Raise InputError about a vehicle that Gazebo cannot have."""
+    if mistake := next(_impossible(vehicle), None):
+        raise InputError(f"{vehicle.identifier}: {mistake}")
+
+
+def _impossible(vehicle: Vehicle) -> Iterator[str]:
     """Yield a line about each reason why Gazebo cannot have the vehicle."""
     if "m_rov" not in vehicle.coefficients:
         yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
@@ -233,19 +233,15 @@ def link_of(vehicle: Vehicle) -> Link:
 def added_mass(vehicle: Vehicle, rigid: Array) -> Array:
     """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
     found = np.zeros((6, 6))
-    forms = vehicle.layout.by_velocity
+    forms, entries = vehicle.layout.by_velocity, vehicle.parameters
     for i, a in enumerate(_VELOCITIES):
         for j, b in enumerate(_VELOCITIES):
             if a in forms and b in forms:
-                mass = vehicle.effective_inertia(forms[a]) if a == b else _off_diagonal(vehicle, a, b)
+                mass = entries.get(f"mass_{a}{b}", entries.get(f"mass_{b}{a}", 0.0))
+                mass = vehicle.effective_inertia(forms[a]) if a == b else mass
                 found[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
     size = np.sqrt(np.diag(rigid))
     return np.where(np.abs(found) < FAINT * np.outer(size, size), 0.0, found)
-
-
-def _off_diagonal(vehicle: Vehicle, a: str, b: str) -> float:
-    """Return an entry of the effective mass matrix."""
-    return vehicle.parameters.get(f"mass_{a}{b}", vehicle.parameters.get(f"mass_{b}{a}", 0.0))
 
 
 def _in_link(added: Array) -> Iterator[tuple[str, float]]:
@@ -360,13 +356,6 @@ def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
 # ---- What Gazebo does otherwise --------------------------------------------------------------------------------------
 
 
-def _notes(vehicle: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
-    """Yield what the vehicle file says and Gazebo does otherwise, and how alpha and beta were folded in."""
-    yield from _notes_of_tuning(vehicle, added, propellers, explicit=explicit)
-    yield from _notes_of_commands(vehicle)
-    yield from _notes_of_motion(vehicle, propellers, explicit=explicit)
-
-
 def _notes_of_tuning(vehicle: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield how alpha and beta were folded in."""
     scaled = [
@@ -434,16 +423,16 @@ def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit
 # ---- Text ------------------------------------------------------------------------------------------------------------
 
 
-def number(value: float) -> str:
+def _number(value: float) -> str:
     """Return a number with 12 digits, without a negative zero."""
     return f"{value + 0.0:.12g}"
 
 
-def vector(values: Array) -> str:
+def _vector(values: Array) -> str:
     """Return the components of a vector."""
-    return " ".join(map(number, values))
+    return " ".join(map(_number, values))
 
 
-def comment(text: str) -> Markup:
+def _comment(text: str) -> Markup:
     """Return a text for an XML comment, which must not contain two hyphens in a row."""
     return Markup(re.sub("-(?=-)", "- ", text.rstrip(".")))

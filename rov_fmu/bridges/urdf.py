@@ -7,13 +7,9 @@ frame (forward, left, up). A matrix of six axes has only its diagonal in the fir
 """
 
 from collections.abc import Iterator
-from pathlib import Path
 
-from rov_fmu import __version__
 from rov_fmu.bridges import sdf
 from rov_fmu.equation.catalogue import AXES, BODY, REVERSE
-from rov_fmu.io.messages import InputError
-from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
@@ -22,8 +18,7 @@ _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
 
 def urdf_model(vehicle: Vehicle) -> sdf.Model:
     """Return the robot description of a vehicle. Raises InputError about a vehicle without a mass or with β = 0."""
-    if mistake := next(sdf.impossible(vehicle), None):
-        raise InputError(f"{vehicle.identifier}: {mistake}")
+    sdf.check_possible(vehicle)
     link = sdf.link_of(vehicle)
     added = sdf.added_mass(vehicle, link.matrix)
     forms, own = vehicle.layout.by_velocity, vehicle.coefficients
@@ -43,15 +38,10 @@ def urdf_model(vehicle: Vehicle) -> sdf.Model:
 
     masses = (-added[n, n] if v in forms else 0.0 for n, v in enumerate(_LETTERS))
     notes = tuple(_notes(vehicle))
-    text = render(
+    text = sdf.written(
         "model.urdf.j2",
-        Path(__file__).parent / "templates",
-        number=sdf.number,
-        vector=sdf.vector,
-        comment=sdf.comment,
-        vehicle=vehicle,
-        version=__version__,
-        notes=notes,
+        vehicle,
+        notes,
         link=link,
         weight=weight,
         buoyancy=weight - sdf.net_weight(vehicle),
@@ -59,12 +49,7 @@ def urdf_model(vehicle: Vehicle) -> sdf.Model:
         added_mass=dict(zip((f"{letter}d{v}" for v, letter in _LETTERS.items()), masses, strict=True)),
         linear=six("b_d", "{0}{1}"),
         quadratic=six("a_d", "{0}{1}{1}"),
-        centres={
-            f"center_of_{word}": {axis: own.get(f"{axis}_{of}", 0.0) for axis in "xyz"}
-            for word, of in (("gravity", "G"), ("buoyancy", "B"))
-        },
         plugin=sdf.hydrodynamics(vehicle, link) | dict(sdf.in_plugin(added)),
-        density=sdf.DENSITY,
     )
     return sdf.Model(text, notes, ())
 

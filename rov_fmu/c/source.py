@@ -7,7 +7,7 @@ from itertools import groupby, takewhile
 
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.alone import response_formulas
-from rov_fmu.equation.attitude import QUATERNION, entry, start_formulas
+from rov_fmu.equation.attitude import QUATERNION, start_formulas
 from rov_fmu.equation.expression import (
     PYTHON,
     Expression,
@@ -101,20 +101,6 @@ class EquationSource:
         kinematic = self.equation.components[len(self.equation.dynamic) :]
         rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
         return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
-
-    def first_rotation(self) -> str:
-        """Return the first angular velocity."""
-        return next(own.axis.velocity for own in self.layout.axes if own.axis.is_rotation)
-
-    def size_group(self, name: str) -> str:
-        """Return the first state of the group of a state. The sizes of a group are added.
-
-        Without an attitude, the groups of several states are the cosine and the sine of the heading, and the horizontal
-        position. With an attitude, they are each row of the rotation matrix, and the position.
-        """
-        if self.layout.has_attitude:
-            return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
-        return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def attitude(self) -> list[str]:
         """Return statements that set the quaternion to that of the rotation matrix in y."""
@@ -334,15 +320,8 @@ def generated_sources(layout: Layout) -> dict[str, str]:
     """Return the generated files of a vehicle, model.h and equation.h, by their names."""
     source = EquationSource(layout)
     formulas = {name: written(rate_formula(terms), PYTHON) for name, terms in source.equation.rows.items()}
-    sizes = {
-        "inputs": len(layout.inputs),
-        "states": len(layout.state),
-        "others": len(layout.calculated) + len(layout.delayed),
-        "commands": len(layout.commands),
-        "parameters": len(layout.coefficients) + len(layout.initial),
-    }
-    given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
-    return {name: render(f"{name}.j2", **given, quaternion=QUATERNION) for name in ("model.h", "equation.h")}
+    given = {"source": source, "equation": source.equation, "formulas": formulas, "quaternion": QUATERNION}
+    return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
 
 
 def unused_sources(layout: Layout) -> list[str]:

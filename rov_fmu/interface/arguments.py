@@ -109,41 +109,41 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
     return found
 
 
-class Commands:
-    """The inputs of a simulation, and the times at which they may change."""
+def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> tuple[Array, dict[str, Array]]:
+    """Return the times of the steps and the inputs by name, each held from one time up to the next.
 
-    def __init__(self, layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> None:
-        names = _names("inputs", inputs)
-        own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
-        self.time = time
-        """The times of the steps: the times of the results, and the times between them at which an input changes."""
-        if own is not None:
-            self.time = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
-        middles = np.append(0.5 * (self.time[:-1] + self.time[1:]), self.time[-1])
-        given: dict[str, Array] = {}
-        for name in names:
-            if name == TIME:
-                continue
-            _check_name("inputs", name, layout.inputs, layout.kinds)
-            value = inputs[name]
-            key = f"inputs[{name!r}]"
-            if callable(value):
-                found = _numbers(f"{key}(t)", value(middles))
-                _check_shape(f"{key}(t)", found, len(middles), many)
-            else:
-                found = _numbers(key, value)
-                _check_shape(key, found, len(time if own is None else own), many)
-                if own is not None and found.ndim and found.shape[-1] == len(own):
-                    place = np.searchsorted(own, self.time, side="right") - 1
-                    before = layout.inputs[name].start if name in layout.inputs else 0.0
-                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], before)
-            given[name] = found
-        self.values: dict[str, Array] = {}
-        """The inputs by name: numbers, or arrays whose last axis is time. Each value is held up to the next time."""
-        for name, found in with_axes(layout, given).items():
-            self.values[name] = found
-            for beyond in _beyond(found, layout.commands[name]) if name in layout.commands else ():
-                warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
+    The times are those of the results, and those between them at which an input changes. An input is a number, or an
+    array whose last axis is time. Raises InputError. Warns about commands that saturate.
+    """
+    names = _names("inputs", inputs)
+    own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
+    times = time
+    if own is not None:
+        times = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
+    middles = np.append(0.5 * (times[:-1] + times[1:]), times[-1])
+    given: dict[str, Array] = {}
+    for name in names:
+        if name == TIME:
+            continue
+        _check_name("inputs", name, layout.inputs, layout.kinds)
+        value = inputs[name]
+        key = f"inputs[{name!r}]"
+        if callable(value):
+            found = _numbers(f"{key}(t)", value(middles))
+            _check_shape(f"{key}(t)", found, len(middles), many)
+        else:
+            found = _numbers(key, value)
+            _check_shape(key, found, len(time if own is None else own), many)
+            if own is not None and found.ndim and found.shape[-1] == len(own):
+                place = np.searchsorted(own, times, side="right") - 1
+                before = layout.inputs[name].start if name in layout.inputs else 0.0
+                found = np.where(place >= 0, found[..., np.maximum(place, 0)], before)
+        given[name] = found
+    values = with_axes(layout, given)
+    for name in filter(layout.commands.__contains__, values):
+        for beyond in _beyond(values[name], layout.commands[name]):
+            warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
+    return times, values
 
 
 def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:

@@ -135,7 +135,8 @@ def _draft(folder: Path, found: Sequence[Inspection], tables: TableHeaders, thru
         identifier=word if word[:1].isalpha() else f"rov_{word}",
         curves=tables.curves or ["all"],
         axes=_axes(signals),
-        body=_body(vehicle) if vehicle else (),
+        body=[*BODY],
+        vehicle=vehicle,
         effects=_effects(vehicle, signals),
         columns=columns,
         headers=_questions(headers),
@@ -148,12 +149,6 @@ def _axes(signals: Collection[str]) -> list[str]:
     """Return the names of the axes that the logs measure; every autopilot measures roll and pitch."""
     measured = [axis for axis in AXES.values() if {axis.position, f"{axis.name} velocity"} & {*signals}]
     return [axis.name for axis in measured if axis not in (ROLL, PITCH)]
-
-
-def _body(vehicle: Vehicle) -> list[tuple[str, str, str]]:
-    """Return the names, values and units of the coefficients of a vehicle's body."""
-    units = {key: declaration.unit for key, declaration in vehicle.layout.coefficients.items()}
-    return [(key, f"{vehicle[key]:g}", units[key]) for key in BODY if key in units]
 
 
 def _effects(vehicle: Vehicle | None, signals: Collection[str]) -> list[str]:
@@ -222,12 +217,6 @@ def _columns(found: Iterable[Inspection], tables: TableHeaders) -> tuple[dict[st
 
 def _quoted(text: str) -> str:
     """Return a text as a basic string of TOML. A byte of a name that is not Unicode becomes a blank."""
-    return '"{}"'.format("".join(map(_in_quotes, text)))
-
-
-def _in_quotes(character: str) -> str:
-    if character in '\\"':
-        return f"\\{character}"
-    if character.isprintable():
-        return character
-    return " " if "\ud800" <= character <= "\udfff" else f"\\U{ord(character):08X}"
+    text = re.sub("[\ud800-\udfff]", " ", text)
+    characters = (f"\\{c}" if c in '\\"' else c if c.isprintable() else f"\\U{ord(c):08X}" for c in text)
+    return f'"{"".join(characters)}"'
