@@ -79,6 +79,8 @@ _vehicle = partial(
     click.argument, "vehicle", callback=lambda _, __, given: find_vehicle(given), shell_complete=_complete_vehicle
 )
 
+_vehicle_or_videoray = partial(_vehicle, default=str(VIDEORAY))
+
 
 class _Choice(click.Choice[Any]):
     """One of several words. A wrong word leads to one line that lists the choices and names the most similar one."""
@@ -162,7 +164,7 @@ def _commands(context: click.Context) -> None:
 
 
 @_commands.command("build")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 @_output_option(
     metavar="FILE.fmu",
     help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0.",
@@ -251,7 +253,7 @@ def _print_built(built: "Built", seconds: float) -> None:
 
 
 @_commands.command("simulate")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 @_set_option(
     help="Set an input, a coefficient, or a state at the start, in SI units. The name of an axis commands all "
     "thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
@@ -348,7 +350,7 @@ def _warn(message: str) -> None:
 
 
 @_commands.command("fly")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 @click.option(
     "--against",
     callback=lambda _, __, given: given and find_vehicle(given),
@@ -482,7 +484,7 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
 
 
 @_commands.command("sdf")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 @_output_option(
     metavar="FILE.sdf|.urdf",
     help="File to write. The default is <identifier>.sdf. URDF has the hydrodynamics for ROS 2.",
@@ -820,7 +822,7 @@ def _schema() -> None:
 
 
 @_commands.command("tables")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper with the printed, computed and measured values."""
     from rov_fmu.report.console import print_tables

@@ -44,8 +44,8 @@ def rates(vehicle: Vehicle, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
         **_components("x", x, tuple(layout.state)),
         **_components("forces", forces, force_names(layout)),
     }
-    found = _rates(layout, library)(values)
-    return library.stack([found[f"der_{name}"] for name in layout.state])
+    numbers = _rates(layout, library)(values)
+    return library.stack([numbers[f"der_{name}"] for name in layout.state])
 
 
 def forces(vehicle: Vehicle, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
@@ -53,8 +53,8 @@ def forces(vehicle: Vehicle, inputs: Mapping[str, Any], p: Mapping[str, Any]) ->
     layout = vehicle.layout
     _check_names("inputs", "input", inputs, layout.inputs)
     library = _library_of((*inputs.values(), *p.values()))
-    found = _thrust(layout, library)({**_coefficients(vehicle, p), **layout.usual_inputs, **inputs})
-    return library.stack([found[name] for name in force_names(layout)])
+    numbers = _thrust(layout, library)({**_coefficients(vehicle, p), **layout.usual_inputs, **inputs})
+    return library.stack([numbers[name] for name in force_names(layout)])
 
 
 @lru_cache(maxsize=_FORMULAS)
@@ -177,8 +177,8 @@ def _casadi() -> _Library:
 
     def interval(x: Any, knots: Sequence[float], columns: Sequence[Sequence[float]]) -> list[Any]:
         t = casadi.SX.sym("t")  # pw_const does not take an MX, but a function does
-        found = [casadi.pw_const(t, casadi.DM(knots[1:-1]), casadi.DM(column)) for column in columns]
-        return [*casadi.Function("interval", [t], found)(x)]
+        pieces = [casadi.pw_const(t, casadi.DM(knots[1:-1]), casadi.DM(column)) for column in columns]
+        return [*casadi.Function("interval", [t], pieces)(x)]
 
     named = {"pow": casadi.power, "both": casadi.logic_and, "either": casadi.logic_or, "where": casadi.if_else}
     return _library(casadi, lambda parts: casadi.vertcat(*parts), named, interval)

@@ -251,13 +251,9 @@ class EquationSource:
         return _assigned(self.equation.orientation, formulas, self._in_c)
 
     def beginning(self) -> list[str]:
-        """Return statements for the start.
-
-        They set the delayed commands to their start values, and compute the attitude from its parameters.
-        """
-        lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
+        """Return statements that compute the attitude at the start from its parameters."""
         formulas = start_formulas() if self.layout.has_attitude else {}
-        return lines + _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
+        return _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""

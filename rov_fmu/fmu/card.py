@@ -77,7 +77,7 @@ def card_text(vehicle: Vehicle) -> str:
 
 def read_card(text: str) -> dict[str, list[str]]:
     """Return the paragraphs of a card by their headings, from the text that `card_text` wrote."""
-    found: dict[str, list[str]] = {}
+    headings: dict[str, list[str]] = {}
     paragraphs: list[str] = []
     for line in text.splitlines():
         if line.startswith("- "):
@@ -85,8 +85,8 @@ def read_card(text: str) -> dict[str, list[str]]:
         elif line.startswith("  ") and paragraphs:
             paragraphs[-1] += f" {line.strip()}"
         elif line:
-            paragraphs = found.setdefault(line, [])
-    return found
+            paragraphs = headings.setdefault(line, [])
+    return headings
 
 
 def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:
@@ -138,7 +138,7 @@ def _left_out_of_forces(layout: Layout) -> Iterator[str]:
 def _mirrored(layout: Layout) -> str:
     """Return, in words, which thrust curves and axes behave in reverse as forward."""
     curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
-    axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
+    axes = [part.axis.name for part in layout.axes if "a_d_reverse" not in part.keys]
     thrust = "thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}"
     drag = "drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}"
     return " and ".join([thrust] * bool(curves) + [drag] * bool(axes))

@@ -126,10 +126,10 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def _has_mass(self, changed: Mapping[str, float]) -> bool:
         """Return True if the mass matrix is positive definite with some parameters changed."""
         try:
-            found = self.equation.numbers({**self.values, **changed})
+            numbers = self.equation.numbers({**self.values, **changed})
         except ZeroDivisionError:
             return False
-        return all(found[name] > 0.0 for name in self.equation.PIVOTS)
+        return all(numbers[name] > 0.0 for name in self.equation.PIVOTS)
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""

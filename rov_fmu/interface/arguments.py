@@ -73,7 +73,7 @@ def checked_values(
 
     For many vehicles each value is a number, or an array of one number for each vehicle, which becomes a column.
     """
-    found = {}
+    arrays = {}
     for name in _names(what, given):
         _check_name(what, name, declarations)
         key = f"{what}[{name!r}]"
@@ -81,7 +81,7 @@ def checked_values(
         if values.ndim > many:
             allowed = "a number, or a sequence of one number for each vehicle" if many else "one number"
             raise InputError(f"{key}: must be {allowed}, and has the shape {values.shape}")
-        found[name] = values[:, np.newaxis] if values.ndim else values
+        arrays[name] = values[:, np.newaxis] if values.ndim else values
         declaration = declarations[name]
         outside = np.flatnonzero((values < declaration.minimum) | (values > declaration.maximum))
         if len(outside):
@@ -90,7 +90,7 @@ def checked_values(
                 within(float(wrong), declaration)
             except ValueError as error:
                 raise InputError(f"{key} = {wrong:.12g}: {error}") from error
-    return found
+    return arrays
 
 
 def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> dict[str, Array]:
@@ -98,15 +98,15 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
 
     Raises InputError if one cannot be used, or if the attitude is given both as a quaternion and as angles.
     """
-    found = checked_values("start", given, layout.state | layout.initial, many=many)
-    if quaternion := [found[name] for name in QUATERNION if name in found]:
-        if angles := found.keys() & layout.initial.keys() - {"psi_0"}:
+    states = checked_values("start", given, layout.state | layout.initial, many=many)
+    if quaternion := [states[name] for name in QUATERNION if name in states]:
+        if angles := states.keys() & layout.initial.keys() - {"psi_0"}:
             raise InputError(
                 f"start[{min(angles)!r}]: the attitude is also given as a quaternion. Give only one of the two"
             )
         if np.any(sum(map(np.abs, quaternion)) == 0.0):
             raise InputError(f"start: the quaternion {', '.join(QUATERNION)} is 0 and has no direction")
-    return found
+    return states
 
 
 def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> tuple[Array, dict[str, Array]]:
@@ -129,16 +129,16 @@ def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -
         value = inputs[name]
         key = f"inputs[{name!r}]"
         if callable(value):
-            found = _numbers(f"{key}(t)", value(middles))
-            _check_shape(f"{key}(t)", found, len(middles), many)
+            array = _numbers(f"{key}(t)", value(middles))
+            _check_shape(f"{key}(t)", array, len(middles), many)
         else:
-            found = _numbers(key, value)
-            _check_shape(key, found, len(time if own is None else own), many)
-            if own is not None and found.ndim and found.shape[-1] == len(own):
+            array = _numbers(key, value)
+            _check_shape(key, array, len(time if own is None else own), many)
+            if own is not None and array.ndim and array.shape[-1] == len(own):
                 place = np.searchsorted(own, times, side="right") - 1
                 before = layout.inputs[name].start if name in layout.inputs else 0.0
-                found = np.where(place >= 0, found[..., np.maximum(place, 0)], before)
-        given[name] = found
+                array = np.where(place >= 0, array[..., np.maximum(place, 0)], before)
+        given[name] = array
     values = with_axes(layout, given)
     for name in filter(layout.commands.__contains__, values):
         for beyond in _beyond(values[name], layout.commands[name]):
@@ -153,17 +153,17 @@ def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:
     command in its positive direction: -0.3 in heave is 30 % up. Where two axes share a command, their fractions add up.
     Raises InputError if no thruster drives the axis, or if one of its commands is given, too.
     """
-    found = {name: value for name, value in values.items() if name in layout.inputs}
+    inputs = {name: value for name, value in values.items() if name in layout.inputs}
     fractions: dict[str, Array] = {}
     for name in (axis for axis in layout.kinds if axis in values):
         if not (signs := layout.signs(AXES[name])):
             raise InputError(f"inputs[{name!r}]: no thruster drives this axis")
         for command, sign in signs.items():
-            if command in found:
+            if command in inputs:
                 raise InputError(f"inputs[{command!r}]: {name} drives this input, too")
             fractions[command] = fractions.get(command, np.array(0.0)) + sign * values[name]
     command_of = np.vectorize(layout.command_of, otypes=[np.float64])
-    return found | {command: command_of(fraction) for command, fraction in fractions.items()}
+    return inputs | {command: command_of(fraction) for command, fraction in fractions.items()}
 
 
 def _beyond(values: Array, command: Declaration) -> Iterator[str]:
@@ -212,10 +212,10 @@ def _check_shape(key: str, values: Array, times: int, many: bool) -> None:
 def _numbers(key: str, given: ArrayLike) -> Array:
     """Return finite numbers as an array. Raises InputError for anything else."""
     try:
-        found = np.asarray(given)
-        if found.dtype.kind not in "biufO":
+        array = np.asarray(given)
+        if array.dtype.kind not in "biufO":
             raise TypeError
-        values = found.astype(np.float64)
+        values = array.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{key} = {brief(shown(given), _ONE_LINE)}: must be a number, or an array of numbers"

@@ -28,7 +28,7 @@ def identify_folder(
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. Returns the
     identification, and a line for each file that was replaced. Raises FileError. Raises WriteError if a file cannot be
-    written; most such cases are found before the work begins.
+    written; most such cases are identified before the work begins.
     """
     replaced: list[str] = []
     if vehicle and report:
@@ -55,11 +55,11 @@ def identify_folder(
 
         outputs.append(report_output(identification, report, begin("drawing the report")))
     if vehicle:
-        found = identification.vehicle
+        identified = identification.vehicle
         if report:
-            assert found.provenance
-            found = replace(found, provenance=found.provenance.model_copy(update={"report": report}))
-        outputs.append(vehicle_output(found, vehicle))
+            assert identified.provenance
+            identified = replace(identified, provenance=identified.provenance.model_copy(update={"report": report}))
+        outputs.append(vehicle_output(identified, vehicle))
     if mcap:
         from rov_fmu.bridges.mcap_logs import identification_mcap
 

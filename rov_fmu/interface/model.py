@@ -247,7 +247,9 @@ class VehicleModel(Vehicle):
             attitude = QUATERNION if layout.has_attitude else ()
             others = (*attitude, *(() if many else layout.commands))
             recording = [*recorded, *(name for name in others if name not in recorded)]
-            found = simulate(self, step_times, values, recording, vehicles=vehicles, workers=workers, lanes=lanes)
+            trajectories = simulate(
+                self, step_times, values, recording, vehicles=vehicles, workers=workers, lanes=lanes
+            )
         except MemoryError as error:
             size = 8e-9 * vehicles * len(step_times) * len(recorded)
             raise InputError(
@@ -255,8 +257,8 @@ class VehicleModel(Vehicle):
                 "fewer variables"
             ) from error
         if attitude:
-            self._warn_if_turned_over(step_times, found.values[[recording.index(name) for name in attitude]])
-        rows = found.values
+            self._warn_if_turned_over(step_times, trajectories.values[[recording.index(name) for name in attitude]])
+        rows = trajectories.values
         if len(step_times) > len(times):
             rows = rows[..., np.searchsorted(step_times, times)]
         return Result(
@@ -264,7 +266,7 @@ class VehicleModel(Vehicle):
             {name: row if many else row[0] for name, row in zip(recorded, rows, strict=False)},
             {name: units[name] for name in recorded},
             tuple(name for name in recorded if name in layout.state),
-            np.flatnonzero(found.failed < len(step_times)),
+            np.flatnonzero(trajectories.failed < len(step_times)),
             {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
             "us" if layout.pulse else "1",
         )

@@ -99,8 +99,8 @@ class Result(Mapping[str, Array]):
         changes of commands that are still waiting for the dead time.
         """
         ends = {name: values[..., -1][()] for name, values in self.arrays.items()}
-        found = {name: ends[name] for name in self.states}
-        return found | ({"psi_0": ends["psi"]} if {*QUATERNION, "psi"} <= ends.keys() else {})
+        start = {name: ends[name] for name in self.states}
+        return start | ({"psi_0": ends["psi"]} if {*QUATERNION, "psi"} <= ends.keys() else {})
 
     def to_dataframe(self) -> "pd.DataFrame":
         """Return a pandas data frame with a column for each variable.
@@ -190,8 +190,8 @@ def _dashes(curves: Sequence[Array]) -> list[Any]:
                 break
         else:
             groups.append([n])
-    found: list[Any] = ["-"] * len(curves)
+    styles: list[Any] = ["-"] * len(curves)
     for group in groups:
         for place, n in enumerate(group[1:], 1):
-            found[n] = (-_DASH * place, (_DASH, _DASH * (len(group) - 1)))
-    return found
+            styles[n] = (-_DASH * place, (_DASH, _DASH * (len(group) - 1)))
+    return styles

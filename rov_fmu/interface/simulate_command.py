@@ -98,7 +98,7 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     """Return the values of the options --set: inputs, initial values and coefficients. Raises InputError."""
     variables = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
     names = [*variables, *layout.kinds]
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for text in settings:
         name, _, value = (part.strip() for part in text.partition("="))
         if name not in names and name in layout.calculated:
@@ -106,17 +106,17 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
         if name not in names:
             hint = did_you_mean(name, names)
             raise InputError(f"--set {text}: the vehicle has no such input, state or coefficient{hint}")
-        if name in found:
+        if name in values:
             raise InputError(f"--set {text}: {name} is set twice")
         try:
-            found[name] = float(value)
+            values[name] = float(value)
         except ValueError:
-            found[name] = nan
-        if not isfinite(found[name]):
+            values[name] = nan
+        if not isfinite(values[name]):
             percent = _percent(value) if name in layout.kinds or variables[name].unit == "1" else ""
             raise InputError(f"--set {text}: {shown(value)} must be a finite number{percent}")
     kinds = (layout.inputs | layout.kinds, layout.state | layout.initial, layout.coefficients)
-    return Settings(*({name: value for name, value in found.items() if name in own} for own in kinds))
+    return Settings(*({name: value for name, value in values.items() if name in own} for own in kinds))
 
 
 def _percent(text: str) -> str:
@@ -186,10 +186,10 @@ def _plot_output(result: Result, path: Path, title: str) -> Output:
 
 def print_final(vehicle: VehicleModel, result: Result, *, has_no_input: bool) -> None:
     """Print the values at the end as a table, and how to set a command if the simulation has no input at all."""
-    found = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
+    ends = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
     for name, values in result.items():
-        found.add_row(name, f"{values[-1] + 0.0:.6g}", result.units[name])  # -0 becomes 0
-    print_table(found)
+        ends.add_row(name, f"{values[-1] + 0.0:.6g}", result.units[name])  # -0 becomes 0
+    print_table(ends)
     if has_no_input:
         name = next(iter(vehicle.layout.commands))
         paragraph(console(), f"No command is set: try --set {name}={vehicle.layout.command_of(0.3):g}")

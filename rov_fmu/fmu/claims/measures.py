@@ -151,7 +151,7 @@ def repeatability(subject: Subject) -> Evidence:
     if subject.obstacle:
         return _not(subject.obstacle)
     plan = subject.plan
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     first = None
     largest = 0.0
     for _ in range(_PROCESSES):
@@ -160,15 +160,15 @@ def repeatability(subject: Subject) -> Evidence:
                 values = child.call("run", plan, _STEPS_OF_RUN)
                 first = values if first is None else first
                 digest = hashlib.sha256(values.tobytes()).hexdigest()
-                found[digest] = found.get(digest, 0) + 1
+                counts[digest] = counts.get(digest, 0) + 1
                 largest = max(largest, _deviation(subject, values, first))
     assert first is not None
-    same = next(iter(found.values()))
+    same = next(iter(counts.values()))
     words = f"{same} of {_RUNS} runs of {subject.words} in {_PROCESSES} processes, with {first.size} numbers each, "
     words += "have the bits of the first one."
-    if len(found) > 1:
+    if len(counts) > 1:
         words += f" The others deviate by up to {_tiny(largest)}."
-    return Evidence(_is(len(found) == 1), words, f"{same} of {_RUNS}")
+    return Evidence(_is(len(counts) == 1), words, f"{same} of {_RUNS}")
 
 
 def cost(subject: Subject) -> Evidence:
@@ -251,10 +251,10 @@ def limits(subject: Subject) -> Evidence:
     """Ask for what is impossible, and see how the FMU answers."""
     if subject.obstacle:
         return _not(subject.obstacle)
-    found = [(what, _asked(subject, *call)) for what, call in _impossible(subject)]
-    accepted = [what for what, answer in found if answer.refused < answer.tried]
-    changed = [what for what, answer in found if answer.kept < answer.refused]
-    share = f"{len(found) - len(accepted)} of {len(found)}"
+    answers = [(what, _asked(subject, *call)) for what, call in _impossible(subject)]
+    accepted = [what for what, answer in answers if answer.refused < answer.tried]
+    changed = [what for what, answer in answers if answer.kept < answer.refused]
+    share = f"{len(answers) - len(accepted)} of {len(answers)}"
     words = f"{share} kinds of impossible values and steps are refused"
     if accepted:
         words += f". Not refused: {listed(accepted)}."
@@ -263,7 +263,7 @@ def limits(subject: Subject) -> Evidence:
     words += f" A refusal changes something: {listed(changed)}." * bool(changed)
     if is_free := bool(accepted) and not subject.is_ours:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
-    rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in found]
+    rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in answers]
     result: Result = "measured" if is_free and not changed else _is(not (accepted or changed))
     return Evidence(result, words, share, ("Asked for", "Refused", "Answer"), rows)
 
@@ -312,18 +312,18 @@ def _beyond(low: float, high: float) -> float | None:
 
 def integrity(subject: Subject) -> Evidence:
     """Check the hashes in the FMU and the signature beside it. Raises ProofError if one of them does not fit."""
-    found = check_evidence(subject.path, subject.key)
-    if not (found.files or found.signer):
+    evidence = check_evidence(subject.path, subject.key)
+    if not (evidence.files or evidence.signer):
         return _not("the FMU carries no hashes of its files, and no signature lies beside it")
-    count = len(found.files)
-    if found.signer:
+    count = len(evidence.files)
+    if evidence.signer:
         known = "given with --key" if subject.key else "compare it with the fingerprint that its maker gives"
-        words = f"All {count} files are as they were built; it is signed with the key {found.signer} ({known})."
+        words = f"All {count} files are as they were built; it is signed with the key {evidence.signer} ({known})."
     else:
         words = f"All {count} files match the hashes in the FMU. It is not signed: whoever changed a file may have "
         words += "changed its hash too."
-    rows = [("Program", name, digest) for name, digest in found.generator.items()]
-    rows += [("File read", name, digest) for name, digest in found.inputs.items()]
+    rows = [("Program", name, digest) for name, digest in evidence.generator.items()]
+    rows += [("File read", name, digest) for name, digest in evidence.inputs.items()]
     return Evidence("holds", words, f"{count} files", ("Made from", "Name", "Hash"), rows)
 
 

@@ -86,17 +86,17 @@ class Runs:
 
     def durations(self, plan: Plan, steps: int, most: float) -> list[float]:
         """Return the duration of each step of a run, s. The run begins anew until `most` seconds have passed."""
-        found: list[float] = []
+        durations: list[float] = []
         began = perf_counter()
         while perf_counter() - began < most:
             with self._instance(plan) as fmu:
                 for t, h in self._steps(fmu, plan, steps):
                     begin = perf_counter()
                     self._step(fmu, t, h)
-                    found.append(perf_counter() - begin)
+                    durations.append(perf_counter() - begin)
                     if perf_counter() - began > most:
                         break
-        return found
+        return durations
 
     def _steps(self, fmu: Any, plan: Plan, steps: int) -> Iterator[tuple[float, float]]:
         """Yield the time and the length of each step of a plan, and set the inputs at the beginning of each piece."""

@@ -67,11 +67,11 @@ class Subject:
         """The least and the largest value of each variable, by name. FMPy does not read those of FMI 3.0."""
         root = etree.parse(str(Path(self.folder, "modelDescription.xml"))).getroot()
         types = {one.get("name"): _attributes(one) for one in root.iterfind("TypeDefinitions/*")}
-        found = {}
+        bounds = {}
         for own in map(_attributes, root.iterfind("ModelVariables/*")):
             given = types.get(own.get("declaredType"), {}) | own
-            found[own["name"]] = float(given.get("min", -inf)), float(given.get("max", inf))
-        return found
+            bounds[own["name"]] = float(given.get("min", -inf)), float(given.get("max", inf))
+        return bounds
 
     @property
     def is_ours(self) -> bool:

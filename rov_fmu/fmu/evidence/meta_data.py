@@ -53,10 +53,10 @@ def _with_own_hash(document: bytes, digest: str) -> bytes:
 @cache
 def generator_hash() -> str:
     """Return the SHA3-256 of the program: of the names and the contents of its files, in the order of their names."""
-    found = sha3_256()
+    digest = sha3_256()
     for name, content in sorted(_program()):
-        found.update(name.encode() + b"\0" + content + b"\0")
-    return found.hexdigest()
+        digest.update(name.encode() + b"\0" + content + b"\0")
+    return digest.hexdigest()
 
 
 def _program() -> Iterator[tuple[str, bytes]]:

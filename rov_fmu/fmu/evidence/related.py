@@ -139,10 +139,10 @@ def ends_of_intervals(vehicle: Vehicle) -> Iterator[tuple[str, str, Mapping[str,
 
 def _moved(known: Uncertainty, scores: Sequence[float]) -> dict[str, float]:
     """Return the coefficients that differ from those of the vehicle by some standard errors each."""
-    found = {}
+    coefficients = {}
     for n, (name, score) in enumerate(zip(known.names, scores, strict=True)):
         value, shift, (low, high) = float(known.values[n]), score * float(known.errors[n]), known.bounds[n]
         moved = value * exp(shift / value) if is_factor(name) and value > 0.0 else value + shift
         if score:
-            found[name] = float(format(min(max(moved, float(low)), float(high)), _DIGITS))
-    return found
+            coefficients[name] = float(format(min(max(moved, float(low)), float(high)), _DIGITS))
+    return coefficients
