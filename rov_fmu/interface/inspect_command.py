@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
-from rov_fmu.equation.catalogue import AXES, BODY, EXTERNAL, PITCH, ROLL
+from rov_fmu.equation.catalogue import AXES, BODY, EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
@@ -22,7 +22,7 @@ from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_ta
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 _BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
@@ -120,7 +120,6 @@ def _draft(
     """Return a draft, which is a complete rov.toml if a vehicle that ships, `base`, has such thrusters."""
     name = folder.resolve().name or inspections[0].path.stem
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    signals = {row.name for one in inspections for row in one.channels}
     vehicle = load_vehicle(SHIPPED[base]) if base else None
     columns, headers = _columns([one for one in inspections if not _is_bag(one.path)], tables)
     return render(
@@ -136,29 +135,15 @@ def _draft(
         name=name,
         identifier=word if word[:1].isalpha() else f"rov_{word}",
         curves=tables.curves or ["all"],
-        axes=_axes(signals),
+        axes=AXES.values(),
+        signals={row.name for one in inspections for row in one.channels},
         body=[*BODY],
         vehicle=vehicle,
-        effects=_effects(vehicle, signals),
         columns=columns,
         headers=_questions(headers),
         fields=_questions(_fields(inspections)),
         dives=_dives(inspections),
     )
-
-
-def _axes(signals: Collection[str]) -> list[str]:
-    """Return the names of the axes that the logs measure; every autopilot measures roll and pitch."""
-    measured = [axis for axis in AXES.values() if {axis.position, f"{axis.name} velocity"} & {*signals}]
-    return [axis.name for axis in measured if axis not in (ROLL, PITCH)]
-
-
-def _effects(vehicle: Vehicle | None, signals: Collection[str]) -> list[str]:
-    """Return the keys of [fit] for which the logs have the channels."""
-    needed = {"voltage": {"voltage"}, "attitude": {"roll angle", "pitch angle"}}
-    if vehicle and vehicle.layout.has_attitude:
-        del needed["attitude"]
-    return [key for key, names in needed.items() if names <= {*signals}]
 
 
 def _fields(inspections: Iterable[Inspection]) -> dict[str, str]:
