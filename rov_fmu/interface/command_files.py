@@ -54,7 +54,7 @@ def _of_log(path: Path, layout: Layout, rov_file: RovFile) -> dict[str, Array]:
     driven = layout_of(name.removeprefix("u_") for name in layout.commands)  # a thruster for each command
     log = one_log(path, driven, rov_file, is_part=True)
     if not log.commands:
-        raise FileError(f"{path}: no commands of {', '.join(layout.commands)} were inputs")
+        raise FileError(f"{path}: no commands of {', '.join(layout.commands)} were found")
     times = log.commands.rows
     fractions = log.commands.at(times)
     if log.axis and log.follows_axis:

@@ -28,7 +28,7 @@ def identify_folder(
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. Returns the
     identification, and a line for each file that was replaced. Raises FileError. Raises WriteError if a file cannot be
-    written; most such cases are identified before the work begins.
+    written; most such cases are found before the work begins.
     """
     replaced: list[str] = []
     if vehicle and report:
