@@ -15,10 +15,10 @@ from rov_fmu.c.compile import (
     compile_all,
     host_platform,
 )
-from rov_fmu.fmu.archive import archive, native_content, python_content, web_module
+from rov_fmu.fmu.archive import Content, archive, native_content, python_content, web_module
 from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
 from rov_fmu.fmu.evidence.signature import private_key, signature_path, signed
-from rov_fmu.fmu.model_description import NATIVE
+from rov_fmu.fmu.model_description import FMI_VERSIONS
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.file_kinds import FMU, check_written
@@ -83,29 +83,20 @@ def build(
     OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the
     vehicle cannot be read, or if `output` does not end with .fmu; WriteError, an OSError, if a path cannot be written.
     """
-    if not isinstance(vehicle, Vehicle):
-        raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
-    check_coefficients(vehicle.layout, vehicle.coefficients)
-    _check_options(backend, fmi, interface, osp=osp)
+    _check_options(vehicle, backend, fmi, interface, osp=osp)
     native = backend == "native"
     interface = interface or ("both" if native else "cs")
-    output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{'.fmi3' if fmi == 3 else ''}.fmu")
-    beside = []
-    if osp:
-        description = osp_model_description(vehicle.layout)
-        beside = [Output(osp_path(output, vehicle.identifier), description)]
+    version = {2: "", 3: ".fmi3"}[fmi]
+    output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
+    beside = [Output(osp_path(output, vehicle.identifier), osp_model_description(vehicle.layout))] if osp else []
     key = private_key(sign) if sign else None
-    signature = [signature_path(output)] if key else []
-    used = [*inputs, *vehicle.files, *([sign] if sign else [])]
-    check_targets([output, *(other.path for other in beside), *signature], used)
+    targets = [output, *(other.path for other in beside), *([signature_path(output)] if key else [])]
+    check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])])
     check_written(output, FMU)
     if output.suffix.lower() != ".fmu":
         raise FileError(f"{output}: the name must end with .fmu")
-    chosen = chosen_platforms(platforms, fmi) if native else []
-    results = reference_results(vehicle)
-    module = web_module(vehicle.layout)
-    pages = {**documentation(vehicle, native=native, fmi=fmi, interface=interface, module=module), **results}
-    content = native_content(vehicle, pages, fmi, interface) if native else python_content(vehicle, pages)
+    chosen = chosen_platforms(platforms, fmi) if native else None
+    content = _content(vehicle, native=native, fmi=fmi, interface=interface)
     on_content()
     start = perf_counter()
     seconds: dict[str, float] = {}
@@ -114,31 +105,37 @@ def build(
         seconds[name] = perf_counter() - start
         on_compiled(name)
 
-    binaries = compile_all(chosen, content.sources, content.identifier, done, fmi)
-    libraries = {
-        f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}": library
-        for name, library in binaries.items()
-    }
-    files = {**content.files, **libraries}
+    binaries = compile_all(chosen or [], content.sources, content.identifier, done, fmi)
+    files = dict(content.files)
+    for name, library in binaries.items():
+        files[f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}"] = library
     files[META_DATA] = meta_data(vehicle, files)
     packed, lost = archive(files), sorted(_platforms_in(output) - _folders(files))
-    checked: list[tuple[str, bool]] = []
     if key:
         beside.append(Output(signature_path(output), signed(packed, key)))
-    draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen if native else None, fmi)))
+    checked: list[tuple[str, bool]] = []
+    draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
-    written = [other.path for other in beside]
-    note, was_run = checked[0]
-    return Built(output, len(packed), content.guid, sizes, seconds, note, was_run, written, lost)
+    return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], targets[1:], lost)
 
 
-def _check_options(backend: str, fmi: int, interface: str | None, *, osp: bool) -> None:
-    """Raise OptionError about the first option that is invalid or cannot be combined with another."""
+def _content(vehicle: Vehicle, *, native: bool, fmi: int, interface: str) -> Content:
+    """Return the content of the FMU, with its expected results and its pages."""
+    results, module = reference_results(vehicle), web_module(vehicle.layout)
+    pages = {**documentation(vehicle, native=native, fmi=fmi, interface=interface, module=module), **results}
+    return native_content(vehicle, pages, fmi, interface) if native else python_content(vehicle, pages)
+
+
+def _check_options(vehicle: object, backend: str, fmi: int, interface: str | None, *, osp: bool) -> None:
+    """Raise InputError about the vehicle, or OptionError about an option that is invalid, alone or beside others."""
+    if not isinstance(vehicle, Vehicle):
+        raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
+    check_coefficients(vehicle.layout, vehicle.coefficients)
     if backend not in BACKENDS:
         raise OptionError(f"there is no backend {shown(backend)}, only {', '.join(BACKENDS)}")
-    if fmi not in NATIVE:
-        raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, NATIVE))}")
+    if fmi not in FMI_VERSIONS:
+        raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, FMI_VERSIONS))}")
     if fmi == 3 and backend != "native":
         raise OptionError("--fmi 3: PythonFMU makes FMI 2.0 alone")
     if interface is not None and interface not in INTERFACES:

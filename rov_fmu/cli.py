@@ -79,6 +79,8 @@ _vehicle = partial(
     click.argument, "vehicle", callback=lambda _, __, given: find_vehicle(given), shell_complete=_complete_vehicle
 )
 
+_vehicle_or_videoray = partial(_vehicle, default=str(VIDEORAY))
+
 
 class _Choice(click.Choice[Any]):
     """One of several words. A wrong word leads to one line that lists the choices and names the most similar one."""
@@ -118,12 +120,6 @@ def _seconds(least: str) -> Callable[[str], float]:
     return _number(f"a number of at least {least} s", low=float(least))
 
 
-def _refuse_vehicle(path: Path, reason: str) -> None:
-    """Raise FileError if a path that does not exist is the name of a vehicle that ships."""
-    if str(path) in SHIPPED and not path.exists():
-        raise FileError(f"{path}: {reason}")
-
-
 def _setting(text: str) -> str:
     """Return the text of an option that sets a value."""
     if "=" not in text:
@@ -133,6 +129,7 @@ def _setting(text: str) -> str:
 
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
 _file_option = partial(click.option, type=_FILE)
+_output_option = partial(_file_option, "-o", "--output")
 _set_option = partial(click.option, "--set", "settings", multiple=True, type=_setting, metavar="NAME=VALUE")
 
 
@@ -167,10 +164,8 @@ def _commands(context: click.Context) -> None:
 
 
 @_commands.command("build")
-@_vehicle(default=str(VIDEORAY))
-@_file_option(
-    "-o",
-    "--output",
+@_vehicle_or_videoray()
+@_output_option(
     metavar="FILE.fmu",
     help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0.",
 )
@@ -258,7 +253,7 @@ def _print_built(built: "Built", seconds: float) -> None:
 
 
 @_commands.command("simulate")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 @_set_option(
     help="Set an input, a coefficient, or a state at the start, in SI units. The name of an axis commands all "
     "thrusters that drive it: surge=0.3 is 30 % ahead. It may be repeated.",
@@ -280,9 +275,7 @@ def _print_built(built: "Built", seconds: float) -> None:
     type=_seconds("1e-6"),
     help="Time between two results, s, which does not change the motion. The default is 0.01.",
 )
-@_file_option(
-    "-o",
-    "--output",
+@_output_option(
     metavar="RESULT.csv",
     help="Results to write (.csv, .parquet, or .mcap for Foxglove and PlotJuggler).",
 )
@@ -357,7 +350,7 @@ def _warn(message: str) -> None:
 
 
 @_commands.command("fly")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 @click.option(
     "--against",
     callback=lambda _, __, given: given and find_vehicle(given),
@@ -376,7 +369,7 @@ def _warn(message: str) -> None:
     metavar="LOGS.mcap",
     help="What `identify --mcap` wrote: bands of the errors and unknown forces are shown.",
 )
-@_file_option("-o", "--output", metavar="PAGE.html", help="Page to write; no browser is opened.")
+@_output_option(metavar="PAGE.html", help="Page to write; no browser is opened.")
 def _fly(
     vehicle: Path, against: Path | None, recording: Path | None, identified: Path | None, output: Path | None
 ) -> None:
@@ -398,22 +391,16 @@ def _fly(
         check_written(output, PAGE)
     with _warnings_printed():
         flown = recording_of(recording, loaded[0], identified) if recording else None
-    page = fly_page(
-        [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, _short_names(paths), strict=True)],
-        recording=flown,
-    ).encode()
+    names = [path.name for path in paths]
+    names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
+    shown_ones = [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, names, strict=True)]
+    page = fly_page(shown_ones, recording=flown).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))
     if output:
         print_end([path], "open it in a browser")
     else:
         _open(path, "-o PAGE.html")
-
-
-def _short_names(paths: Sequence[Path]) -> list[str]:
-    """Return the names of files, with their folders if the names are the same."""
-    names = [path.name for path in paths]
-    return names if len({*names}) == len(names) else [str(path) for path in paths]
 
 
 def _open(path: Path, option: str) -> None:
@@ -497,10 +484,8 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
 
 
 @_commands.command("sdf")
-@_vehicle(default=str(VIDEORAY))
-@_file_option(
-    "-o",
-    "--output",
+@_vehicle_or_videoray()
+@_output_option(
     metavar="FILE.sdf|.urdf",
     help="File to write. The default is <identifier>.sdf. URDF has the hydrodynamics for ROS 2.",
 )
@@ -567,7 +552,8 @@ def _prove(
 
     Before, hashes in the FMU and a signature beside it are checked.
     """
-    _refuse_vehicle(fmu, f"must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
+    if str(fmu) in SHIPPED and not fmu.exists():
+        raise FileError(f"{fmu}: must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
     from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
     from rov_fmu.report.progress import parts
 
@@ -605,7 +591,7 @@ def _prove(
 
 @_commands.command("study")
 @click.argument("plan", type=_FILE)
-@_file_option("-o", "--output", required=True, metavar="RESULTS", help="Folder of the results.")
+@_output_option(required=True, metavar="RESULTS", help="Folder of the results.")
 @click.option(
     "--workers",
     type=_number("a whole number from 1 to 1024", 1, 1024, int),
@@ -675,7 +661,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
 
 @_commands.command("identify")
 @click.argument("folder", type=_FILE)
-@_file_option("-o", "--output", metavar="VEHICLE.toml", help="Vehicle file to write.")
+@_output_option(metavar="VEHICLE.toml", help="Vehicle file to write.")
 @_file_option(
     "--report",
     metavar="REPORT.html",
@@ -803,7 +789,7 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
     metavar="POINTS.csv",
     help="Table of many wanted points instead, with columns for command, velocity and time constant.",
 )
-@_file_option("-o", "--output", metavar="TUNED.toml", help="Vehicle file to write.")
+@_output_option(metavar="TUNED.toml", help="Vehicle file to write.")
 def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     """Find alpha and beta of an axis that give a wanted response."""
     from rov_fmu.identify.findings import sentences
@@ -834,7 +820,7 @@ def _schema() -> None:
 
 
 @_commands.command("tables")
-@_vehicle(default=str(VIDEORAY))
+@_vehicle_or_videoray()
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper with the printed, computed and measured values."""
     from rov_fmu.report.console import print_tables

@@ -1,21 +1,36 @@
-"""The equation of motion for NumPy arrays, CasADi symbols (SX, MX, DM) and JAX arrays, chosen by the arguments."""
+"""The equation of motion for NumPy arrays, CasADi symbols (SX, MX, DM) and JAX arrays, chosen by the arguments.
+
+The rates need only + - * /, sin, cos, sqrt, and a choice by the sign of a velocity. The thrust also needs powers and
+thrust tables. So the rates take forces, and another function gives the forces for the commands.
+"""
 
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 
-from rov_fmu.bridges.rates import Functions, force_names, forces_of_commands, rates_of
+from rov_fmu.equation.catalogue import delayed_name
+from rov_fmu.equation.expression import ARRAYS, Expression, Name, compiled
+from rov_fmu.equation.layout import Layout, ThrustTable
+from rov_fmu.equation.step import cubic
+from rov_fmu.equation.terms import Equation, equation_of
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.vehicle.vehicle import Vehicle
+
+_FORMULAS = 100
+"""The most layouts and libraries whose compiled formulas are kept."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Library:
-    functions: Functions
+    functions: Mapping[str, Callable[..., Any]]
+    """The functions that formulas may call: sin, cos, sqrt, pow, where, both, either; and `interval`.
+
+    `interval(x, knots, columns)` returns from each column the number of the interval between the rising knots that
+    contains x; the outer intervals have no end."""
     stack: Callable[[Sequence[Any]], Any]
     """Makes one vector of its components, each a number or an array."""
 
@@ -29,27 +44,41 @@ def rates(vehicle: Vehicle, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
         **_components("x", x, tuple(layout.state)),
         **_components("forces", forces, force_names(layout)),
     }
-    return library.stack(rates_of(layout, values, library.functions))
+    numbers = _rates(layout, library)(values)
+    return library.stack([numbers[f"der_{name}"] for name in layout.state])
 
 
 def forces(vehicle: Vehicle, inputs: Mapping[str, Any], p: Mapping[str, Any]) -> Any:
     """Return the forces for the inputs, as described in `VehicleModel.forces`."""
     layout = vehicle.layout
-    _check_names("inputs", inputs, layout.inputs)
+    _check_names("inputs", "input", inputs, layout.inputs)
     library = _library_of((*inputs.values(), *p.values()))
-    values = {**_coefficients(vehicle, p), **layout.usual_inputs, **inputs}
-    return library.stack(forces_of_commands(layout, values, library.functions))
+    numbers = _thrust(layout, library)({**_coefficients(vehicle, p), **layout.usual_inputs, **inputs})
+    return library.stack([numbers[name] for name in force_names(layout)])
+
+
+@lru_cache(maxsize=_FORMULAS)
+def force_names(layout: Layout) -> tuple[str, ...]:
+    """Return the names of the forces that the rates take.
+
+    These are the steady thrust of each thruster, F_… or, when it lags, steady_…; the loss of thrust by the speed of
+    advance, loss_…, and the angle of each fin, angle_…, where the vehicle has them; and the inputs that are no
+    commands: the loads from outside (X_ext …) and the current (V_N …).
+    """
+    equation = equation_of(layout)
+    formulas = (*_before_rates(equation).values(), *equation.rates.values())
+    used = frozenset().union(*(formula.names for formula in formulas))
+    return tuple(name for name in (*equation.thrust, *layout.inputs) if name in used)
 
 
 def _coefficients(vehicle: Vehicle, p: Mapping[str, Any]) -> dict[str, Any]:
-    _check_names("p", p, vehicle.layout.coefficients)
+    _check_names("p", "coefficient", p, vehicle.layout.coefficients)
     return {**vehicle.coefficients, **p}
 
 
-def _check_names(what: str, given: Mapping[str, Any], known: Iterable[str]) -> None:
+def _check_names(what: str, kind: str, given: Iterable[str], known: Iterable[str]) -> None:
     for name in given:
         if name not in known:
-            kind = {"inputs": "input", "p": "coefficient"}[what]
             raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{did_you_mean(str(name), [*known])}")
 
 
@@ -61,6 +90,46 @@ def _components(what: str, vector: Any, names: Sequence[str]) -> dict[str, Any]:
     if shape[:1] != (len(names),):
         raise InputError(f"{what}: must have {len(names)} rows ({', '.join(names)}), and has the shape {shape}")
     return {name: vector[n] for n, name in enumerate(names)}
+
+
+# ---- Formulas --------------------------------------------------------------------------------------------------------
+
+_Compiled = Callable[[Mapping[str, Any]], dict[str, Any]]
+
+
+@lru_cache(maxsize=_FORMULAS)
+def _rates(layout: Layout, library: _Library) -> _Compiled:
+    """Compile the formulas from the coefficients, the states and the forces to the rates, der_… by state."""
+    equation = equation_of(layout)
+    rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
+    return compiled({**_before_rates(equation), **rates}, library.functions, ARRAYS)
+
+
+@lru_cache(maxsize=_FORMULAS)
+def _thrust(layout: Layout, library: _Library) -> _Compiled:
+    """Compile the formulas from the coefficients and the inputs to the forces."""
+    equation, interval = equation_of(layout), library.functions["interval"]
+    tables = {name: _table_force(table, interval) for name, table in equation.tables.items()}
+    delayed = {delayed_name(name): Name(name) for name in layout.commands} if layout.has_dead_time else {}
+    return compiled({**delayed, **equation.thrust}, {**library.functions, **tables}, ARRAYS)
+
+
+def _before_rates(equation: Equation) -> dict[str, Expression]:
+    """Return the formulas from coefficients, states and forces to the numbers in the rates."""
+    return {name: formula for name, formula in equation.program.items() if name not in equation.thrust}
+
+
+def _table_force(table: ThrustTable, interval: Callable[..., Any]) -> Callable[[Any], Any]:
+    """Return the force of a thrust table as a function of the command, as `ThrustTable.force` computes it."""
+    rows = table.commands, table.forces, table.slopes
+    columns = [row[:-1] for row in rows] + [row[1:] for row in rows]
+
+    def force(command: Any) -> Any:
+        low, f, slope, high, g, slope_after = interval(command, table.commands, columns)
+        h = high - low
+        return cubic(f, g, h * slope, h * slope_after, (command - low) / h)
+
+    return force
 
 
 # ---- Libraries -------------------------------------------------------------------------------------------------------
@@ -76,38 +145,30 @@ def _library_of(values: Iterable[Any]) -> _Library:
 
 @cache
 def _numpy() -> _Library:
-    return _Library(_array_functions(np), lambda parts: np.stack(np.broadcast_arrays(*parts)).astype(float))
+    return _of_arrays(np, lambda parts: np.stack(np.broadcast_arrays(*parts)).astype(float))
 
 
 @cache
 def _jax() -> _Library:
-    jax = importlib.import_module("jax")
-    jnp = importlib.import_module("jax.numpy")
-    functions = _array_functions(jnp)
+    jax, jnp = map(importlib.import_module, ("jax", "jax.numpy"))
 
     def stack(parts: Sequence[Any]) -> Any:
         if not jax.config.jax_enable_x64:
             raise InputError('JAX computes in single precision: call jax.config.update("jax_enable_x64", True) first')
         return jnp.stack(jnp.broadcast_arrays(*parts))
 
-    return _Library(functions, stack)
+    return _of_arrays(jnp, stack)
 
 
-def _array_functions(library: Any) -> Functions:
-    """Return the functions of NumPy, or of a library with the same names."""
+def _of_arrays(library: Any, stack: Callable[[Sequence[Any]], Any]) -> _Library:
+    """Return the library with the functions of NumPy, or of another one with the same names."""
 
     def interval(x: Any, knots: Sequence[float], columns: Sequence[Sequence[float]]) -> list[Any]:
         place = library.searchsorted(library.asarray(knots[1:-1]), x, side="right")
         return [library.asarray(column)[place] for column in columns]
 
-    return {
-        **{name: getattr(library, name) for name in ("sin", "cos", "sqrt", "where")},
-        "abs": lambda x: library.where(x < 0.0, -x, x),  # with the derivative 1 at 0, as in the engine
-        "pow": library.power,
-        "both": library.logical_and,
-        "either": library.logical_or,
-        "interval": interval,
-    }
+    named = {"pow": library.power, "both": library.logical_and, "either": library.logical_or, "where": library.where}
+    return _library(library, stack, named, interval)
 
 
 @cache
@@ -116,16 +177,18 @@ def _casadi() -> _Library:
 
     def interval(x: Any, knots: Sequence[float], columns: Sequence[Sequence[float]]) -> list[Any]:
         t = casadi.SX.sym("t")  # pw_const does not take an MX, but a function does
-        found = [casadi.pw_const(t, casadi.DM(knots[1:-1]), casadi.DM(column)) for column in columns]
-        return [*casadi.Function("interval", [t], found)(x)]
+        pieces = [casadi.pw_const(t, casadi.DM(knots[1:-1]), casadi.DM(column)) for column in columns]
+        return [*casadi.Function("interval", [t], pieces)(x)]
 
-    functions = {
-        **{name: getattr(casadi, name) for name in ("sin", "cos", "sqrt")},
-        "where": casadi.if_else,
-        "abs": lambda x: casadi.if_else(x < 0.0, -x, x),  # with the derivative 1 at 0, as in the engine
-        "pow": casadi.power,
-        "both": casadi.logic_and,
-        "either": casadi.logic_or,
-        "interval": interval,
-    }
-    return _Library(functions, lambda parts: casadi.vertcat(*parts))
+    named = {"pow": casadi.power, "both": casadi.logic_and, "either": casadi.logic_or, "where": casadi.if_else}
+    return _library(casadi, lambda parts: casadi.vertcat(*parts), named, interval)
+
+
+def _library(
+    module: Any, stack: Callable[[Sequence[Any]], Any], named: Mapping[str, Any], interval: Callable[..., Any]
+) -> _Library:
+    def size(x: Any) -> Any:
+        return named["where"](x < 0.0, -x, x)  # with the derivative 1 at 0, as in the engine
+
+    alike = {name: getattr(module, name) for name in ("sin", "cos", "sqrt")}
+    return _Library({**alike, **named, "abs": size, "interval": interval}, stack)

@@ -26,7 +26,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from foxglove import Context
-    from foxglove.messages import ArrowPrimitive, Color, Quaternion, SceneEntity, Timestamp, Vector3
+    from foxglove.messages import ArrowPrimitive, Color, Pose, Quaternion, SceneEntity, Timestamp, Vector3
 
 EARTH = "map"
 """The name of the frame that is fixed to the earth: east, north, up."""
@@ -90,13 +90,13 @@ class Recording:
     def poses(self, name: str, values: Mapping[str, Array]) -> Callable[[int, int], None]:
         """Return the function that writes the n-th pose of a topic, with its stamp in ns, from values as in `poses`."""
         from foxglove.channels import PoseInFrameChannel
-        from foxglove.messages import Pose, PoseInFrame
+        from foxglove.messages import PoseInFrame
 
         channel = PoseInFrameChannel(name, context=self.context)
         positions, orientations = poses(values)
 
         def write(n: int, stamp: int) -> None:
-            pose = Pose(position=_vector(positions[n]), orientation=_quaternion(orientations[n]))
+            pose = _pose(positions[n], orientations[n])
             channel.log(PoseInFrame(timestamp=_timestamp(stamp), frame_id=EARTH, pose=pose), log_time=stamp)
 
         return write
@@ -164,13 +164,6 @@ def poses(values: Mapping[str, Array]) -> tuple[Array, Rotation]:
     return np.stack([east, north, 0.0 - down], axis=-1), _TO_ENU * turned * _TO_FRD
 
 
-def _timestamp(stamp: int) -> "Timestamp":
-    from foxglove.messages import Timestamp
-
-    seconds, rest = divmod(stamp, 1_000_000_000)
-    return Timestamp(sec=seconds, nsec=rest)
-
-
 def _picture_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
     """Return the function that writes frame and picture of the vehicle at the n-th time, with its stamp in ns."""
     from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel
@@ -207,9 +200,9 @@ def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "Sce
 
     `shares` are the forces relative to the strongest one.
     """
-    from foxglove.messages import CubePrimitive, Pose, SceneEntity
+    from foxglove.messages import CubePrimitive, SceneEntity
 
-    middle = Pose(position=_vector(np.zeros(3)), orientation=_quaternion(Rotation.identity()))
+    middle = _pose(np.zeros(3), Rotation.identity())
     return SceneEntity(
         frame_id=BODY,
         id="vehicle",
@@ -228,7 +221,7 @@ def hull_size(vehicle: Vehicle) -> Array:
 
 def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iterator["ArrowPrimitive"]:
     """Yield the jets as arrows in the frame of the vehicle. An arrow of Foxglove points along its own x axis."""
-    from foxglove.messages import ArrowPrimitive, Pose
+    from foxglove.messages import ArrowPrimitive
 
     for thruster in vehicle.layout.thrusters:
         share = shares.get(thruster.name, 0.0)
@@ -238,7 +231,7 @@ def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iter
         turned, _ = Rotation.align_vectors([jet], [[1.0, 0.0, 0.0]])
         length = abs(share) * longest
         yield ArrowPrimitive(
-            pose=Pose(position=_vector(_TO_FRD.apply(place(vehicle, thruster))), orientation=_quaternion(turned)),
+            pose=_pose(_TO_FRD.apply(place(vehicle, thruster)), turned),
             shaft_length=0.8 * length,
             shaft_diameter=0.04 * longest,
             head_length=0.2 * length,
@@ -247,22 +240,31 @@ def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iter
         )
 
 
+def _timestamp(stamp: int) -> "Timestamp":
+    from foxglove.messages import Timestamp
+
+    return Timestamp(*divmod(stamp, 1_000_000_000))
+
+
+def _pose(position: Array, orientation: Rotation) -> "Pose":
+    from foxglove.messages import Pose
+
+    return Pose(position=_vector(position), orientation=_quaternion(orientation))
+
+
 def _vector(of: Array) -> "Vector3":
     from foxglove.messages import Vector3
 
-    x, y, z = of.tolist()
-    return Vector3(x=x, y=y, z=z)
+    return Vector3(**dict(zip("xyz", of.tolist(), strict=True)))
 
 
 def _quaternion(of: Rotation) -> "Quaternion":
     from foxglove.messages import Quaternion
 
-    x, y, z, w = of.as_quat().tolist()
-    return Quaternion(x=x, y=y, z=z, w=w)
+    return Quaternion(**dict(zip("xyzw", of.as_quat().tolist(), strict=True)))
 
 
 def _colour(of: tuple[float, float, float, float]) -> "Color":
     from foxglove.messages import Color
 
-    r, g, b, a = of
-    return Color(r=r, g=g, b=b, a=a)
+    return Color(**dict(zip("rgba", of, strict=True)))

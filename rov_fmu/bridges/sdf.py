@@ -46,8 +46,8 @@ _GRAVITY = 9.8
 """Gravity where a vehicle file has no weight, m/s2, the default of SDFormat."""
 _SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """The signs of the components along and about the axes in Gazebo's frame, by those in the vehicle's frame."""
-_VELOCITIES, _FORCES, _IN_LINK = "uvwpqr", "xyzkmn", "xyzpqr"
-"""The letters of the axes: of velocities, of forces in the Hydrodynamics plugin, and in <fluid_added_mass>."""
+_VELOCITIES, _FORCES = "uvwpqr", "xyzkmn"
+"""The letters of the axes: of velocities, and of forces in the Hydrodynamics plugin."""
 _HELD_TIME = 0.02
 """The time constant, s, with which an axis that the vehicle lacks comes to rest."""
 _HELD_INERTIA = 1000.0
@@ -88,16 +88,6 @@ class _Propeller:
     lost: float
     """The moment per newton that no position can give, m."""
 
-    @property
-    def largest(self) -> float:
-        """The largest thrust, N."""
-        return max(self.newtons.values())
-
-    @property
-    def smallest(self) -> float:
-        """The smallest thrust, N: that in reverse."""
-        return min(self.newtons.values())
-
 
 @dataclass(frozen=True)
 class Link:
@@ -126,30 +116,27 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
     Raises InputError about a vehicle that Gazebo cannot have at all.
     """
-    if mistake := next(impossible(vehicle), None):
-        raise InputError(f"{vehicle.identifier}: {mistake}")
+    check_possible(vehicle)
     link = link_of(vehicle)
     added = added_mass(vehicle, link.matrix)
     propellers = [propeller for propeller in (_propeller(vehicle, t) for t in vehicle.layout.thrusters) if propeller]
-    notes = tuple(_notes(vehicle, added, propellers, explicit=explicit))
+    notes = (
+        *_notes_of_tuning(vehicle, added, propellers, explicit=explicit),
+        *_notes_of_commands(vehicle),
+        *_notes_of_motion(vehicle, propellers, explicit=explicit),
+    )
     small, radius = _PROPELLER
-    text = render(
+    text = written(
         "model.sdf.j2",
-        Path(__file__).parent / "templates",
-        number=number,
-        vector=vector,
-        comment=comment,
-        vehicle=vehicle,
-        version=__version__,
-        notes=notes,
+        vehicle,
+        notes,
         in_world=in_world,
-        density=DENSITY,
         gravity=gravity(vehicle),
         north=pi / 2.0,
         body=Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
         propeller=Link(link.mass * small, np.zeros(3), link.mass * small * radius**2 * np.eye(3)),
-        fluid_added_mass={} if explicit else dict(_in_link(added)),
-        disable_coriolis=explicit and not vehicle.layout.coupled,
+        explicit=explicit,
+        added=added,
         buoyancy={"centre": _centre(vehicle, "B"), "size": [_volume(vehicle) ** (1.0 / 3.0)] * 3},
         hydrodynamics=hydrodynamics(vehicle, link) | (dict(in_plugin(added)) if explicit else {}),
         thrusters=propellers,
@@ -157,12 +144,25 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
     return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
 
 
-def impossible(vehicle: Vehicle) -> Iterator[str]:
+def written(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: object) -> str:
+    """Return a model of a vehicle with notes, from its template."""
+    common = {"number": _number, "vector": _vector, "comment": _comment, "version": __version__, "density": DENSITY}
+    folder = Path(__file__).parent / "templates"
+    return render(template, folder, vehicle=vehicle, notes=notes, **common, **content)
+
+
+def check_possible(vehicle: Vehicle) -> None:
+    """Raise InputError about a vehicle that Gazebo cannot have."""
+    if mistake := next(_impossible(vehicle), None):
+        raise InputError(f"{vehicle.identifier}: {mistake}")
+
+
+def _impossible(vehicle: Vehicle) -> Iterator[str]:
     """Yield a line about each reason why Gazebo cannot have the vehicle."""
     if "m_rov" not in vehicle.coefficients:
         yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
         return
-    for name in (form.axis.coefficient("beta") for form in vehicle.layout.axes):
+    for name in (part.axis.coefficient("beta") for part in vehicle.layout.axes):
         if vehicle[name] == 0.0:
             yield f"{name} = 0: must be more than 0 for Gazebo, because m/{name} is a mass"
     thrusters = {thruster.name for thruster in vehicle.layout.thrusters}
@@ -232,27 +232,16 @@ def link_of(vehicle: Vehicle) -> Link:
 
 def added_mass(vehicle: Vehicle, rigid: Array) -> Array:
     """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
-    found = np.zeros((6, 6))
-    forms = vehicle.layout.by_velocity
+    added = np.zeros((6, 6))
+    forms, entries = vehicle.layout.by_velocity, vehicle.parameters
     for i, a in enumerate(_VELOCITIES):
         for j, b in enumerate(_VELOCITIES):
             if a in forms and b in forms:
-                mass = vehicle.effective_inertia(forms[a]) if a == b else _off_diagonal(vehicle, a, b)
-                found[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
+                mass = entries.get(f"mass_{a}{b}", entries.get(f"mass_{b}{a}", 0.0))
+                mass = vehicle.effective_inertia(forms[a]) if a == b else mass
+                added[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
     size = np.sqrt(np.diag(rigid))
-    return np.where(np.abs(found) < FAINT * np.outer(size, size), 0.0, found)
-
-
-def _off_diagonal(vehicle: Vehicle, a: str, b: str) -> float:
-    """Return an entry of the effective mass matrix."""
-    return vehicle.parameters.get(f"mass_{a}{b}", vehicle.parameters.get(f"mass_{b}{a}", 0.0))
-
-
-def _in_link(added: Array) -> Iterator[tuple[str, float]]:
-    """Yield the entries of <fluid_added_mass> that are not 0."""
-    for i, j in combinations_with_replacement(range(6), 2):
-        if added[i, j]:
-            yield f"{_IN_LINK[i]}{_IN_LINK[j]}", added[i, j]
+    return np.where(np.abs(added) < FAINT * np.outer(size, size), 0.0, added)
 
 
 def in_plugin(added: Array) -> Iterator[tuple[str, float]]:
@@ -289,20 +278,20 @@ def hydrodynamics(vehicle: Vehicle, link: Link) -> dict[str, float]:
 
     U|U| and U U together give quadratic drag that depends on the direction.
     """
-    found: dict[str, float] = {}
+    terms: dict[str, float] = {}
 
     def add(axis: str, value: float, first: str, second: str = "", *, magnitude: bool = False) -> None:
         """Add a force along an axis: a value times a velocity, and times another or its magnitude."""
         signs = [_SIGNS[_VELOCITIES.index(v)] for v in (axis, first, *([] if magnitude else second))]
         name = f"{_FORCES[_VELOCITIES.index(axis)]}{first.upper()}{'abs' if magnitude else ''}{second.upper()}"
-        found[name] = found.get(name, 0.0) + value * np.prod(signs)
+        terms[name] = terms.get(name, 0.0) + value * np.prod(signs)
 
     for n, v in enumerate(_VELOCITIES):
-        form = vehicle.layout.by_velocity.get(v)
-        if form is None:
+        part = vehicle.layout.by_velocity.get(v)
+        if part is None:
             add(v, -link.matrix[n, n] / _HELD_TIME, v)
             continue
-        b, a = (both_ways(vehicle, form, key) for key in ("b_d", "a_d"))
+        b, a = (both_ways(vehicle, part, key) for key in ("b_d", "a_d"))
         add(v, -sum(b) / 2.0, v)
         add(v, -sum(a) / 2.0, v, v, magnitude=True)
         if a[0] != a[1]:
@@ -315,12 +304,12 @@ def hydrodynamics(vehicle: Vehicle, link: Link) -> dict[str, float]:
             add(axis, -value, others[0], others[0], magnitude=True)
         elif key == "lift":
             add(axis, value, *others)
-    return found
+    return terms
 
 
-def both_ways(vehicle: Vehicle, form: VehicleAxis, key: str) -> tuple[float, float]:
+def both_ways(vehicle: Vehicle, part: VehicleAxis, key: str) -> tuple[float, float]:
     """Return a drag coefficient for positive and for negative velocities."""
-    return vehicle[form.coefficient(key)], vehicle[form.coefficient(key + REVERSE)]
+    return vehicle[part.coefficient(key)], vehicle[part.coefficient(key + REVERSE)]
 
 
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
@@ -360,13 +349,6 @@ def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
 # ---- What Gazebo does otherwise --------------------------------------------------------------------------------------
 
 
-def _notes(vehicle: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
-    """Yield what the vehicle file says and Gazebo does otherwise, and how alpha and beta were folded in."""
-    yield from _notes_of_tuning(vehicle, added, propellers, explicit=explicit)
-    yield from _notes_of_commands(vehicle)
-    yield from _notes_of_motion(vehicle, propellers, explicit=explicit)
-
-
 def _notes_of_tuning(vehicle: Vehicle, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield how alpha and beta were folded in."""
     scaled = [
@@ -377,13 +359,13 @@ def _notes_of_tuning(vehicle: Vehicle, added: Array, propellers: list[_Propeller
     if idle := {thruster.name for thruster in vehicle.layout.thrusters} - {propeller.name for propeller in propellers}:
         yield f"left out: thrusters whose force alpha makes 0: {', '.join(sorted(idle))}"
     place = "the Hydrodynamics plugin" if explicit else "<fluid_added_mass>"
-    for form in vehicle.layout.axes:
-        axis, beta = form.axis, form.axis.coefficient("beta")
+    for part in vehicle.layout.axes:
+        axis, beta = part.axis, part.axis.coefficient("beta")
         if vehicle[beta] != 1.0:
             n, unit = _VELOCITIES.index(axis.velocity), BODY[axis.inertia].unit
             yield (
                 f"{beta} = {vehicle[beta]:g}: the effective inertia in {axis.name} "
-                f"is {vehicle.effective_inertia(form):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
+                f"is {vehicle.effective_inertia(part):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
             )
 
 
@@ -409,16 +391,16 @@ def _notes_of_commands(vehicle: Vehicle) -> Iterator[str]:
 def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
     """Yield what the plugins and Gazebo's rigid body do otherwise with the motion."""
     layout = vehicle.layout
-    for form in layout.axes:
-        forward, back = both_ways(vehicle, form, "b_d")
+    for part in layout.axes:
+        forward, back = both_ways(vehicle, part, "b_d")
         if forward != back:
-            names = f"{form.coefficient('b_d')} and {form.coefficient('b_d' + REVERSE)}"
+            names = f"{part.coefficient('b_d')} and {part.coefficient('b_d' + REVERSE)}"
             yield f"{names}: linear drag has their mean in both directions"
-        if vehicle.coefficients.get(form.coefficient("F_0")):
-            if form.axis is HEAVE and not layout.has_attitude:
+        if vehicle.coefficients.get(part.coefficient("F_0")):
+            if part.axis is HEAVE and not layout.has_attitude:
                 yield "the constant load F_0_w is in the buoyancy"
             else:
-                yield f"left out: the constant load {form.coefficient('F_0')}"
+                yield f"left out: the constant load {part.coefficient('F_0')}"
     if missing := [name for name in AXES if name not in layout.kinds]:
         yield f"the vehicle file has no {', '.join(missing)}: damping holds it there, in rotation with a large inertia"
     if not layout.has_attitude:
@@ -434,16 +416,16 @@ def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit
 # ---- Text ------------------------------------------------------------------------------------------------------------
 
 
-def number(value: float) -> str:
+def _number(value: float) -> str:
     """Return a number with 12 digits, without a negative zero."""
     return f"{value + 0.0:.12g}"
 
 
-def vector(values: Array) -> str:
+def _vector(values: Array) -> str:
     """Return the components of a vector."""
-    return " ".join(map(number, values))
+    return " ".join(map(_number, values))
 
 
-def comment(text: str) -> Markup:
+def _comment(text: str) -> Markup:
     """Return a text for an XML comment, which must not contain two hyphens in a row."""
     return Markup(re.sub("-(?=-)", "- ", text.rstrip(".")))

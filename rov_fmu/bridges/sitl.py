@@ -190,16 +190,16 @@ class Flight:
 
         `fractions` has all commands from -1 to 1.
         """
-        found = {}
+        battery = {}
         if self._draws:
-            found["voltage"] = self._draws[0][0].voltage
-            found["current"] = sum(
+            battery["voltage"] = self._draws[0][0].voltage
+            battery["current"] = sum(
                 table.current(sum(gain * fractions[name] for name, gain in gains.items()))
                 for table, gains in self._draws
             )
         if "voltage" in self._held:
-            found["voltage"] = self._held["voltage"]
-        return found
+            battery["voltage"] = self._held["voltage"]
+        return battery
 
     def _measured(self, at: Mapping[str, float]) -> tuple[dict[str, Any], dict[str, float]]:
         """Return the values of the reply, and those of the log, from the variables of the vehicle."""
@@ -367,7 +367,7 @@ class Connection:
             except ConnectionError:  # Windows reports in this way that nobody received the last reply
                 continue
             begin = thread_time()
-            if found := self.answer(data, sender):
+            if answer := self.answer(data, sender):
                 with suppress(OSError):
-                    server.sendto(found, sender)
+                    server.sendto(answer, sender)
             self.traffic.own_time += thread_time() - begin

@@ -34,17 +34,17 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
     each of its motors drives one thruster, and each thruster is driven. `table` maps servos to thrusters, fins or other
     inputs by name, instead of the frame or in addition to it; a minus before a name reverses it. Raises InputError.
     """
-    found: dict[str, tuple[int, float]] = {}
+    servos: dict[str, tuple[int, float]] = {}
     if frame is not None:
         motors = _matched(layout, FRAMES[frame])
         if motors is None:
             raise InputError(f"--frame {frame}: the motors of this frame do not push as the thrusters do{_ADVICE}")
-        found = {**motors}
+        servos = {**motors}
     elif not table:
         frames = (_matched(layout, motors) for motors in FRAMES.values() if len(motors) == len(layout.thrusters))
         if (first := next(filter(None, frames), None)) is None or len(first) < len(layout.commands):
             raise InputError(f"VEHICLE: none of ArduSub's frames has these thrusters{_ADVICE}")
-        found = first
+        servos = first
     for servo, name in table.items():
         key = f"u_{name.removeprefix('-')}"
         if key not in layout.commands:
@@ -52,9 +52,9 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
             raise InputError(f"--servo {servo}={name}: there is no such input{only(name.removeprefix('-'), names)}")
         if any(key == f"u_{other.removeprefix('-')}" for number, other in table.items() if number < servo):
             raise InputError(f"--servo {servo}={name}: another servo drives this input")
-        found = {other: motor for other, motor in found.items() if motor[0] != servo}
-        found[key] = servo, -1.0 if name.startswith("-") else 1.0
-    return found
+        servos = {other: motor for other, motor in servos.items() if motor[0] != servo}
+        servos[key] = servo, -1.0 if name.startswith("-") else 1.0
+    return servos
 
 
 _ADVICE = ": write --servo NUMBER=THRUSTER for each servo"
@@ -65,7 +65,7 @@ def _matched(layout: Layout, motors: Sequence[str]) -> dict[str, tuple[int, floa
     if layout.mix:
         return None
     free = [*layout.thrusters]
-    found = {}
+    servos = {}
     for servo, motor in enumerate(motors, 1):
         fitting = [(t, sign) for sign in (1.0, -1.0) for t in free if _pushes(t, sign, motor)]
         named = [(t, sign) for t, sign in fitting if t.name == str(servo)]
@@ -73,8 +73,8 @@ def _matched(layout: Layout, motors: Sequence[str]) -> dict[str, tuple[int, floa
             return None
         thruster, sign = (named or fitting)[0]
         free.remove(thruster)
-        found[f"u_{thruster.name}"] = servo, sign
-    return found
+        servos[f"u_{thruster.name}"] = servo, sign
+    return servos
 
 
 def _pushes(thruster: Thruster, sign: float, motor: str) -> bool:

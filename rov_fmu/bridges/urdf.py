@@ -7,13 +7,9 @@ frame (forward, left, up). A matrix of six axes has only its diagonal in the fir
 """
 
 from collections.abc import Iterator
-from pathlib import Path
 
-from rov_fmu import __version__
 from rov_fmu.bridges import sdf
 from rov_fmu.equation.catalogue import AXES, BODY, REVERSE
-from rov_fmu.io.messages import InputError
-from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
@@ -22,49 +18,34 @@ _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
 
 def urdf_model(vehicle: Vehicle) -> sdf.Model:
     """Return the robot description of a vehicle. Raises InputError about a vehicle without a mass or with β = 0."""
-    if mistake := next(sdf.impossible(vehicle), None):
-        raise InputError(f"{vehicle.identifier}: {mistake}")
+    sdf.check_possible(vehicle)
     link = sdf.link_of(vehicle)
     added = sdf.added_mass(vehicle, link.matrix)
-    forms, own = vehicle.layout.by_velocity, vehicle.coefficients
+    axes, own = vehicle.layout.by_velocity, vehicle.coefficients
     weight = vehicle["m_rov"] * sdf.gravity(vehicle)
     largest = max((own[name] for name in BODY if name != "m_rov" and name in own), default=float(link.inertia[0, 0]))
     moments = {
         f"i{2 * 'xyz'[axis.place]}": own.get(axis.inertia, largest) for axis in AXES.values() if axis.is_rotation
     }
 
-    def six(key: str, name: str) -> dict[str, float]:
-        """Return the drag of each axis with Fossen's sign: the mean of both directions, 0 of an axis that is absent."""
-        found = {}
-        for v, letter in _LETTERS.items():
-            both = sdf.both_ways(vehicle, forms[v], key) if v in forms else (0.0, 0.0)
-            found[name.format(letter, v)] = -0.5 * sum(both)
-        return found
+    def drag(v: str, key: str) -> float:
+        """Return the drag of an axis with Fossen's sign: the mean of both directions, 0 of an axis that is absent."""
+        return -0.5 * sum(sdf.both_ways(vehicle, axes[v], key)) if v in axes else 0.0
 
-    masses = (-added[n, n] if v in forms else 0.0 for n, v in enumerate(_LETTERS))
     notes = tuple(_notes(vehicle))
-    text = render(
+    text = sdf.written(
         "model.urdf.j2",
-        Path(__file__).parent / "templates",
-        number=sdf.number,
-        vector=sdf.vector,
-        comment=sdf.comment,
-        vehicle=vehicle,
-        version=__version__,
-        notes=notes,
+        vehicle,
+        notes,
         link=link,
         weight=weight,
         buoyancy=weight - sdf.net_weight(vehicle),
         moments=moments,
-        added_mass=dict(zip((f"{letter}d{v}" for v, letter in _LETTERS.items()), masses, strict=True)),
-        linear=six("b_d", "{0}{1}"),
-        quadratic=six("a_d", "{0}{1}{1}"),
-        centres={
-            f"center_of_{word}": {axis: own.get(f"{axis}_{of}", 0.0) for axis in "xyz"}
-            for word, of in (("gravity", "G"), ("buoyancy", "B"))
-        },
+        letters=_LETTERS,
+        axes=axes,
+        added=added,
+        drag=drag,
         plugin=sdf.hydrodynamics(vehicle, link) | dict(sdf.in_plugin(added)),
-        density=sdf.DENSITY,
     )
     return sdf.Model(text, notes, ())
 
@@ -73,11 +54,11 @@ def _notes(vehicle: Vehicle) -> Iterator[str]:
     """Yield what <hydrodynamics> does otherwise than the vehicle file."""
     layout = vehicle.layout
     yield "the tags have no thrusters: their curves, places, lags and alpha are left to the controller"
-    if any(vehicle[form.axis.coefficient("beta")] != 1.0 for form in layout.axes):
+    if any(vehicle[part.axis.coefficient("beta")] != 1.0 for part in layout.axes):
         yield "beta: the added mass is that of the effective inertia, (m + m_a) / beta less the mass"
     if missing := [name for name in AXES if name not in layout.kinds]:
         yield f"the vehicle file has no {', '.join(missing)}: no added mass and no drag there"
-    if any(key.endswith(REVERSE) for form in layout.axes for key in form.keys):
+    if any(key.endswith(REVERSE) for part in layout.axes for key in part.keys):
         yield "drag has the mean of both directions"
     if layout.cross or any(vehicle.coefficients.get(f"{axis}_G") for axis in "xyz"):
         yield "left out: terms between two axes"

@@ -155,15 +155,14 @@ def compile_all(
 
     Raises BuildError. No process and no file is left behind when it is interrupted or fails.
     """
-    own = {
-        name: [_library(platform, target, sources, identifier, name) for target in platform.targets(fmi)]
-        for name, platform in ((name, PLATFORMS[name]) for name in platforms)
-    }
+    targets = {name: PLATFORMS[name].targets(fmi) for name in platforms}
+    own = {name: [_library(name, target, sources, identifier) for target in some] for name, some in targets.items()}
     return _compiled(own, on_done)
 
 
-def _library(platform: Platform, target: str, sources: Mapping[str, str], identifier: str, name: str) -> "_Library":
+def _library(name: str, target: str, sources: Mapping[str, str], identifier: str) -> "_Library":
     """Return the library of an FMU for one target of the platform with this name."""
+    platform = PLATFORMS[name]
     file = f"{identifier}{platform.suffix}"
     arguments = [
         *("-target", target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS),

@@ -11,7 +11,6 @@ value and its derivatives. A reversal does not interrupt the derivatives: every 
 the direction of a velocity is 0 where this velocity is 0, so the rates are continuous there.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -128,7 +127,6 @@ class _Variational:
             return table
 
         held = self._before(values)
-        lags = {self.places[name]: rows(held, [*equation.rows[name][0].coefficient.names])[0] for name in equation.lags}
         monitored = [self.places[name] for name in equation.monitored]
         by_direction: dict[bytes, Array] = {}
 
@@ -138,25 +136,16 @@ class _Variational:
                 by_direction[reverse.tobytes()] = rows(self._before({**values, **signs}), self.coefficients)
             return by_direction[reverse.tobytes()]
 
-        def with_lags(t: float, y: Array) -> Array:
-            """Return the states and a row for 1. The arrived fraction of a lag is 1 - exp(-t / T)."""
-            table = np.vstack([y.reshape(count, 1 + width), np.eye(1, 1 + width)])
-            for n, rate in lags.items():
-                table[n] = t * math.exp(-rate[0] * t) * rate
-                table[n, 0] = -math.expm1(-rate[0] * t)
-            return table
-
         evaluations = 0
 
-        def rates(t: float, y: Array) -> Array:
+        def rates(_: float, y: Array) -> Array:
             nonlocal evaluations
             evaluations += 1
-            table = with_lags(t, y)
+            table = np.vstack([y.reshape(count, 1 + width), np.eye(1, 1 + width)])  # with a row for 1
             first, second = table[self.factors]
             terms = _product(coefficients(table[monitored, 0] < 0.0), _product(first, second))
-            found = self.sums @ terms
-            found[[*lags]] = 0.0 if evaluations < _MOST else np.nan
-            return found.ravel()
+            derivatives = self.sums @ terms
+            return derivatives.ravel() if evaluations < _MOST else np.full_like(y, np.nan)
 
         start = np.zeros((count, 1 + width))
         starting = [name for name in equation.states if name in equation.starts]
@@ -165,8 +154,7 @@ class _Variational:
         solved = solve_ivp(rates, (0.0, h), start.ravel(), "DOP853", first_step=0.1 * h, **tolerances)
         if not solved.success:
             return np.full((len(self.layout.state), 1 + width), np.nan)
-        end = with_lags(h, solved.y[:, -1])
-        by_name = dict(zip(equation.states, end, strict=False))
+        by_name = dict(zip(equation.states, solved.y[:, -1].reshape(start.shape), strict=True))
         moved = {name: row[0] for name, row in by_name.items()}
         moved |= {change_of(name).identifier: row[1:] for name, row in by_name.items()}
         results = self._after({**held, **moved})
@@ -185,6 +173,6 @@ def _variational(layout: Layout) -> _Variational:
 
 def _product(a: Array, b: Array) -> Array:
     """Return the products of rows with derivatives."""
-    found = a[:, :1] * b
-    found[:, 1:] += a[:, 1:] * b[:, :1]
-    return found
+    products = a[:, :1] * b
+    products[:, 1:] += a[:, 1:] * b[:, :1]
+    return products

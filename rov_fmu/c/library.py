@@ -55,8 +55,9 @@ def _load(texts: dict[str, str]) -> ctypes.CDLL:
     with suppress(OSError):
         folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
         folder.mkdir(parents=True, exist_ok=True)
-        if path := _find(folder, key):
-            return ctypes.CDLL(str(path))
+        for path in folder.glob(f"{key}-*"):
+            if path.name == _name(key, path.read_bytes()):  # otherwise the library is damaged
+                return ctypes.CDLL(str(path))
         content = compile_engine(texts)
         return ctypes.CDLL(str(_write(folder, key, content)))
     with temporary_folder("rov-fmu-") as temporary:
@@ -82,17 +83,6 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         return next((line for line in lines if line.startswith(("flags", "Features"))), "")
     return platform.processor()
-
-
-def _find(folder: Path, key: str) -> Path | None:
-    """Return the library with this key in a folder, or None.
-
-    The name of a library contains the digest of its content, so a damaged library is not returned.
-    """
-    for path in folder.glob(f"{key}-*"):
-        if path.name == _name(key, path.read_bytes()):
-            return path
-    return None
 
 
 def _write(folder: Path, key: str, content: bytes) -> Path:

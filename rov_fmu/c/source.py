@@ -3,11 +3,11 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, takewhile
 
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.alone import response_formulas
-from rov_fmu.equation.attitude import QUATERNION, entry, start_formulas
+from rov_fmu.equation.attitude import QUATERNION, start_formulas
 from rov_fmu.equation.expression import (
     PYTHON,
     Expression,
@@ -21,7 +21,7 @@ from rov_fmu.equation.expression import (
     written,
 )
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
+from rov_fmu.equation.terms import Equation, equation_of, rate_formula
 from rov_fmu.io.templates import render
 
 
@@ -93,46 +93,14 @@ class EquationSource:
         """
         if self.layout.has_attitude:
             return []
-        return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
+        turning = {name for name, others in self.equation.states_in_rate.items() if others & {"cos_psi", "sin_psi"}}
+        return [name for name in self.equation.states if name not in self.equation.used | turning]
 
     def turning(self) -> list[str]:
         """Return the entries of the rotation matrix that still change while all velocities are steady."""
         kinematic = self.equation.components[len(self.equation.dynamic) :]
         rotating = {name for group in kinematic for name in group} & {*self.equation.orientation}
         return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
-
-    def first_rotation(self) -> str:
-        """Return the first angular velocity."""
-        return next(own.axis.velocity for own in self.layout.axes if own.axis.is_rotation)
-
-    def _turns(self, name: str) -> bool:
-        """Return True when the rate of a state depends on the heading."""
-        return "cos_psi" in self.equation.states_in_rate[name] or "sin_psi" in self.equation.states_in_rate[name]
-
-    def size_group(self, name: str) -> str:
-        """Return the first state of the group of a state. The sizes of a group are added.
-
-        Without an attitude, the groups of several states are the cosine and the sine of the heading, and the horizontal
-        position. With an attitude, they are each row of the rotation matrix, and the position.
-        """
-        if self.layout.has_attitude:
-            return "x" if name in ("y", "z") else entry(int(name[2]), 1) if name.startswith("R_") else name
-        return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
-
-    def finish(self) -> list[str]:
-        """Return statements that assign the states of the vehicle after a step."""
-        lines = []
-        for name in self.layout.state:
-            if name in QUATERNION:
-                end = f"state[REF_{name} - FIRST_STATE]"
-            elif name in self.equation.lagging:
-                end = f"q->{name}"
-            elif name in self.equation.used:
-                end = f"y[Y_{name}]"
-            else:
-                end = f"state[REF_{name} - FIRST_STATE] + displacement[Y_{name}]"
-            lines.append(f"next[REF_{name} - FIRST_STATE] = {end};")
-        return lines
 
     def attitude(self) -> list[str]:
         """Return statements that set the quaternion to that of the rotation matrix in y."""
@@ -150,16 +118,14 @@ class EquationSource:
 
     def rate(self, name: str) -> str:
         """Write the rate of a state in terms of the states y of the table."""
-        return self._rate(self.equation.rows[name])
+        return self.by_states(rate_formula(self.equation.rows[name]))
 
     def size(self, name: str) -> str:
         """Write the sum of the sizes of the terms in the rate of a state."""
-        return " + ".join(f"fabs({self._rate([term])})" for term in self.equation.rows[name]) or "0.0"
+        sizes = (f"fabs({self.by_states(rate_formula([term]))})" for term in self.equation.rows[name])
+        return " + ".join(sizes) or "0.0"
 
-    def _rate(self, terms: Sequence[Term]) -> str:
-        return self._by_states(rate_formula(terms))
-
-    def _by_states(self, formula: Expression) -> str:
+    def by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
         known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, known.__getitem__)
@@ -216,18 +182,16 @@ class EquationSource:
         """Return the longest run among some products; of several, the first in the order of the states."""
         states = self.equation.states
         candidates = {*wanted, *((b, a) for a, b in wanted if a)}
-        best: tuple[str, str, int] = ("", "", 0)
-        for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
-            place, length = states.index(second), 0
-            while (
-                place + length < len(states)
-                and (first, states[place + length]) in candidates
-                and self.block_of[states[place + length]] == self.block_of[second]
-            ):
-                length += 1
-            if length > best[2]:
-                best = first, second, length
-        return best
+
+        def length(pair: tuple[str, str]) -> int:
+            """Return the number of neighbours from the second state on, of the same block, with which to multiply."""
+            first, second = pair
+            block = self.block_of[second]
+            neighbours = states[states.index(second) :]
+            return len([*takewhile(lambda y: (first, y) in candidates and self.block_of[y] == block, neighbours)])
+
+        best = max(sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))), key=length)
+        return *best, length(best)
 
     def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
@@ -269,10 +233,6 @@ class EquationSource:
                 partners |= sum(1 << self.equation.states.index(other) for other in others)
         return partners
 
-    def lagging_ends(self) -> list[tuple[str, str]]:
-        """Return each force that lags, and its formula in C after a piece that ends at y."""
-        return [(name, self._by_states(end)) for name, (_, end) in self.equation.lagging.items()]
-
     # ---- Derivatives of the vehicle's states ----
 
     def derivative_lines(self) -> list[str]:
@@ -291,18 +251,9 @@ class EquationSource:
         return _assigned(self.equation.orientation, formulas, self._in_c)
 
     def beginning(self) -> list[str]:
-        """Return statements for the start.
-
-        They set the delayed commands to their start values, and compute the attitude from its parameters.
-        """
-        lines = [f"at[REF_{name}] = {declaration.start!r};" for name, declaration in self.layout.delayed.items()]
+        """Return statements that compute the attitude at the start from its parameters."""
         formulas = start_formulas() if self.layout.has_attitude else {}
-        return lines + _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
-
-    def has_direction(self) -> str:
-        """Write the condition that the quaternion is not 0."""
-        parts = (f"state[REF_{name} - FIRST_STATE] != 0.0" for name in QUATERNION if name in self.layout.state)
-        return " || ".join(parts) or "true"
+        return _statements(formulas, {name: f"at[REF_{name}]" for name in self.layout.state}, self._in_c)
 
     def beginning_tangent(self) -> list[str]:
         """Return statements that add the changes of the attitude at the start to d."""
@@ -365,14 +316,7 @@ def generated_sources(layout: Layout) -> dict[str, str]:
     """Return the generated files of a vehicle, model.h and equation.h, by their names."""
     source = EquationSource(layout)
     formulas = {name: written(rate_formula(terms), PYTHON) for name, terms in source.equation.rows.items()}
-    sizes = {
-        "inputs": len(layout.inputs),
-        "states": len(layout.state),
-        "others": len(layout.calculated) + len(layout.delayed),
-        "commands": len(layout.commands),
-        "parameters": len(layout.coefficients) + len(layout.initial),
-    }
-    given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
+    given = {"source": source, "equation": source.equation, "formulas": formulas, "quaternion": QUATERNION}
     return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
 
 

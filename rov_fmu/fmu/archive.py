@@ -13,7 +13,7 @@ from rov_fmu.c.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE,
 from rov_fmu.c.source import generated_sources, unused_sources
 from rov_fmu.c.source import sources as motion_sources
 from rov_fmu.equation.layout import Layout
-from rov_fmu.fmu.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
+from rov_fmu.fmu.model_description import build_description, model_description
 from rov_fmu.fmu.python_flavour import python_files, python_sources
 from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
 from rov_fmu.fmu.variables import interface_header, variables
@@ -56,10 +56,10 @@ def native_content(
     sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
     sources |= generated_sources(vehicle.layout)
     source_files = (UNITY_FILE,) if fmi == 2 else ()
-    interfaces = {name: NATIVE[fmi][name] for name in INTERFACES[interface]}
+    interfaces = INTERFACES[interface]
     describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, [*interfaces])
+    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, interfaces)
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:
@@ -72,7 +72,7 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
     declared = variables(vehicle)
     sources = python_sources(vehicle, declared)
-    describe = partial(model_description, vehicle, declared, interfaces=PYTHON, note=PYTHON_NOTE)
+    describe = partial(model_description, vehicle, declared, interfaces=INTERFACES["cs"], native=False)
     guid = _guid(describe(guid=""), sources)
     files = python_files(vehicle, sources)
     return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})

@@ -5,7 +5,6 @@ file documentation/model_card.txt, and in the annotations of modelDescription.xm
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import chain
 from math import degrees
 from textwrap import fill
 
@@ -87,7 +86,7 @@ def card_text(vehicle: Vehicle) -> str:
 
 def read_card(text: str) -> dict[str, list[str]]:
     """Return the paragraphs of a card by their headings, from the text that `card_text` wrote."""
-    found: dict[str, list[str]] = {}
+    headings: dict[str, list[str]] = {}
     paragraphs: list[str] = []
     for line in text.splitlines():
         if line.startswith("- "):
@@ -95,8 +94,8 @@ def read_card(text: str) -> dict[str, list[str]]:
         elif line.startswith("  ") and paragraphs:
             paragraphs[-1] += f" {line.strip()}"
         elif line:
-            paragraphs = found.setdefault(line, [])
-    return found
+            paragraphs = headings.setdefault(line, [])
+    return headings
 
 
 def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:
@@ -111,7 +110,15 @@ def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str
 
 def _left_out(layout: Layout) -> Iterator[str]:
     """Yield what the equation of the vehicle lacks, in sentences."""
-    keys = {*chain.from_iterable(one.keys for one in layout.axes), *chain.from_iterable(c.keys for c in layout.curves)}
+    yield from _left_out_of_motion(layout)
+    yield from _left_out_of_forces(layout)
+    yield "The tether pulls at nothing unless it is connected as loads."
+    yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.kinds else ''}"
+    level = "" if layout.has_attitude else ", horizontal"
+    yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
+
+
+def _left_out_of_motion(layout: Layout) -> Iterator[str]:
     if not layout.coupled and len(layout.axes) > 1 and not layout.cross:
         yield "Coupling between the axes."
     if missing := [name for name in _AXES if name not in layout.kinds]:
@@ -119,28 +126,28 @@ def _left_out(layout: Layout) -> Iterator[str]:
         yield f"{', '.join(missing).capitalize()}.{' The vehicle does not drift outward in a turn.' if drifts else ''}"
     if same := _mirrored(layout):
         yield f"What differs between the two directions of {same}."
+
+
+def _left_out_of_forces(layout: Layout) -> Iterator[str]:
     effects = effects_of(layout)
     if some := [effect.missed for effect in EXPECTED if effect not in effects]:
         yield f"Thrusters as machines: there is no {listed(some, 'or')}."
-    static = [
-        "" if "m_a" in keys else "added mass",
-        "static drag",
-        "" if layout.has_dead_time else "a delay at the start",
-    ]
-    yield f"As terms of their own: {listed(filter(None, static))}; β < 1 stands for a slow start."
+    own_terms = {
+        "added mass": any("m_a" in own.keys for own in layout.axes),
+        "static drag": False,
+        "a delay at the start": layout.has_dead_time,
+    }
+    static = listed(words for words, is_there in own_terms.items() if not is_there)
+    yield f"As terms of their own: {static}; β < 1 stands for a slow start."
     if "heave" in layout.kinds and not layout.restoring:
         load = "Beyond the constant load F_0_w, buoyancy" if "F_0_w" in layout.coefficients else "Buoyancy"
         yield f"{load} is neutral."
-    yield "The tether pulls at nothing unless it is connected as loads."
-    yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.kinds else ''}"
-    level = "" if layout.has_attitude else ", horizontal"
-    yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
 
 
 def _mirrored(layout: Layout) -> str:
     """Return, in words, which thrust curves and axes behave in reverse as forward."""
     curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
-    axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
+    axes = [part.axis.name for part in layout.axes if "a_d_reverse" not in part.keys]
     thrust = "thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}"
     drag = "drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}"
     return " and ".join([thrust] * bool(curves) + [drag] * bool(axes))

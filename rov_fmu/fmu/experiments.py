@@ -18,7 +18,6 @@ from rov_fmu.io.messages import NO_FILE, FileError, shown
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
 MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
-_SETTINGS = ("startTime", "stopTime", "stepSize", "tolerance")
 DEFAULT_TOLERANCE = 1e-3
 """The tolerance if neither the experiment nor the FMU has one."""
 DEFAULT_STEPS = 500
@@ -119,34 +118,25 @@ class ReferenceResults:
         """Read a file of experiments."""
         for element in self._xml(member, "Experiments").iterfind("{*}Experiment"):
             name = element.get("name", "")
+            where = f"experiment {shown(name)}"
             parts = {etree.QName(child).localname: child for child in element if isinstance(child.tag, str)}
             parts.pop("Annotations", None)
             unknown = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References"}
             if unknown:
-                raise member.error(f"experiment {shown(name)}: {', '.join(sorted(unknown))} cannot be run")
+                raise member.error(f"{where}: {', '.join(sorted(unknown))} cannot be run")
             # drafts after 1.0.0-beta.1 have the times in a child element
             given = {**element.attrib, **getattr(parts.pop("TransientSimulation", None), "attrib", {})}
-            times = {
-                key: str(value)
-                for key in _SETTINGS
-                if (value := given.get(key, getattr(default, key, None))) is not None
+            numbers = {
+                key: member.number(str(text), f"{where}: {key}")
+                for key in ("startTime", "stopTime", "stepSize", "tolerance")
+                if (text := given.get(key, getattr(default, key, None))) is not None
             }
-            numbers = {key: member.number(text, f"experiment {shown(name)}: {key}") for key, text in times.items()}
             start = numbers.get("startTime", 0.0)
             stop = numbers.get("stopTime", start + 1.0)
             step = numbers.get("stepSize", (stop - start) / DEFAULT_STEPS)
             tolerance = numbers.get("tolerance", DEFAULT_TOLERANCE)
-            steps = (stop - start) / step if step > 0.0 else 0.0
-            reason = ""
-            if not (steps > 0.0 and tolerance > 0.0):
-                reason = "must go on from its start, in steps, with a tolerance"
-            elif tolerance >= 1.0:
-                reason = f"tolerance = {tolerance:g}: must be less than 1, or nothing would be compared"
-            elif steps > MOST_STEPS:
-                reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
-                reason += f"; at most {MOST_STEPS} are run"
-            if reason:
-                raise member.error(f"experiment {shown(name)}: {reason}")
+            if reason := _why_not_run(start, stop, step, tolerance):
+                raise member.error(f"{where}: {reason}")
             files = {part: member.resolve(one.get("source")) for part, one in parts.items()}
             parameters = self._parameters(files["Parameters"], variables) if "Parameters" in files else {}
             stimuli, references = (
@@ -207,3 +197,16 @@ class ReferenceResults:
         if (name := etree.QName(element).localname) != root:
             raise member.error(f"must begin with <{root}>, and not with <{name}>")
         return element
+
+
+def _why_not_run(start: float, stop: float, step: float, tolerance: float) -> str:
+    """Return why an experiment with these settings is not run, or an empty text."""
+    steps = (stop - start) / step if step > 0.0 else 0.0
+    if not (steps > 0.0 and tolerance > 0.0):
+        return "must go on from its start, in steps, with a tolerance"
+    if tolerance >= 1.0:
+        return f"tolerance = {tolerance:g}: must be less than 1, or nothing would be compared"
+    if steps > MOST_STEPS:
+        length = f"from {start:g} to {stop:g} s; at most {MOST_STEPS} are run"
+        return f"stepSize = {step:g} s takes {steps:.3g} steps {length}"
+    return ""

@@ -1,6 +1,6 @@
 """Write modelDescription.xml (FMI 2.0, section 2.2; FMI 3.0, section 2.4)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from rov_fmu import __version__
 from rov_fmu.c.compile import UNITY_FILE
@@ -12,52 +12,7 @@ from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable, unit_of
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
-# Attributes that are false are also written, because FMI++ stops when they are missing.
-_COMMON = {
-    "canBeInstantiatedOnlyOncePerProcess": "false",
-    "canNotUseMemoryManagementFunctions": "true",
-    "canGetAndSetFMUstate": "true",
-    "canSerializeFMUstate": "true",
-}
-_CO_SIMULATION = {
-    "canHandleVariableCommunicationStepSize": "true",
-    "canInterpolateInputs": "false",
-    "canRunAsynchronuously": "false",
-    **_COMMON,
-}
-_COMMON_3 = {
-    "canBeInstantiatedOnlyOncePerProcess": "false",
-    "canGetAndSetFMUState": "true",
-    "canSerializeFMUState": "true",
-    "providesDirectionalDerivatives": "true",
-    "providesAdjointDerivatives": "true",
-}
-
-NATIVE = {
-    2: {
-        "ModelExchange": {**_COMMON, "providesDirectionalDerivative": "true"},
-        "CoSimulation": {
-            **_CO_SIMULATION,
-            "maxOutputDerivativeOrder": "1",  # fmu-runner takes this for a Boolean, and OMSimulator reads only order 1
-            "providesDirectionalDerivative": "true",
-        },
-    },
-    3: {
-        "ModelExchange": _COMMON_3,
-        "CoSimulation": {
-            **_COMMON_3,
-            "canHandleVariableCommunicationStepSize": "true",
-            "maxOutputDerivativeOrder": "1",
-            "providesIntermediateUpdate": "true",
-            "mightReturnEarlyFromDoStep": "true",
-            "canReturnEarlyAfterIntermediateUpdate": "true",
-            "hasEventMode": "true",
-        },
-    },
-}
-"""The interfaces of the FMU in C and their capabilities, by version of FMI."""
-PYTHON = {"CoSimulation": {"needsExecutionTool": "true", **_CO_SIMULATION}}
-"""The interface of the FMU in pure Python and its capabilities."""
+FMI_VERSIONS = (2, 3)
 PYTHON_NOTE = (
     "Needs a Python on this machine. On Linux an importer that is not itself a Python process must be started with "
     "LD_PRELOAD=/path/to/libpython3.x.so, or it cannot load the library (undefined symbol: _Py_NoneStruct)."
@@ -69,53 +24,41 @@ DEAD_TIME_NOTE = (
 )
 """The text that follows the summary of a vehicle with a dead time, if the FMU is for Model Exchange."""
 
-_EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize": 0.01}
-
 
 def model_description(
     vehicle: Vehicle,
     variables: tuple[Variable, ...],
     *,
     guid: str,
-    interfaces: Mapping[str, Mapping[str, str]],
-    source_files: tuple[str, ...] = (),
+    interfaces: Sequence[str],
+    source_files: Sequence[str] = (),
     fmi: int = 2,
-    note: str = "",
+    native: bool = True,
 ) -> bytes:
     """Return the XML document for a version of FMI. The same arguments give the same bytes.
 
-    `note` follows the vehicle's summary in the description of the model.
+    `interfaces` are the elements of what the FMU offers, such as CoSimulation. `native` is False in pure Python.
     """
-    if vehicle.layout.has_dead_time and "ModelExchange" in interfaces:
-        note = " ".join(filter(None, (DEAD_TIME_NOTE, note)))
-    head = {
-        "fmiVersion": f"{fmi}.0",
-        "modelName": vehicle.identifier,
-        "guid" if fmi == 2 else "instantiationToken": guid,
-        "description": ". ".join(filter(None, (vehicle.summary, note))),
-        "author": vehicle.source,
-        "version": vehicle.version,
-        "license": "MIT, see documentation/licenses/license.txt",
-        "generationTool": f"rov-fmu {__version__}",
-        "variableNamingConvention": "structured",
-        "numberOfEventIndicators": "0" if fmi == 2 else None,
-    }
+    notes = [DEAD_TIME_NOTE] if vehicle.layout.has_dead_time and "ModelExchange" in interfaces else []
+    notes += [] if native else [PYTHON_NOTE]
+    description = ". ".join(filter(None, (vehicle.summary, " ".join(notes))))
     if fmi == 3:
         variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
-        if "ModelExchange" in interfaces:
-            needs = {"needsCompletedIntegratorStep": "true" if _needs_completed_steps(vehicle.layout) else "false"}
-            interfaces = {**interfaces, "ModelExchange": {**interfaces["ModelExchange"], **needs}}
     number = {v.name: v.index for v in variables}
     return render(
         "modelDescription.xml.j2",
-        head=head,
-        interfaces={name: {"modelIdentifier": vehicle.identifier, **can} for name, can in interfaces.items()},
+        vehicle=vehicle,
+        guid=guid,
+        fmi=fmi,
+        native=native,
+        version=__version__,
+        description=description,
+        interfaces=interfaces,
         source_files=source_files,
         units={name: unit_of(name) for name in dict.fromkeys(v.unit for v in variables)},
-        types={_type_name(v): _type(v) for v in variables} if fmi == 3 else {},
+        types={_type_name(v): v for v in variables},
         type_name=_type_name,
         log_categories=LOG_CATEGORIES,
-        experiment=_EXPERIMENT,
         card=card_text(vehicle),
         variables=variables,
         number=number,
@@ -124,28 +67,9 @@ def model_description(
     ).encode()
 
 
-def _needs_completed_steps(layout: Layout) -> bool:
-    """Return True when completedIntegratorStep does something: it counts turns, and sends commands to the dead time."""
-    return layout.has_attitude or layout.has_dead_time
-
-
 def build_description(identifier: str) -> bytes:
     """Return sources/buildDescription.xml, which says how to compile the sources (FMI 3.0, section 2.5.1.3.1)."""
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
-
-
-# In FMI 3.0, only the declared type of a variable has its unit, its nominal value and its bounds. FMI Library loses the
-# unit of a variable that has a type and also bounds of its own, and fmi-sim refuses a unit on a variable.
-
-
-def _type(variable: Variable) -> dict[str, str | float | None]:
-    return {
-        "unit": variable.unit,
-        "displayUnit": variable.display_unit,
-        "min": variable.minimum,
-        "max": variable.maximum,
-        "nominal": variable.nominal,
-    }
 
 
 def _type_name(variable: Variable) -> str:

@@ -2,8 +2,8 @@
 
 import io
 import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, redirect_stdout
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from pathlib import Path
@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.fmu.experiments import Experiment, ReferenceResults
-from rov_fmu.fmu.unpacking import unpack_fmu
-from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
+from rov_fmu.fmu.claims.runs import MESSAGE, Runs, keep_message
+from rov_fmu.fmu.claims.subject import TIME_LIMIT, Subject, opened
+from rov_fmu.fmu.experiments import Experiment
+from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.csv_table import Series
-from rov_fmu.io.file_kinds import FMU, check_suffix
-from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
@@ -32,12 +31,6 @@ _TOLERANCE_OF_SOLVER = 1e-3
 """The share of the tolerance that the solver of Model Exchange may use at each step."""
 _LEAST_OF_SOLVER = 1e-7
 """The smallest deviation that counts in Model Exchange, where the errors of the solver's steps add up."""
-TIME_LIMIT = 60.0
-"""The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
-MEMORY, DISK = 4_000_000_000, 1_000_000_000
-"""The address space of the process of an FMU and the size of each file that it writes, in bytes (Linux)."""
-_WARNING = 1
-"""The status `warning` in every version of FMI; more serious ones are greater."""
 
 
 @dataclass(frozen=True)
@@ -73,37 +66,23 @@ def prove(
 
     Raises FileError, and ProofError if the FMU ends its process or exceeds a limit.
     """
-    check_suffix(fmu, FMU)
-    reference_results = ReferenceResults(fmu)
-    with temporary_folder("fmu-") as folder:
-        description = unpack_fmu(fmu, fmu, Path(folder))
-        experiments = reference_results.experiments(description)
-        check_binary(fmu, folder)
-        return compare(fmu, folder, description, experiments, interface, tolerance, time_limit, on_experiment)
+    with opened(fmu, interface, tolerance, time_limit, needs_results=True) as subject:
+        return compare(subject, on_experiment)
 
 
-def compare(
-    fmu: Path,
-    folder: str,
-    description: Any,
-    experiments: Sequence[Experiment],
-    interface: str | None = None,
-    tolerance: float | None = None,
-    time_limit: float = TIME_LIMIT,
-    on_experiment: Callable[[str, float], None] = lambda *_: None,
-) -> list[Finding]:
-    """Run experiments of an FMU that is unpacked in a folder, as `prove` does."""
-    has = [name for name, of in INTERFACES.items() if getattr(description, of)]
-    if not has or (interface and interface not in has):
-        raise FileError(f"{fmu}: has no {interface or 'interface that can be run'}, only {', '.join(has) or 'none'}")
-    chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
+def compare(subject: Subject, on_experiment: Callable[[str, float], None] = lambda *_: None) -> list[Finding]:
+    """Run the experiments of an FMU and compare the results, as `prove` does."""
+    fmu, wanted = subject.path, subject.interface
+    has = [name for name, of in INTERFACES.items() if getattr(subject.description, of)]
+    if not has or (wanted and wanted not in has):
+        raise FileError(f"{fmu}: has no {wanted or 'interface that can be run'}, only {', '.join(has) or 'none'}")
+    chosen = [replace(x, tolerance=subject.tolerance or x.tolerance) for x in subject.experiments]
     experiment, findings = chosen[0], list[Finding]()
-    limits = Limits(time=time_limit, memory=MEMORY, disk=DISK)
     try:
-        with closing(ChildProcess(_Experiments, folder, interface or has[0], limits=limits)) as child:
+        with subject.runs(kind=_Experiments) as child:
             for n, experiment in enumerate(chosen):
                 on_experiment(experiment.name, n / len(chosen))
-                findings += child.call("findings", experiment)
+                findings += child.call("findings", experiment, wanted or has[0])
     except ChildError as error:
         where = one_line(f"{fmu}: experiment {experiment.name!r}")
         raise ProofError(f"{where}: the FMU {error}{remedy(error)}") from error
@@ -120,78 +99,57 @@ def nominal(variable: Any) -> float:
     return abs(float(variable.nominal or 0.0)) or 1.0
 
 
-def check_binary(fmu: Path, folder: str) -> None:
-    """Raise FileError if an unpacked FMU has no binary for this machine."""
-    import fmpy
+class _Experiments(Runs):
+    """The experiments of an unpacked FMU."""
 
-    platforms = fmpy.supported_platforms(folder)
-    if fmpy.platform not in platforms:
-        raise FileError(f"{fmu}: has no binary for this machine ({fmpy.platform}): {', '.join(platforms) or 'none'}")
+    def findings(self, experiment: Experiment, interface: str) -> list[Finding]:
+        """Run an experiment and compare its results: a finding for each variable, or a single one if it fails."""
+        if experiment.references is None:
+            return [_failed(experiment, "has no expected results, so nothing is compared")]
+        times, *expected = map(np.array, experiment.references.values())
+        names = [*experiment.references][1:]
+        MESSAGE[0] = ""
+        try:
+            result = self._result(experiment, interface, names)
+        except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
+            message = f"; the FMU: {MESSAGE[0]}" if MESSAGE[0] else ""
+            what = str(error).replace(self._folder + os.sep, "").rstrip(".")  # the cause follows the library's path
+            return [_failed(experiment, brief(what + message, 240))]
+        solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
+        findings = []
+        for name, values in zip(names, expected, strict=True):
+            scale = max(float(np.abs(values).max()), SHARE_OF_NOMINAL * nominal(self._variables[name]))
+            off = _deviation(result["time"], result[name], times, values)
+            findings.append(Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved)))
+        return findings
 
-
-class _Experiments:
-    """The experiments of an unpacked FMU. A child process runs them, because a damaged FMU may end its process."""
-
-    def __init__(self, folder: str, interface: str) -> None:
+    def _result(self, experiment: Experiment, interface: str, names: Sequence[str]) -> Any:
+        """Return what FMPy returns for an experiment."""
         import fmpy
 
-        self._folder, self._interface = folder, interface
-        self._description = fmpy.read_model_description(folder, validate=False)
-
-    def findings(self, experiment: Experiment) -> list[Finding]:
-        """Run an experiment and compare its results."""
-        return list(_findings(self._folder, self._description, self._interface, experiment))
-
-
-def _findings(folder: str, description: Any, interface: str, experiment: Experiment) -> Iterator[Finding]:
-    """Yield a finding for each variable, or a single one if the experiment fails or compares nothing."""
-    import fmpy
-
-    if experiment.references is None:
-        reason = "has no expected results, so nothing is compared"
-        yield Finding(experiment.name, "-", inf, experiment.tolerance, reason)
-        return
-    times, *expected = map(np.array, experiment.references.values())
-    names = [*experiment.references][1:]
-    kind = INTERFACES[interface]
-    reasons: list[bytes] = []
-
-    def keep(*arguments: Any) -> None:
-        """Keep the last warning or error. The last three arguments are the same in every version of FMI."""
-        status, _, text = arguments[-3:]
-        if status >= _WARNING:
-            reasons[:] = [text or b""]
-
-    try:
+        kind = INTERFACES[interface]
+        share = _TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0
         with redirect_stdout(io.StringIO()):  # FMPy's warnings
-            result = fmpy.simulate_fmu(
-                folder,
+            return fmpy.simulate_fmu(
+                self._folder,
                 validate=False,
                 start_time=experiment.start,
                 stop_time=experiment.stop,
-                relative_tolerance=experiment.tolerance
-                * (_TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0),
+                relative_tolerance=experiment.tolerance * share,
                 output_interval=experiment.step,
                 fmi_type=kind[0].upper() + kind[1:],
                 start_values=dict(experiment.parameters),
                 input=_signals(experiment.stimuli),
                 output=names,
-                model_description=description,
+                model_description=self._description,
                 remote_platform=None,
                 debug_logging=True,
-                logger=keep,
+                logger=keep_message,
             )
-    except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
-        messages = "".join(f"; the FMU: {text.decode(errors='replace')}" for text in reasons)
-        what = str(error).replace(folder + os.sep, "").rstrip(".")  # the cause follows the library's path
-        yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(what + messages, 240))
-        return
-    variables = {v.name: v for v in description.modelVariables}
-    for name, values in zip(names, expected, strict=True):
-        scale = max(float(np.abs(values).max()), SHARE_OF_NOMINAL * nominal(variables[name]))
-        off = _deviation(result["time"], result[name], times, values)
-        solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
-        yield Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved))
+
+
+def _failed(experiment: Experiment, reason: str) -> Finding:
+    return Finding(experiment.name, "-", inf, experiment.tolerance, reason)
 
 
 def _signals(stimuli: Series | None) -> Any:

@@ -138,7 +138,7 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
             related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
     files = {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}
     of_origin, roles = origin(vehicle)
-    return {**files, **of_origin, MANIFEST: manifest([*related, *roles])}
+    return {**files, **of_origin, MANIFEST: manifest(vehicle, [*related, *roles])}
 
 
 _EXPECTED = (
@@ -186,7 +186,7 @@ def _steps(vehicle: Vehicle) -> Iterator[_Experiment]:
                     yield _step(model, table.axis, float(row.command), name, table, cells)
     else:
         largest = round(100.0 * min(1.0, vehicle.command_range[1]), 6)
-        for axis in (form.axis for form in vehicle.layout.axes if vehicle.layout.signs(form.axis)):
+        for axis in (part.axis for part in vehicle.layout.axes if vehicle.layout.signs(part.axis)):
             yield _step(vehicle, axis, largest)
 
 
@@ -240,10 +240,10 @@ def _fastest_rate(vehicle: Vehicle, inputs: Values) -> float:
     multiplied by the roots of their effective masses, as in the kinetic energy, to compare all axes.
     """
     layout, root, steady, rates = vehicle.layout, dict[str, float](), dict[str, float](), [1.0 / _LONGEST_TAU]
-    for form, motion in zip(layout.axes, vehicle.motions(inputs), strict=True):
-        v, V = form.axis.velocity, motion.steady_velocity()
-        root[v], steady[v] = sqrt(vehicle.effective_inertia(form)), V if isfinite(V) else 0.0
-        if form.axis.is_rotation:
+    for part, motion in zip(layout.axes, vehicle.motions(inputs), strict=True):
+        v, V = part.axis.velocity, motion.steady_velocity()
+        root[v], steady[v] = sqrt(vehicle.effective_inertia(part)), V if isfinite(V) else 0.0
+        if part.axis.is_rotation:
             rates += [sqrt(abs(motion.C)), abs(steady[v])]
     state = {**layout.at_rest, **steady}
     before = vehicle.derivatives(inputs, state)

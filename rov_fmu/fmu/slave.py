@@ -89,26 +89,19 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, references: list[int], values: list[float]) -> None:
         """Set all values, or none if one is refused."""
         pairs = [(self.declared[reference], value) for reference, value in zip(references, values, strict=True)]
-        for v, value in pairs:
-            name, is_calculated = v["name"], v["initial"] == "calculated"
-            if not self._may_set(v) and (is_calculated or value != self.values[name]):
-                words = "is calculated and must not be set" if is_calculated else _TOO_LATE
-                self.log(f"{name} {words}; it was not.", Fmi2Status.error)
-                return
-            if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
-                self.log(f"{name} = {value!r} is refused; it stays {self.values[name]!r}.", Fmi2Status.discard)
-                return
+        if any(self._is_refused(v, value) for v, value in pairs):
+            return
         parameters = {v["name"]: value for v, value in pairs if v["causality"] == "parameter"}
         if self.is_initialized and parameters and not self._has_mass(parameters):
             words = "the mass matrix of these parameters is not positive definite; all of them stay as they are."
             self.log(words, Fmi2Status.discard)
             return
         for v, value in pairs:
-            if not self._may_set(v):
+            if self._may_set(v):
+                self.values[v["name"]] = value
+                self._warn_of_input(v, value)
+            else:
                 self._warn_once("again", f"{v['name']} {_TOO_LATE}, but it has this value already")
-                continue
-            self.values[v["name"]] = value
-            self._warn_of_input(v, value)
         if not self.is_initialized:
             self._set_attitude()
         for v, value in pairs:
@@ -118,13 +111,25 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                     "guess", f"{words}, because phi_0, theta_0 and psi_0 determine the attitude at the start"
                 )
 
+    def _is_refused(self, v: dict[str, Any], value: float) -> bool:
+        """Return True, with a message, if a variable must not have a value. One that it has already is accepted."""
+        name, is_calculated = v["name"], v["initial"] == "calculated"
+        if not self._may_set(v) and (is_calculated or value != self.values[name]):
+            words = "is calculated and must not be set" if is_calculated else _TOO_LATE
+            self.log(f"{name} {words}; it was not.", Fmi2Status.error)
+            return True
+        if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
+            self.log(f"{name} = {value!r} is refused; it stays {self.values[name]!r}.", Fmi2Status.discard)
+            return True
+        return False
+
     def _has_mass(self, changed: Mapping[str, float]) -> bool:
         """Return True if the mass matrix is positive definite with some parameters changed."""
         try:
-            found = self.equation.numbers({**self.values, **changed})
+            numbers = self.equation.numbers({**self.values, **changed})
         except ZeroDivisionError:
             return False
-        return all(found[name] > 0.0 for name in self.equation.PIVOTS)
+        return all(numbers[name] > 0.0 for name in self.equation.PIVOTS)
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""

@@ -4,7 +4,6 @@ FMI 2.0.4 uses the file of FMI 3.0, including fmiVersion="3.0", so it is the sam
 terminalKind: the standard defines none, and our own kind would only prevent connections to others.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rov_fmu.equation.layout import Layout
@@ -59,14 +58,5 @@ def terminals(layout: Layout) -> list[Terminal]:
 
 
 def terminals_and_icons(layout: Layout) -> bytes:
-    """Return the XML document, with inputs on the left of the icon and outputs on its right."""
-    placed = [place for causality, x in (("input", -120), ("output", 100)) for place in _placed(layout, causality, x)]
-    return render("terminalsAndIcons.xml.j2", placed=placed, icon=SIGNAL).encode()
-
-
-def _placed(layout: Layout, causality: str, x: int) -> Iterator[tuple[Terminal, dict[str, int]]]:
-    """Yield the terminals of one side with the corners of their pictures, spaced evenly from top to bottom."""
-    side = [terminal for terminal in terminals(layout) if terminal.causality == causality]
-    for n, terminal in enumerate(side, start=1):
-        y = 100 - 200 * n // (len(side) + 1)
-        yield terminal, {"x1": x, "y1": y - 10, "x2": x + 20, "y2": y + 10}
+    """Return the XML document."""
+    return render("terminalsAndIcons.xml.j2", terminals=terminals(layout), icon=SIGNAL).encode()

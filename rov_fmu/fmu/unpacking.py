@@ -35,8 +35,12 @@ _MOST_REFERENCE = 2**32 - 1
 _INDICES = ("derivative", "index", "dependencies", "clocks", "valueReference")
 """The attributes that name other variables, such as those in the model structure and in dimensions."""
 _FINITE = ("nominal", "factor", "offset", "gain", "startTime", "stopTime", "tolerance", "stepSize")
-_COUNTS = ("numberOfEventIndicators", "numberOfContinuousStates")
-_EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+_RANGES: dict[str | tuple[str, str], tuple[int, int]] = {
+    **dict.fromkeys(("numberOfEventIndicators", "numberOfContinuousStates"), (0, _MOST_VARIABLES)),
+    **dict.fromkeys((("BaseUnit", key) for key in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")), (-1000, 1000)),
+    ("Dimension", "start"): (0, 2**64 - 1),
+}
+"""The least and the largest whole number of an attribute, in elements of any kind or of one kind."""
 _INFINITE = ("INF", "-INF", "NaN")
 """How XML writes numbers that are not finite."""
 _INITIAL = ("exact", "approx", "calculated")
@@ -217,12 +221,8 @@ class _Description:
                     self._named.setdefault(number, place)
         elif key in _FINITE:
             self._number(place, text)
-        elif key in _COUNTS:
-            self._whole(place, text, 0, _MOST_VARIABLES)
-        elif key in _EXPONENTS and tag == "BaseUnit":
-            self._whole(place, text, -1000, 1000)
-        elif key == "start" and tag == "Dimension":
-            self._whole(place, text, 0, 2**64 - 1)
+        elif ends := _RANGES.get(key, _RANGES.get((tag, key))):
+            self._whole(place, text, *ends)
         elif key in ("min", "max", "start") and part:
             for value in text.split() if self._version == "3" else [text]:
                 self._value(place, value, kind, may_be_nan=key == "start")

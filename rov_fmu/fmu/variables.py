@@ -147,16 +147,14 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
     result: list[Variable] = []
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
-        bounds = {
-            end: x for end, x in (("minimum", declaration.minimum), ("maximum", declaration.maximum)) if isfinite(x)
-        }
-        given = {"display_unit": declaration.display_unit, **bounds, **rest}
-        result.append(
-            Variable(name, len(result), declaration.description, declaration.unit, causality, variability, **given)
-        )
+        low, high = (x if isfinite(x) else None for x in (declaration.minimum, declaration.maximum))
+        given = {"display_unit": declaration.display_unit, "minimum": low, "maximum": high, **rest}
+        place, about = len(result), (declaration.description, declaration.unit)
+        result.append(Variable(name, place, *about, causality, variability, **given))
 
+    held = layout.commands if layout.has_dead_time else ()
     for name, declaration in layout.inputs.items():
-        variability = "discrete" if layout.has_dead_time and name in layout.commands else "continuous"
+        variability = "discrete" if name in held else "continuous"
         add(name, declaration, "input", variability, start=declaration.start, nominal=declaration.nominal)
     for name, declaration in layout.state.items():
         add(
@@ -165,43 +163,22 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
             "output",
             "continuous",
             initial="approx" if name in QUATERNION else "exact",
-            start=1.0 if name == QUATERNION[0] else 0.0,
+            start=float(name == QUATERNION[0]),
             nominal=declaration.nominal,
             dependencies={name: "constant"},
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
     for name in layout.state:
-        add(
-            f"der({name})",
-            derivatives[name],
-            "local",
-            "continuous",
-            initial="calculated",
-            derivative_of=name,
-            dependencies=dependencies[f"der({name})"],
-        )
+        rest = {"derivative_of": name, "dependencies": dependencies[f"der({name})"]}
+        add(f"der({name})", derivatives[name], "local", "continuous", initial="calculated", **rest)
     for name, declaration in layout.calculated.items():
-        add(
-            name,
-            declaration,
-            "output",
-            "continuous",
-            initial="calculated",
-            dependencies=dependencies[name],
-        )
+        add(name, declaration, "output", "continuous", initial="calculated", dependencies=dependencies[name])
     for name, declaration in layout.delayed.items():
         add(name, declaration, "local", "discrete", initial="calculated")
-    for name, declaration in layout.coefficients.items():
-        add(
-            name,
-            declaration,
-            "parameter",
-            "tunable" if declaration.tunable else "fixed",
-            initial="exact",
-            start=vehicle[name],
-        )
-    for name, declaration in layout.initial.items():
-        add(name, declaration, "parameter", "fixed", initial="exact", start=0.0)
+    for name, declaration in (layout.coefficients | layout.initial).items():
+        variability = "tunable" if declaration.tunable else "fixed"
+        start = 0.0 if name in layout.initial else vehicle[name]
+        add(name, declaration, "parameter", variability, initial="exact", start=start)
     places = {v.name: v.value_reference for v in result if v.derivative_of is None}
     assert places == layout.places, "the C code has another order of the variables"
     return tuple(result)

@@ -73,7 +73,7 @@ def checked_values(
 
     For many vehicles each value is a number, or an array of one number for each vehicle, which becomes a column.
     """
-    found = {}
+    arrays = {}
     for name in _names(what, given):
         _check_name(what, name, declarations)
         key = f"{what}[{name!r}]"
@@ -81,7 +81,7 @@ def checked_values(
         if values.ndim > many:
             allowed = "a number, or a sequence of one number for each vehicle" if many else "one number"
             raise InputError(f"{key}: must be {allowed}, and has the shape {values.shape}")
-        found[name] = values[:, np.newaxis] if values.ndim else values
+        arrays[name] = values[:, np.newaxis] if values.ndim else values
         declaration = declarations[name]
         outside = np.flatnonzero((values < declaration.minimum) | (values > declaration.maximum))
         if len(outside):
@@ -90,7 +90,7 @@ def checked_values(
                 within(float(wrong), declaration)
             except ValueError as error:
                 raise InputError(f"{key} = {wrong:.12g}: {error}") from error
-    return found
+    return arrays
 
 
 def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> dict[str, Array]:
@@ -98,52 +98,52 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
 
     Raises InputError if one cannot be used, or if the attitude is given both as a quaternion and as angles.
     """
-    found = checked_values("start", given, layout.state | layout.initial, many=many)
-    if quaternion := [found[name] for name in QUATERNION if name in found]:
-        if angles := found.keys() & layout.initial.keys() - {"psi_0"}:
+    states = checked_values("start", given, layout.state | layout.initial, many=many)
+    if quaternion := [states[name] for name in QUATERNION if name in states]:
+        if angles := states.keys() & layout.initial.keys() - {"psi_0"}:
             raise InputError(
                 f"start[{min(angles)!r}]: the attitude is also given as a quaternion. Give only one of the two"
             )
         if np.any(sum(map(np.abs, quaternion)) == 0.0):
             raise InputError(f"start: the quaternion {', '.join(QUATERNION)} is 0 and has no direction")
-    return found
+    return states
 
 
-class Commands:
-    """The inputs of a simulation, and the times at which they may change."""
+def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> tuple[Array, dict[str, Array]]:
+    """Return the times of the steps and the inputs by name, each held from one time up to the next.
 
-    def __init__(self, layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> None:
-        names = _names("inputs", inputs)
-        own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
-        self.time = time
-        """The times of the steps: the times of the results, and the times between them at which an input changes."""
-        if own is not None:
-            self.time = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
-        middles = np.append(0.5 * (self.time[:-1] + self.time[1:]), self.time[-1])
-        given: dict[str, Array] = {}
-        for name in names:
-            if name == TIME:
-                continue
-            _check_name("inputs", name, layout.inputs, layout.kinds)
-            value = inputs[name]
-            key = f"inputs[{name!r}]"
-            if callable(value):
-                found = _numbers(f"{key}(t)", value(middles))
-                _check_shape(f"{key}(t)", found, len(middles), many)
-            else:
-                found = _numbers(key, value)
-                _check_shape(key, found, len(time if own is None else own), many)
-                if own is not None and found.ndim and found.shape[-1] == len(own):
-                    place = np.searchsorted(own, self.time, side="right") - 1
-                    before = layout.inputs[name].start if name in layout.inputs else 0.0
-                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], before)
-            given[name] = found
-        self.values: dict[str, Array] = {}
-        """The inputs by name: numbers, or arrays whose last axis is time. Each value is held up to the next time."""
-        for name, found in with_axes(layout, given).items():
-            self.values[name] = found
-            for beyond in _beyond(found, layout.commands[name]) if name in layout.commands else ():
-                warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
+    The times are those of the results, and those between them at which an input changes. An input is a number, or an
+    array whose last axis is time. Raises InputError. Warns about commands that saturate.
+    """
+    names = _names("inputs", inputs)
+    own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
+    times = time
+    if own is not None:
+        times = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
+    middles = np.append(0.5 * (times[:-1] + times[1:]), times[-1])
+    given: dict[str, Array] = {}
+    for name in names:
+        if name == TIME:
+            continue
+        _check_name("inputs", name, layout.inputs, layout.kinds)
+        value = inputs[name]
+        key = f"inputs[{name!r}]"
+        if callable(value):
+            array = _numbers(f"{key}(t)", value(middles))
+            _check_shape(f"{key}(t)", array, len(middles), many)
+        else:
+            array = _numbers(key, value)
+            _check_shape(key, array, len(time if own is None else own), many)
+            if own is not None and array.ndim and array.shape[-1] == len(own):
+                place = np.searchsorted(own, times, side="right") - 1
+                before = layout.inputs[name].start if name in layout.inputs else 0.0
+                array = np.where(place >= 0, array[..., np.maximum(place, 0)], before)
+        given[name] = array
+    values = with_axes(layout, given)
+    for name in filter(layout.commands.__contains__, values):
+        for beyond in _beyond(values[name], layout.commands[name]):
+            warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
+    return times, values
 
 
 def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:
@@ -153,17 +153,17 @@ def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:
     command in its positive direction: -0.3 in heave is 30 % up. Where two axes share a command, their fractions add up.
     Raises InputError if no thruster drives the axis, or if one of its commands is given, too.
     """
-    found = {name: value for name, value in values.items() if name in layout.inputs}
+    inputs = {name: value for name, value in values.items() if name in layout.inputs}
     fractions: dict[str, Array] = {}
     for name in (axis for axis in layout.kinds if axis in values):
         if not (signs := layout.signs(AXES[name])):
             raise InputError(f"inputs[{name!r}]: no thruster drives this axis")
         for command, sign in signs.items():
-            if command in found:
+            if command in inputs:
                 raise InputError(f"inputs[{command!r}]: {name} drives this input, too")
             fractions[command] = fractions.get(command, np.array(0.0)) + sign * values[name]
     command_of = np.vectorize(layout.command_of, otypes=[np.float64])
-    return found | {command: command_of(fraction) for command, fraction in fractions.items()}
+    return inputs | {command: command_of(fraction) for command, fraction in fractions.items()}
 
 
 def _beyond(values: Array, command: Declaration) -> Iterator[str]:
@@ -212,10 +212,10 @@ def _check_shape(key: str, values: Array, times: int, many: bool) -> None:
 def _numbers(key: str, given: ArrayLike) -> Array:
     """Return finite numbers as an array. Raises InputError for anything else."""
     try:
-        found = np.asarray(given)
-        if found.dtype.kind not in "biufO":
+        array = np.asarray(given)
+        if array.dtype.kind not in "biufO":
             raise TypeError
-        values = found.astype(np.float64)
+        values = array.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{key} = {brief(shown(given), _ONE_LINE)}: must be a number, or an array of numbers"

@@ -61,11 +61,11 @@ def _of_log(path: Path, layout: Layout, rov_file: RovFile) -> dict[str, Array]:
         values = {name: sign * fractions[:, 0] for name, sign in layout.signs(log.axis).items()}
     else:
         values = {f"u_{name}": fractions[:, n] for n, name in enumerate(log.commands.thrusters)}
-    found = {name: np.array([layout.command_of(fraction) for fraction in column]) for name, column in values.items()}
+    inputs = {name: np.array([layout.command_of(fraction) for fraction in column]) for name, column in values.items()}
     voltage = log.used("voltage")
     if "voltage" in layout.inputs and voltage and voltage.count:
-        found["voltage"] = held(voltage.time[voltage.there], voltage.values[voltage.there], times)
-    return {TIME: times - times[0], **found}
+        inputs["voltage"] = held(voltage.time[voltage.there], voltage.values[voltage.there], times)
+    return {TIME: times - times[0], **inputs}
 
 
 def _check_header(path: Path, layout: Layout, header: Iterable[str]) -> None:

@@ -51,27 +51,18 @@ def identify_folder(
     identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
     if report:
-        outputs.append(_report_output(identification, report, begin("drawing the report")))
+        from rov_fmu.report.report import report_output  # imports Matplotlib, which takes a second
+
+        outputs.append(report_output(identification, report, begin("drawing the report")))
     if vehicle:
-        outputs.append(_vehicle_output(identification, vehicle, report))
+        identified = identification.vehicle
+        if report:
+            assert identified.provenance
+            identified = replace(identified, provenance=identified.provenance.model_copy(update={"report": report}))
+        outputs.append(vehicle_output(identified, vehicle))
     if mcap:
         from rov_fmu.bridges.mcap_logs import identification_mcap
 
         outputs.append(Output(mcap, identification_mcap(identification)))
     write_whole(*outputs)
     return identification, replaced
-
-
-def _report_output(identification: Identification, path: Path, on_progress: Progress) -> Output:
-    from rov_fmu.report.report import report_output  # imports Matplotlib, which takes a second
-
-    return report_output(identification, path, on_progress)
-
-
-def _vehicle_output(identification: Identification, path: Path, report: Path | None) -> Output:
-    """Return the vehicle file, which names the report."""
-    vehicle = identification.vehicle
-    if report:
-        assert vehicle.provenance
-        vehicle = replace(vehicle, provenance=vehicle.provenance.model_copy(update={"report": report}))
-    return vehicle_output(vehicle, path)

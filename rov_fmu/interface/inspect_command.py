@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
-from rov_fmu.equation.catalogue import AXES, BODY, EXTERNAL, PITCH, ROLL
+from rov_fmu.equation.catalogue import AXES, BODY, EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
@@ -22,7 +22,7 @@ from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_ta
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 _BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
@@ -59,32 +59,32 @@ def inspect_logs(path: Path) -> Inspected:
     folder = folder.parent if (folder / _BAG).is_file() else folder
     described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE
     layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
-    found: list[Inspection] = []
+    inspections: list[Inspection] = []
     mistakes: list[str] = []
     findings: list[Finding] = []
     with one_parser():
         for log in logs_of(path, described.tables.columns):
             try:
-                found += inspect(log, layouts.values(), described)
+                inspections += inspect(log, layouts.values(), described)
             except DataFileError as error:
                 mistakes += str(error).splitlines()
                 findings.append(unreadable(log, error))
-    if not found:
+    if not inspections:
         none = f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it"
         raise DataFileError(*(mistakes or [none]))
     tables = headers_of_tables(folder)
-    text = _draft(folder, found, tables, *_thrusters(found, layouts, tables.curves))
-    return Inspected(found, sentences(findings, SENTENCES), folder / ROV_FILE, text)
+    text = _draft(folder, inspections, tables, *_thrusters(inspections, layouts, tables.curves))
+    return Inspected(inspections, sentences(findings, SENTENCES), folder / ROV_FILE, text)
 
 
 def _thrusters(
-    found: Iterable[Inspection], layouts: Mapping[str, Layout], curves: Collection[str]
+    inspections: Iterable[Inspection], layouts: Mapping[str, Layout], curves: Collection[str]
 ) -> tuple[list[str], str]:
     """Return the thrusters of the log that has most of them, and the first vehicle that has such ones and the curves.
 
     Without such a vehicle, its name is empty.
     """
-    most = max(found, key=lambda one: (len(one.commands), _changing(one)))
+    most = max(inspections, key=lambda one: (len(one.commands), _changing(one)))
     thrusters = [row.name.removeprefix("thruster ") for row in most.commands]
     if not fitting(thrusters, layouts.values()) and _is_bag(most.path):
         thrusters = thrusters[: _changing(most)]
@@ -114,18 +114,19 @@ def check_no_description(path: Path) -> None:
 # ---- The draft -------------------------------------------------------------------------------------------------------
 
 
-def _draft(folder: Path, found: Sequence[Inspection], tables: TableHeaders, thrusters: Sequence[str], base: str) -> str:
+def _draft(
+    folder: Path, inspections: Sequence[Inspection], tables: TableHeaders, thrusters: Sequence[str], base: str
+) -> str:
     """Return a draft, which is a complete rov.toml if a vehicle that ships, `base`, has such thrusters."""
-    name = folder.resolve().name or found[0].path.stem
+    name = folder.resolve().name or inspections[0].path.stem
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    signals = {row.name for one in found for row in one.channels}
     vehicle = load_vehicle(SHIPPED[base]) if base else None
-    columns, headers = _columns([one for one in found if not _is_bag(one.path)], tables)
+    columns, headers = _columns([one for one in inspections if not _is_bag(one.path)], tables)
     return render(
         "rov.toml.j2",
         Path(__file__).parent / "templates",
         quoted=_quoted,
-        names=one_line(brief(", ".join(dict.fromkeys(one.path.name for one in found)))),
+        names=one_line(brief(", ".join(dict.fromkeys(one.path.name for one in inspections)))),
         is_own=not base and len(thrusters) > 1,
         is_wrench=not EXTERNAL.isdisjoint(thrusters),
         thrusters=thrusters,
@@ -134,39 +135,20 @@ def _draft(folder: Path, found: Sequence[Inspection], tables: TableHeaders, thru
         name=name,
         identifier=word if word[:1].isalpha() else f"rov_{word}",
         curves=tables.curves or ["all"],
-        axes=_axes(signals),
-        body=_body(vehicle) if vehicle else (),
-        effects=_effects(vehicle, signals),
+        axes=AXES.values(),
+        signals={row.name for one in inspections for row in one.channels},
+        body=[*BODY],
+        vehicle=vehicle,
         columns=columns,
         headers=_questions(headers),
-        fields=_questions(_fields(found)),
-        dives=_dives(found),
+        fields=_questions(_fields(inspections)),
+        dives=_dives(inspections),
     )
 
 
-def _axes(signals: Collection[str]) -> list[str]:
-    """Return the names of the axes that the logs measure; every autopilot measures roll and pitch."""
-    measured = [axis for axis in AXES.values() if {axis.position, f"{axis.name} velocity"} & {*signals}]
-    return [axis.name for axis in measured if axis not in (ROLL, PITCH)]
-
-
-def _body(vehicle: Vehicle) -> list[tuple[str, str, str]]:
-    """Return the names, values and units of the coefficients of a vehicle's body."""
-    units = {key: declaration.unit for key, declaration in vehicle.layout.coefficients.items()}
-    return [(key, f"{vehicle[key]:g}", units[key]) for key in BODY if key in units]
-
-
-def _effects(vehicle: Vehicle | None, signals: Collection[str]) -> list[str]:
-    """Return the keys of [fit] for which the logs have the channels."""
-    needed = {"voltage": {"voltage"}, "attitude": {"roll angle", "pitch angle"}}
-    if vehicle and vehicle.layout.has_attitude:
-        del needed["attitude"]
-    return [key for key, names in needed.items() if names <= {*signals}]
-
-
-def _fields(found: Iterable[Inspection]) -> dict[str, str]:
+def _fields(inspections: Iterable[Inspection]) -> dict[str, str]:
     """Return the descriptions of the fields of topics that are not recognised, without those of what is wanted."""
-    unread = {name: what for one in found if _is_bag(one.path) for name, what in one.unread.items()}
+    unread = {name: what for one in inspections if _is_bag(one.path) for name, what in one.unread.items()}
     return {
         name: what
         for name, what in unread.items()
@@ -184,14 +166,14 @@ def _questions(names: Mapping[str, str]) -> list[str]:
     return first_of([one_line(f'{_quoted(name)} = "?"{what and f"   # {what}"}') for name, what in names.items()])
 
 
-def _dives(found: Sequence[Inspection]) -> list[list[str]]:
+def _dives(inspections: Sequence[Inspection]) -> list[list[str]]:
     """Return the files of each dive of several files: one with commands, and those without commands that belong to it.
 
     A file without commands belongs to the one whose times overlap most with its own, or, without an overlap, to the
     only one with commands.
     """
-    times = {one.path: _times(one) for one in found}
-    files = {one.path: [one.path.name] for one in found if one.commands}
+    times = {one.path: _times(one) for one in inspections}
+    files = {one.path: [one.path.name] for one in inspections if one.commands}
     for path, (start, end) in times.items():
         if files and path not in files and isfinite(start):
             overlaps = {other: min(end, times[other][1]) - max(start, times[other][0]) for other in files}
@@ -207,11 +189,11 @@ def _times(inspection: Inspection) -> tuple[float, float]:
     return min((row.start for row in rows), default=inf), max((row.end for row in rows), default=-inf)
 
 
-def _columns(found: Iterable[Inspection], tables: TableHeaders) -> tuple[dict[str, str], dict[str, str]]:
+def _columns(inspections: Iterable[Inspection], tables: TableHeaders) -> tuple[dict[str, str], dict[str, str]]:
     """Return what headers seem to mean, and the descriptions of the others."""
     columns = {title: meant for title, meant in tables.columns.items() if meant}
     others = dict.fromkeys(tables.columns, "")
-    for one in found:
+    for one in inspections:
         columns |= one.columns
         others |= one.unread
     if any(meant.startswith("-depth") for meant in columns.values()):  # z points up, in all files
@@ -222,12 +204,6 @@ def _columns(found: Iterable[Inspection], tables: TableHeaders) -> tuple[dict[st
 
 def _quoted(text: str) -> str:
     """Return a text as a basic string of TOML. A byte of a name that is not Unicode becomes a blank."""
-    return '"{}"'.format("".join(map(_in_quotes, text)))
-
-
-def _in_quotes(character: str) -> str:
-    if character in '\\"':
-        return f"\\{character}"
-    if character.isprintable():
-        return character
-    return " " if "\ud800" <= character <= "\udfff" else f"\\U{ord(character):08X}"
+    text = re.sub("[\ud800-\udfff]", " ", text)
+    characters = (f"\\{c}" if c in '\\"' else c if c.isprintable() else f"\\U{ord(c):08X}" for c in text)
+    return f'"{"".join(characters)}"'

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rov_fmu.bridges import arrays
-from rov_fmu.bridges.rates import force_names
+from rov_fmu.bridges.arrays import force_names
 from rov_fmu.c.simulation import Array, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
-    Commands,
     Inputs,
+    checked_inputs,
     checked_record,
     checked_start,
     checked_times,
@@ -234,9 +234,9 @@ class VehicleModel(Vehicle):
         layout = self.layout
         check_coefficients(layout, self.coefficients)  # `dataclasses.replace` does not check them
         times = checked_times("time", duration_times(time) if np.ndim(time) == 0 else time)
-        commands = Commands(layout, times, inputs, many=many)
+        step_times, input_values = checked_inputs(layout, times, inputs, many=many)
         values: dict[str, Array] = {
-            **commands.values,
+            **input_values,
             **checked_start(start, layout, many=many),
             **checked_values("coefficients", coefficients, layout.coefficients, many=many),
         }
@@ -247,24 +247,26 @@ class VehicleModel(Vehicle):
             attitude = QUATERNION if layout.has_attitude else ()
             others = (*attitude, *(() if many else layout.commands))
             recording = [*recorded, *(name for name in others if name not in recorded)]
-            found = simulate(self, commands.time, values, recording, vehicles=vehicles, workers=workers, lanes=lanes)
+            trajectories = simulate(
+                self, step_times, values, recording, vehicles=vehicles, workers=workers, lanes=lanes
+            )
         except MemoryError as error:
-            size = 8e-9 * vehicles * len(commands.time) * len(recorded)
+            size = 8e-9 * vehicles * len(step_times) * len(recorded)
             raise InputError(
                 f"time, record: the result needs {size:.3g} GB, which is more than the available memory. Record "
                 "fewer variables"
             ) from error
         if attitude:
-            self._warn_if_turned_over(commands.time, found.values[[recording.index(name) for name in attitude]])
-        rows = found.values
-        if len(commands.time) > len(times):
-            rows = rows[..., np.searchsorted(commands.time, times)]
+            self._warn_if_turned_over(step_times, trajectories.values[[recording.index(name) for name in attitude]])
+        rows = trajectories.values
+        if len(step_times) > len(times):
+            rows = rows[..., np.searchsorted(step_times, times)]
         return Result(
             times,
             {name: row if many else row[0] for name, row in zip(recorded, rows, strict=False)},
             {name: units[name] for name in recorded},
             tuple(name for name in recorded if name in layout.state),
-            np.flatnonzero(found.failed < len(commands.time)),
+            np.flatnonzero(trajectories.failed < len(step_times)),
             {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
             "us" if layout.pulse else "1",
         )

@@ -98,10 +98,9 @@ class Result(Mapping[str, Array]):
         For a vehicle with roll or pitch, it also contains psi_0, so that the heading continues. It does not contain
         changes of commands that are still waiting for the dead time.
         """
-        found = {name: self.arrays[name][..., -1][()] for name in self.states}
-        return found | (
-            {"psi_0": self.arrays["psi"][..., -1][()]} if {*QUATERNION, "psi"} <= self.arrays.keys() else {}
-        )
+        ends = {name: values[..., -1][()] for name, values in self.arrays.items()}
+        start = {name: ends[name] for name in self.states}
+        return start | ({"psi_0": ends["psi"]} if {*QUATERNION, "psi"} <= ends.keys() else {})
 
     def to_dataframe(self) -> "pd.DataFrame":
         """Return a pandas data frame with a column for each variable.
@@ -140,14 +139,16 @@ class Result(Mapping[str, Array]):
     def _draw(self, figure: "Figure", names: str | Sequence[str] | None) -> None:
         from rov_fmu.report.plots.svg import LIGHT, LINES, draw_commands, name_axes
 
-        chosen = self._moving() if names is None else (names,) if isinstance(names, str) else tuple(names)
+        moving = [name for name in self.names if name not in QUATERNION and np.any(self.arrays[name])]
+        chosen = moving or self.names[:1] if names is None else [names] if isinstance(names, str) else [*names]
         if not chosen:
             raise InputError("names: must name a variable")
         panels: dict[tuple[str, str], dict[str, Array]] = {}
         for name in dict.fromkeys(chosen):
             values = self[name]
             factor, unit = in_degrees(self.units[name])
-            panels.setdefault((_quantity(name, unit), unit), {})[name] = factor * values
+            quantity = "thrust" if name.startswith("F_") and unit == "N" else _QUANTITIES.get(unit, "")
+            panels.setdefault((quantity, unit), {})[name] = factor * values
         commands = {name: values for name, values in self.commands.items() if names is None and np.any(values)}
         heights = [0.6 if quantity in _SMALL else 1.0 for quantity, _ in panels] + [0.6] * bool(commands)
         figure.set_size_inches(8.0, 1.0 + 1.6 * sum(heights))
@@ -174,16 +175,6 @@ class Result(Mapping[str, Array]):
             draw_commands(axes[-1], self.time, commands, self.command_unit)
         axes[-1].set_xlabel("time (s)")
 
-    def _moving(self) -> tuple[str, ...]:
-        """Return the variables that are ever different from 0, without the quaternion; the first one if none is."""
-        moving = tuple(name for name in self.names if name not in QUATERNION and np.any(self.arrays[name]))
-        return moving or self.names[:1]
-
-
-def _quantity(name: str, unit: str) -> str:
-    """Return what a panel shows, in words."""
-    return "thrust" if name.startswith("F_") and unit == "N" else _QUANTITIES.get(unit, "")
-
 
 def _dashes(curves: Sequence[Array]) -> list[Any]:
     """Return the line style of each curve of a panel.
@@ -193,13 +184,14 @@ def _dashes(curves: Sequence[Array]) -> list[Any]:
     scale = max((float(np.nanmax(np.abs(values), initial=0.0)) for values in curves), default=0.0)
     groups: list[list[int]] = []
     for n, values in enumerate(curves):
-        same = (group for group in groups if np.allclose(values, curves[group[0]], 0.0, 5e-3 * scale, equal_nan=True))
-        if (group := next(same, None)) is not None:
-            group.append(n)
+        for group in groups:
+            if np.allclose(values, curves[group[0]], 0.0, 5e-3 * scale, equal_nan=True):
+                group.append(n)
+                break
         else:
             groups.append([n])
-    found: list[Any] = ["-"] * len(curves)
+    styles: list[Any] = ["-"] * len(curves)
     for group in groups:
         for place, n in enumerate(group[1:], 1):
-            found[n] = (-_DASH * place, (_DASH, _DASH * (len(group) - 1)))
-    return found
+            styles[n] = (-_DASH * place, (_DASH, _DASH * (len(group) - 1)))
+    return styles

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.equation.layout import Layout
-from rov_fmu.interface.arguments import STEP, TIME, Array, result_times
+from rov_fmu.interface.arguments import STEP, TIME, result_times
 from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
@@ -67,18 +67,13 @@ def run(
     if stop is not None and step is None and stop / STEP > _MOST_RESULTS:
         ends = f"--stop {stop:g}" if commands is None or stop != inputs[TIME][-1] else f"{commands}, up to {stop:g} s,"
         raise InputError(f"{ends} needs a longer --step than {STEP:g} s: at least {_least_step(stop):g} s")
-    time = _result_times(_STOP if stop is None else stop, STEP if step is None else step)
+    stop, step = _STOP if stop is None else stop, STEP if step is None else step
+    if stop / step > _MOST_RESULTS:
+        raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
     layout = vehicle.layout
     record = [*layout.inputs, *layout.state, *layout.calculated] if with_inputs else None
     changed = vehicle.with_(**given.coefficients)
-    return changed.simulate(time, inputs | given.inputs, start=given.start, record=record)
-
-
-def _result_times(stop: float, step: float) -> Array:
-    """Return the times of the results. Raises InputError if there are too many."""
-    if stop / step > _MOST_RESULTS:
-        raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
-    return result_times(stop, step)
+    return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start, record=record)
 
 
 def _least_step(stop: float) -> float:
@@ -101,20 +96,9 @@ class Settings:
 
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     """Return the values of the options --set: inputs, initial values and coefficients. Raises InputError."""
-    at_start = {*layout.state, *layout.initial}
-    found = _read_values(settings, layout)
-    return Settings(
-        {name: value for name, value in found.items() if name in layout.inputs or name in layout.kinds},
-        {name: value for name, value in found.items() if name in at_start},
-        {name: value for name, value in found.items() if name in layout.coefficients},
-    )
-
-
-def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
-    """Return the values of the options --set by name. Raises InputError."""
     variables = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
     names = [*variables, *layout.kinds]
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for text in settings:
         name, _, value = (part.strip() for part in text.partition("="))
         if name not in names and name in layout.calculated:
@@ -122,16 +106,17 @@ def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
         if name not in names:
             hint = did_you_mean(name, names)
             raise InputError(f"--set {text}: the vehicle has no such input, state or coefficient{hint}")
-        if name in found:
+        if name in values:
             raise InputError(f"--set {text}: {name} is set twice")
         try:
-            found[name] = float(value)
+            values[name] = float(value)
         except ValueError:
-            found[name] = nan
-        if not isfinite(found[name]):
+            values[name] = nan
+        if not isfinite(values[name]):
             percent = _percent(value) if name in layout.kinds or variables[name].unit == "1" else ""
             raise InputError(f"--set {text}: {shown(value)} must be a finite number{percent}")
-    return found
+    kinds = (layout.inputs | layout.kinds, layout.state | layout.initial, layout.coefficients)
+    return Settings(*({name: value for name, value in values.items() if name in own} for own in kinds))
 
 
 def _percent(text: str) -> str:
@@ -201,10 +186,10 @@ def _plot_output(result: Result, path: Path, title: str) -> Output:
 
 def print_final(vehicle: VehicleModel, result: Result, *, has_no_input: bool) -> None:
     """Print the values at the end as a table, and how to set a command if the simulation has no input at all."""
-    found = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
+    ends = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
     for name, values in result.items():
-        found.add_row(name, f"{values[-1] + 0.0:.6g}", result.units[name])  # -0 becomes 0
-    print_table(found)
+        ends.add_row(name, f"{values[-1] + 0.0:.6g}", result.units[name])  # -0 becomes 0
+    print_table(ends)
     if has_no_input:
         name = next(iter(vehicle.layout.commands))
         paragraph(console(), f"No command is set: try --set {name}={vehicle.layout.command_of(0.3):g}")

@@ -104,16 +104,16 @@ def _setup(path: Path, options: Options) -> Setup:
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:
     """Return the names of inputs by servo. Raises InputError."""
-    found: dict[int, str] = {}
+    names: dict[int, str] = {}
     example = next(iter(layout.commands)).removeprefix("u_")
     for text in texts:
         number, equals, name = (part.strip() for part in text.partition("="))
         if not (equals and number.isdecimal() and 1 <= int(number) <= _MOST_CHANNELS):
             raise InputError(f"--servo {text}: must be N=NAME with N from 1 to {_MOST_CHANNELS}, such as 3={example}")
-        if int(number) in found:
+        if int(number) in names:
             raise InputError(f"--servo {text}: servo {number} is given before")
-        found[int(number)] = name
-    return found
+        names[int(number)] = name
+    return names
 
 
 def _listed(servos: Servos, layout: Layout) -> Iterator[str]:

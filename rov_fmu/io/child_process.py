@@ -216,7 +216,9 @@ def _messages(pipe: IO[bytes]) -> Iterator[Any]:
 def _serve() -> None:
     """Make the object and call its methods as long as the parent process lives."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    too_large = _TooLarge()
+    too_large: list[int] = []  # a file has become larger than the limit, even if a library does not tell why it failed
+    if sys.platform == "linux":
+        signal.signal(signal.SIGXFSZ, lambda number, _: too_large.append(number))
     answers = os.fdopen(os.dup(1), "wb")
     requests: SimpleQueue[Any] = SimpleQueue()
 
@@ -234,31 +236,19 @@ def _serve() -> None:
     _send(answers, (None, None, None))
     target: Any = None
     while True:
-        too_large.file = False
+        too_large.clear()
         try:
             with limits.applied():
                 result, error = function(*arguments), None
         except Exception as raised:
             result, error = None, raised
-        exceeded = _exceeded(error, limits) or ("disk" if error and too_large.file else None)
+        exceeded = _exceeded(error, limits) or ("disk" if error and too_large else None)
         if target is None:
             target, result = result, None
         _send(answers, (result, None if exceeded else _portable(error), exceeded))
         result = error = None  # the memory is free before the next call
         method, arguments, limits = requests.get()
         function = getattr(target, method)
-
-
-class _TooLarge:
-    """Notices that a file has become larger than the limit, even if a library does not tell why it failed."""
-
-    def __init__(self) -> None:
-        self.file = False
-        if sys.platform == "linux":
-            signal.signal(signal.SIGXFSZ, self._notice)
-
-    def _notice(self, _signal: int, _frame: object) -> None:
-        self.file = True
 
 
 def _exceeded(error: BaseException | None, limits: Limits) -> str | None:

@@ -452,13 +452,9 @@ def _what_lacks(missing: Mapping[str, Column], others: Iterable[str], hint: str)
     unread = {_name_and_unit(title)[0]: title for title in others}
     first, *more = (repr(_title(name, column)) for name, column in missing.items())
     reason = ", and so is ".join([f"{first} is missing", *more])
-    near = [shown(unread[name]) for wanted in missing for name in similar(wanted, [*unread][:_MOST_COMPARED])]
-    return reason + (f"; is it the column {' or '.join(near)}?" if near else f"{_listed_titles(unread)}{hint}")
-
-
-def _listed_titles(unread: Mapping[str, str]) -> str:
-    """Return words about the columns that are not known, or an empty text."""
-    return f". The other columns are {brief(', '.join(map(repr, unread.values())))}" if unread else ""
+    if near := [shown(unread[name]) for wanted in missing for name in similar(wanted, [*unread][:_MOST_COMPARED])]:
+        return f"{reason}; is it the column {' or '.join(near)}?"
+    return reason + (f". The other columns are {brief(', '.join(map(repr, unread.values())))}" if unread else "") + hint
 
 
 class KnownColumns:
@@ -482,7 +478,7 @@ class KnownColumns:
         keys = self.keys.get(name, {})
         for key in keys:
             column = self._columns[key]
-            if unit := _find_unit(word, column):
+            if unit := next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None):
                 convert, factor = _conversion(unit, numbers, column)
                 if title.startswith("-"):
                     convert, factor = partial(_opposite, convert), -factor
@@ -544,11 +540,6 @@ def _folded(text: str) -> str:
 def _units(column: Column) -> list[str]:
     """Return all units that a column may have."""
     return [*column.units, *column.conversions]
-
-
-def _find_unit(word: str, column: Column) -> str | None:
-    """Return a unit, given in any case, as the column spells it, or None if the column does not have it."""
-    return next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None)
 
 
 def _title(name: str, column: Column) -> str:

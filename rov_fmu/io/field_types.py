@@ -8,8 +8,8 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 
 def printable(text: str) -> str:
     """Return the text if it has no control characters. Raises ValueError."""
-    if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
-        raise ValueError(f"must be without the control character {found[0]!a}")
+    if control := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
+        raise ValueError(f"must be without the control character {control[0]!a}")
     return text
 
 

@@ -98,19 +98,16 @@ def print_message(text: str) -> None:
     All messages are printed here, and all other text by `rov_fmu.report.console`. Both escape control characters,
     because a name or value of a stranger's file could otherwise change what the terminal shows.
     """
-    if sys.stderr:
-        print(_on_terminal(one_line(text)), file=sys.stderr)
-
-
-def _on_terminal(line: str) -> str:
-    """Return a line as stderr gets it."""
-    if not (sys.stderr and sys.stderr.isatty()):
-        return line
-    try:
-        columns = os.get_terminal_size(sys.stderr.fileno()).columns
-    except (OSError, ValueError):
-        columns = 0
-    return wrapped(line, columns or shutil.get_terminal_size().columns, "  ")
+    if not sys.stderr:
+        return
+    line = one_line(text)
+    if sys.stderr.isatty():
+        try:
+            columns = os.get_terminal_size(sys.stderr.fileno()).columns
+        except (OSError, ValueError):
+            columns = 0
+        line = wrapped(line, columns or shutil.get_terminal_size().columns, "  ")
+    print(line, file=sys.stderr)
 
 
 def wrapped(text: str, width: int, indent: str = "") -> str:

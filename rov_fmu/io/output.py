@@ -55,12 +55,11 @@ def _check_folder(path: Path) -> None:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
     except OSError as error:
-        reasons = {
-            errno.EACCES: "its folder is read-only",
-            errno.EROFS: "its folder is read-only",
-            errno.ENOENT: f"no new file can be made in the folder {path.parent}",
-        }
-        reason = reasons.get(error.errno or 0, f"no new file can be made in the folder {path.parent}: {error.strerror}")
+        reason = f"no new file can be made in the folder {path.parent}"
+        if error.errno in (errno.EACCES, errno.EROFS):
+            reason = "its folder is read-only"
+        elif error.errno != errno.ENOENT:
+            reason += f": {error.strerror}"
         raise WriteError(error.errno, reason, str(path)) from error
 
 

@@ -14,10 +14,10 @@ _PIECE = 2**20
 
 def hash_of(file: IO[bytes], kind: str) -> bytes:
     """Return the hash of the content of an open file, of a kind that hashlib has."""
-    found = hashlib.new(kind)
+    digest = hashlib.new(kind)
     while piece := file.read(_PIECE):
-        found.update(piece)
-    return found.digest()
+        digest.update(piece)
+    return digest.digest()
 
 
 def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> bytes:

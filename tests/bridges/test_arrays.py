@@ -12,7 +12,7 @@ import pytest
 
 import rov_fmu
 from rov_fmu.bridges import arrays
-from rov_fmu.bridges.rates import force_names
+from rov_fmu.bridges.arrays import force_names
 from rov_fmu.c.simulation import simulate
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 import pytest
 from lxml import etree
 
-from rov_fmu.fmu.model_description import NATIVE, model_description
+from rov_fmu.c.compile import INTERFACES
+from rov_fmu.fmu.model_description import model_description
 from rov_fmu.fmu.variables import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, VEHICLES, a_vehicle, numbered, with_axes
@@ -51,7 +52,7 @@ def vary(values: Sequence[float]) -> bool:
 def declared(rov: Vehicle, of: str) -> dict[tuple[str, str], str]:
     """Return a list of <ModelStructure>."""
     of_rov = variables(rov)
-    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE[2]))
+    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=INTERFACES["both"]))
     name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
     found: dict[tuple[str, str], str] = {}
     for unknown in root.find(f"ModelStructure/{of}"):

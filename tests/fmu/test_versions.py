@@ -14,7 +14,7 @@ import rov_fmu
 from rov_fmu.c import compile as build_options
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
-from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
+from rov_fmu.fmu.model_description import build_description, model_description
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -43,7 +43,9 @@ _LISTS = {
 
 
 def described(rov: Vehicle, fmi: int) -> etree._Element:
-    description = model_description(a_vehicle(rov), variables(rov), guid="{1}", interfaces=NATIVE[fmi], fmi=fmi)
+    description = model_description(
+        a_vehicle(rov), variables(rov), guid="{1}", interfaces=build_options.INTERFACES["both"], fmi=fmi
+    )
     return etree.fromstring(description)
 
 

@@ -8,10 +8,10 @@ from typing import Any
 from rov_fmu.fmu.claims import measures
 from rov_fmu.fmu.claims.measures import Evidence
 from rov_fmu.fmu.claims.runs import RunError
-from rov_fmu.fmu.claims.subject import Subject, opened
+from rov_fmu.fmu.claims.subject import TIME_LIMIT, Subject, opened
 from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.experiments import FOLDER
-from rov_fmu.fmu.proof import TIME_LIMIT, remedy
+from rov_fmu.fmu.proof import remedy
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import Progress, ProofError, silent
 from rov_fmu.io.reading import hash_of

@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
@@ -11,12 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, cross_of
+from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.fmu.card import read_card
-from rov_fmu.fmu.claims.runs import Answer, Array, Plan, RunError
+from rov_fmu.fmu.claims.runs import REAL, Answer, Array, Plan, RunError
 from rov_fmu.fmu.claims.subject import Subject
 from rov_fmu.fmu.evidence.check import check_evidence
-from rov_fmu.fmu.proof import SHARE_OF_NOMINAL, compare, nominal
+from rov_fmu.fmu.proof import SHARE_OF_NOMINAL, Finding, compare, nominal
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import brief, listed
 
@@ -30,16 +29,16 @@ _WAIT = 5.0
 """The longest time for an answer to something impossible, s."""
 _GLIDE, _GLIDE_STEPS = 10.0, 100
 """The length of a motion without thrust (s), and its number of steps."""
-_DRAG, _LOAD = re.compile(r"[a-z]_d_\w+"), re.compile(r"F_0_\w+|[WB]")
-"""The parameters of drag, and those of constant loads, weight and buoyancy."""
+_DRAG, _LOAD = re.compile(r"[a-z]_d_\w+"), re.compile(r"F_0_\w+|[WB]|[XYZKMN]_[uvwpqr]{2}")
+"""The parameters of drag, and those of constant loads, weight, buoyancy and lift."""
 _LOSS = 1e-12
 """The increase of an energy, relative to the energy, that is a rounding error."""
 
 
-_UNSEEN = "Unseen data: "
-"""The beginning of a paragraph of the model card about a prediction."""
+_UNSEEN = re.compile("(?m)^Unseen data: (.*)")
+"""A paragraph of the model card about a prediction."""
 _BAD = "do not use"
-_VERDICT = re.compile(rf"([\w ]+): (good|usable|{_BAD})\. ?(.*)")
+_VERDICT = re.compile(rf"(?m)^([\w ]+): (good|usable|{_BAD})\. ?(.*)")
 """A paragraph of the model card with the verdict of an axis and its reasons."""
 
 
@@ -73,35 +72,38 @@ def _is(holds: bool) -> Result:
 
 # ---- Experiments -----------------------------------------------------------------------------------------------------
 
+_SECOND_SOLVER = (
+    " They come from a second solver of the same equation: an explicit Runge-Kutta method of order 8 (DOP853) in "
+    "Python, run when the FMU was built, and not the Taylor series in C that the FMU runs. So they test the "
+    "integration and the compiled code, and not the physics."
+)
+
 
 def expected(subject: Subject) -> Evidence:
     """Compare the FMU with the results that it carries."""
     if not subject.experiments:
         return _not("the FMU carries no expected results (FMI-LS-REF)")
-    has = subject.path, subject.folder, subject.description, subject.experiments
-    findings = compare(*has, subject.interface, subject.tolerance, subject.time_limit)
-    experiments = [*dict.fromkeys(f.experiment for f in findings)]
-    worst = [
-        max((f for f in findings if f.experiment == x), key=lambda f: f.deviation / f.tolerance) for x in experiments
-    ]
+    findings = compare(subject)
+    by_experiment: dict[str, list[Finding]] = {}
+    for f in findings:
+        by_experiment.setdefault(f.experiment, []).append(f)
+    worst = [max(own, key=lambda f: f.deviation / f.tolerance) for own in by_experiment.values()]
     wrong = [f for f in findings if not f.passed]
-    largest = max(f.deviation for f in findings)
-    words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(experiments)} experiments are as expected"
-    words += f", within {max(f.tolerance for f in findings):.0e} of the largest value of each variable."
-    if subject.is_ours and Path(subject.folder, "sources", "step.c").exists():
-        words += " They come from a second solver of the same equation: an explicit Runge-Kutta method of order 8 "
-        words += "(DOP853) in Python, run when the FMU was built, and not the Taylor series in C that the FMU runs. So "
-        words += "they test the integration and the compiled code, and not the physics."
-    for f in wrong[:1]:
+    tolerances, deviations = [f.tolerance for f in worst], [f.deviation for f in worst]
+    words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(worst)} experiments are as expected"
+    words += f", within {max(tolerances):.0e} of the largest value of each variable."
+    words += _SECOND_SOLVER * (subject.is_ours and Path(subject.folder, "sources", "step.c").exists())
+    if wrong:
+        f = wrong[0]
         words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {_tiny(f.deviation)}'}."
     rows = [(f.experiment, f.error or f.variable, _tiny(f.deviation), f"{f.tolerance:.0e}") for f in worst]
     return Evidence(
         _is(not wrong),
         words,
-        _tiny(largest),
+        _tiny(max(deviations)),
         ("Experiment", "Worst variable", "Deviation", "Tolerance"),
         rows if len(rows) <= 12 or wrong else (),
-        {"deviations": [f.deviation for f in worst], "tolerance": [f.tolerance for f in worst]},
+        {"deviations": deviations, "tolerance": tolerances},
     )
 
 
@@ -149,7 +151,7 @@ def repeatability(subject: Subject) -> Evidence:
     if subject.obstacle:
         return _not(subject.obstacle)
     plan = subject.plan
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     first = None
     largest = 0.0
     for _ in range(_PROCESSES):
@@ -158,15 +160,15 @@ def repeatability(subject: Subject) -> Evidence:
                 values = child.call("run", plan, _STEPS_OF_RUN)
                 first = values if first is None else first
                 digest = hashlib.sha256(values.tobytes()).hexdigest()
-                found[digest] = found.get(digest, 0) + 1
+                counts[digest] = counts.get(digest, 0) + 1
                 largest = max(largest, _deviation(subject, values, first))
     assert first is not None
-    same = next(iter(found.values()))
+    same = next(iter(counts.values()))
     words = f"{same} of {_RUNS} runs of {subject.words} in {_PROCESSES} processes, with {first.size} numbers each, "
     words += "have the bits of the first one."
-    if len(found) > 1:
+    if len(counts) > 1:
         words += f" The others deviate by up to {_tiny(largest)}."
-    return Evidence(_is(len(found) == 1), words, f"{same} of {_RUNS}")
+    return Evidence(_is(len(counts) == 1), words, f"{same} of {_RUNS}")
 
 
 def cost(subject: Subject) -> Evidence:
@@ -197,36 +199,17 @@ def _time(seconds: float) -> str:
 
 
 def conservation(subject: Subject) -> Evidence:
-    """Let a vehicle glide without thrust and drag, and then with drag.
-
-    The energy is v' M v / 2. M is measured: its inverse has the accelerations that loads of 1 N or 1 N m give at rest.
-    """
+    """Let a vehicle glide without thrust and drag, and then with drag."""
     if subject.obstacle:
         return _not(subject.obstacle)
     has = subject.variables
     axes = [axis for axis in AXES.values() if {axis.velocity, axis.external, f"der({axis.velocity})"} <= has.keys()]
     if not axes or not subject.is_ours:
         return _not("it is known only of vehicles of rov-fmu which parameters switch drag and loads off")
-    loads = {name: "0" for name in has if _LOAD.fullmatch(name) or (cross_of(name) or ("",))[0] == "lift"}
-    off = loads | {name: "0" for name in has if _DRAG.fullmatch(name)}
-    if fixed := [name for name in off if has[name].causality != "parameter"]:
+    loads, drag = (dict.fromkeys(filter(kind.fullmatch, has), "0") for kind in (_LOAD, _DRAG))
+    if fixed := [name for name in loads | drag if has[name].causality != "parameter"]:
         return _not(f"{listed(fixed)} cannot be set to 0")
-    inputs = {v.name: float(v.start or 0.0) for v in has.values() if v.causality == "input"}
-    velocities = [axis.velocity for axis in axes]
-    rates = tuple(f"der({name})" for name in velocities)
-    begin = {name: f"{0.5 + 0.1 * n:g}" for n, name in enumerate(velocities)}
-    with subject.runs() as child:
-
-        def accelerations(**load: float) -> Any:
-            return child.call("run", Plan(0.0, ((1e-3, inputs | load),), off, rates), 1)[0]
-
-        still = accelerations()
-        mass = np.linalg.inv(np.column_stack([accelerations(**{axis.external: 1.0}) - still for axis in axes]))
-        glides = [
-            child.call("run", Plan(0.0, ((_GLIDE, inputs),), {**set_to, **begin}, tuple(velocities)), _GLIDE_STEPS)
-            for set_to in (off, loads)
-        ]
-    free, braked = (0.5 * np.einsum("ti,ij,tj->t", v, mass, v) for v in glides)
+    free, braked = _energies(subject, axes, loads | drag, loads)
     drift = float(np.abs(free / free[0] - 1.0).max())
     gain = float(np.max(np.diff(braked) / braked[0], initial=-inf))
     allowed = subject.allowed
@@ -236,6 +219,31 @@ def conservation(subject: Subject) -> Evidence:
     return Evidence(_is(drift <= allowed and gain <= _LOSS), words, _tiny(drift))
 
 
+def _energies(
+    subject: Subject, axes: Sequence[Axis], free: Mapping[str, str], braked: Mapping[str, str]
+) -> list[Array]:
+    """Return the kinetic energy v' M v / 2 during a glide with parameters that switch drag off, and with others.
+
+    M is measured: its inverse has the accelerations that loads of 1 N or 1 N m give at rest.
+    """
+    inputs = {v.name: float(v.start or 0.0) for v in subject.variables.values() if v.causality == "input"}
+    velocities = [axis.velocity for axis in axes]
+    rates = [f"der({name})" for name in velocities]
+    begin = {name: f"{0.5 + 0.1 * n:g}" for n, name in enumerate(velocities)}
+    with subject.runs() as child:
+
+        def accelerations(**load: float) -> Any:
+            return child.call("run", Plan(0.0, ((1e-3, inputs | load),), free, rates), 1)[0]
+
+        still = accelerations()
+        mass = np.linalg.inv(np.column_stack([accelerations(**{axis.external: 1.0}) - still for axis in axes]))
+        glides = [
+            child.call("run", Plan(0.0, ((_GLIDE, inputs),), {**parameters, **begin}, velocities), _GLIDE_STEPS)
+            for parameters in (free, braked)
+        ]
+    return [0.5 * np.einsum("ti,ij,tj->t", v, mass, v) for v in glides]
+
+
 # ---- Limits ----------------------------------------------------------------------------------------------------------
 
 
@@ -243,46 +251,42 @@ def limits(subject: Subject) -> Evidence:
     """Ask for what is impossible, and see how the FMU answers."""
     if subject.obstacle:
         return _not(subject.obstacle)
-    found = [(what, _asked(subject, *call)) for what, call in _impossible(subject)]
-    refused = sum(answer.refused == answer.tried for _, answer in found)
-    changed = [what for what, answer in found if answer.kept < answer.refused]
-    accepted = [what for what, answer in found if answer.refused < answer.tried]
-    words = f"{refused} of {len(found)} kinds of impossible values and steps are refused"
-    words += f". Not refused: {listed(accepted)}." if accepted else ", and the old values stay." * (not changed)
-    if changed:
-        words += f"{'.' * (not accepted)} A refusal changes something: {listed(changed)}."
-    if accepted and not subject.is_ours:
+    answers = [(what, _asked(subject, *call)) for what, call in _impossible(subject)]
+    accepted = [what for what, answer in answers if answer.refused < answer.tried]
+    changed = [what for what, answer in answers if answer.kept < answer.refused]
+    share = f"{len(answers) - len(accepted)} of {len(answers)}"
+    words = f"{share} kinds of impossible values and steps are refused"
+    if accepted:
+        words += f". Not refused: {listed(accepted)}."
+    else:
+        words += "." if changed else ", and the old values stay."
+    words += f" A refusal changes something: {listed(changed)}." * bool(changed)
+    if is_free := bool(accepted) and not subject.is_ours:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
-    rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in found]
-    result: Result = "fails" if changed or (accepted and subject.is_ours) else "measured" if accepted else "holds"
-    return Evidence(result, words, f"{refused} of {len(found)}", ("Asked for", "Refused", "Answer"), rows)
+    rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in answers]
+    result: Result = "measured" if is_free and not changed else _is(not (accepted or changed))
+    return Evidence(result, words, share, ("Asked for", "Refused", "Answer"), rows)
 
 
 def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
     """Yield what is impossible in words, with the method of Runs and its argument."""
-    real = [
-        v
-        for v in subject.variables.values()
-        if v.type in ("Real", "Float64", "Float32") and not getattr(v, "dimensions", None)
-    ]
-    inputs = [v.name for v in real if v.causality == "input"]
-    parameters = [v for v in real if v.causality == "parameter"]
-    beyond = [(v.name, value) for v in parameters if (value := _beyond(*subject.bounds[v.name])) is not None]
-    for what, values in (
-        ("an input that is not a number", [(name, nan) for name in inputs]),
-        ("an infinite input", [(name, inf) for name in inputs]),
-        ("a parameter that is not a number", [(v.name, nan) for v in parameters]),
-        ("a parameter beyond its bounds", beyond),
-    ):
+    inputs, parameters = (subject.numbers(causality, REAL) for causality in ("input", "parameter"))
+    beyond = {name: value for name in parameters if (value := _beyond(*subject.bounds[name])) is not None}
+    for what, values in {
+        "an input that is not a number": dict.fromkeys(inputs, nan),
+        "an infinite input": dict.fromkeys(inputs, inf),
+        "a parameter that is not a number": dict.fromkeys(parameters, nan),
+        "a parameter beyond its bounds": beyond,
+    }.items():
         if values:
-            yield what, ("values_tried", values)
+            yield what, ("values_tried", [*values.items()])
     h = subject.step
-    for what, length in (
-        ("a step of 0 s", 0.0),
-        (f"a step of −{h:g} s", -h),
-        ("a step past the stop time", 2.0 * (subject.plan.stop - subject.plan.start)),
-        ("a step that is not a number", nan),
-    ):
+    for what, length in {
+        "a step of 0 s": 0.0,
+        f"a step of −{h:g} s": -h,
+        "a step past the stop time": 2.0 * (subject.plan.stop - subject.plan.start),
+        "a step that is not a number": nan,
+    }.items():
         yield what, ("step_tried", length)
 
 
@@ -308,18 +312,18 @@ def _beyond(low: float, high: float) -> float | None:
 
 def integrity(subject: Subject) -> Evidence:
     """Check the hashes in the FMU and the signature beside it. Raises ProofError if one of them does not fit."""
-    found = check_evidence(subject.path, subject.key)
-    if not (found.files or found.signer):
+    evidence = check_evidence(subject.path, subject.key)
+    if not (evidence.files or evidence.signer):
         return _not("the FMU carries no hashes of its files, and no signature lies beside it")
-    count = len(found.files)
-    if found.signer:
+    count = len(evidence.files)
+    if evidence.signer:
         known = "given with --key" if subject.key else "compare it with the fingerprint that its maker gives"
-        words = f"All {count} files are as they were built; it is signed with the key {found.signer} ({known})."
+        words = f"All {count} files are as they were built; it is signed with the key {evidence.signer} ({known})."
     else:
         words = f"All {count} files match the hashes in the FMU. It is not signed: whoever changed a file may have "
         words += "changed its hash too."
-    rows = [("Program", name, digest) for name, digest in found.generator.items()]
-    rows += [("File read", name, digest) for name, digest in found.inputs.items()]
+    rows = [("Program", name, digest) for name, digest in evidence.generator.items()]
+    rows += [("File read", name, digest) for name, digest in evidence.inputs.items()]
     return Evidence("holds", words, f"{count} files", ("Made from", "Name", "Hash"), rows)
 
 
@@ -330,26 +334,22 @@ def unseen(subject: Subject) -> Evidence:
     and says so itself. The evidence names the axis, with the reasons, and does not count as held.
     """
     paragraphs = card_of(subject).get("How far to trust it", [])
-    errors = [text.removeprefix(_UNSEEN) for text in paragraphs if text.startswith(_UNSEEN)]
-    verdicts = [found.groups() for text in paragraphs if (found := _VERDICT.match(text))]
+    errors, verdicts = (kind.findall("\n".join(paragraphs)) for kind in (_UNSEEN, _VERDICT))
     if not (errors or verdicts):
         known = f": {paragraphs[0].rstrip('.')}" if paragraphs else ""
         return _not(f"the FMU says nothing about errors on unseen data{known}")
-    bad = [(axis, reasons) for axis, word, reasons in verdicts if word == _BAD]
+    bad = {axis: reasons for axis, word, reasons in verdicts if word == _BAD}
     words = f"The model card has the errors of {len(errors)} predictions."
-    figure = ""
+    figure = f"{_BAD} {listed(bad)}" if bad else ""
     if verdicts:
         words += f" Its verdicts: {'; '.join(f'{axis}: {word}' for axis, word, _ in verdicts)}."
-        figure = f"{len(verdicts)} of {len(verdicts)} axes"
-    if bad:
-        words += "".join(f" Do not use {axis}: {reasons}" for axis, reasons in bad)
-        figure = f"{_BAD} {listed(axis for axis, _ in bad)}"
+        figure = figure or f"{len(verdicts)} of {len(verdicts)} axes"
+    words += "".join(f" Do not use {axis}: {reasons}" for axis, reasons in bad.items())
     rows = [tuple(one.rstrip(".").split(": ", 1)) for one in errors]
     return Evidence("holds" if verdicts and not bad else "measured", words, figure, ("Quantity", "Error"), rows)
 
 
 def card_of(subject: Subject) -> dict[str, list[str]]:
     """Return the model card of an FMU of ours, by its headings; an empty one if there is none."""
-    with zipfile.ZipFile(subject.path) as archive:
-        name = "documentation/model_card.txt"
-        return read_card(archive.read(name).decode(errors="replace")) if name in archive.namelist() else {}
+    path = Path(subject.folder, "documentation", "model_card.txt")
+    return read_card(path.read_text(encoding="utf-8", errors="replace")) if path.is_file() else {}

@@ -18,11 +18,11 @@ _WARNING = 1
 """The status `warning` in every version of FMI; more serious ones are greater."""
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 """The name of each status, in every version of FMI."""
-_REAL = ("Real", "Float64", "Float32")
+REAL = ("Real", "Float64", "Float32")
 _WHOLE = ("Integer", "Boolean", "Enumeration", *(f"{u}Int{size}" for u in ("", "U") for size in (8, 16, 32, 64)))
-NUMBERS = (*_REAL, *_WHOLE)
+NUMBERS = (*REAL, *_WHOLE)
 """The types of variables that are numbers, in FMI 2.0 and 3.0."""
-_MESSAGE = [""]
+MESSAGE = [""]
 """The FMU's last warning. It is global, because FMPy passes all messages to the latest logger."""
 
 
@@ -78,26 +78,25 @@ class Runs:
         Every run has an instance of its own. Raises RunError.
         """
         with self._instance(plan) as fmu:
-            read = self._reader(fmu, plan.outputs)
-            rows = [read()]
+            rows = [self._read(fmu, plan.outputs)]
             for t, h in self._steps(fmu, plan, steps):
                 self._step(fmu, t, h)
-                rows.append(read())
+                rows.append(self._read(fmu, plan.outputs))
         return np.array(rows, dtype=np.float64)
 
     def durations(self, plan: Plan, steps: int, most: float) -> list[float]:
         """Return the duration of each step of a run, s. The run begins anew until `most` seconds have passed."""
-        found: list[float] = []
+        durations: list[float] = []
         began = perf_counter()
         while perf_counter() - began < most:
             with self._instance(plan) as fmu:
                 for t, h in self._steps(fmu, plan, steps):
                     begin = perf_counter()
                     self._step(fmu, t, h)
-                    found.append(perf_counter() - begin)
+                    durations.append(perf_counter() - begin)
                     if perf_counter() - began > most:
                         break
-        return found
+        return durations
 
     def _steps(self, fmu: Any, plan: Plan, steps: int) -> Iterator[tuple[float, float]]:
         """Yield the time and the length of each step of a plan, and set the inputs at the beginning of each piece."""
@@ -115,37 +114,40 @@ class Runs:
         words = ""
         with self._instance(plan, initialized=is_input, logging=True) as fmu:
             for name, value in values:
-                read = self._reader(fmu, [name])
-                before = read()
-                status, answer = self._answer(partial(self._set, fmu, {name: value}))
-                if status > _WARNING:
-                    refused += 1
-                    kept += self._is_unchanged(read, before)
-                if status > _WARNING or not refused:
-                    words = answer
+                answer = self._asked(fmu, [name], partial(self._set, fmu, {name: value}))
+                refused, kept = refused + answer.refused, kept + answer.kept
+                if answer.refused or not refused:
+                    words = answer.words
         return Answer(len(values), refused, kept, words)
 
     def step_tried(self, plan: Plan, length: float) -> Answer:
         """Take a step of an impossible length at the start."""
         with self._instance(plan, logging=True) as fmu:
-            read = self._reader(fmu, plan.outputs)
-            before = read()
-            status, words = self._answer(partial(self._step, fmu, plan.start, length))
-            refused = status > _WARNING
-            return Answer(1, int(refused), int(refused and self._is_unchanged(read, before)), words)
+            return self._asked(fmu, plan.outputs, partial(self._step, fmu, plan.start, length))
 
-    def _is_unchanged(self, read: Callable[[], list[float]], before: list[float]) -> bool:
-        """Return True unless values can be read and differ from before. After an error, FMI lets an FMU refuse this."""
-        now: list[float] = []
-        status, _ = self._answer(lambda: now.extend(read()))
-        return status > _WARNING or np.array_equal(now, before, equal_nan=True)
+    def _asked(self, fmu: Any, names: Sequence[str], call: Callable[[], object]) -> Answer:
+        """Return the answer to a call that should change none of these variables.
+
+        After an error, FMI lets an FMU refuse to be read.
+        """
+        before = now = self._read(fmu, names)
+        status, words = self._answer(call)
+        if status <= _WARNING:
+            return Answer(1, 0, 0, words)
+
+        def read() -> None:
+            nonlocal now
+            now = self._read(fmu, names)
+
+        unreadable = self._answer(read)[0] > _WARNING
+        return Answer(1, 1, int(unreadable or np.array_equal(now, before, equal_nan=True)), words)
 
     @staticmethod
     def _answer(call: Callable[[], object]) -> tuple[int, str]:
         """Return the status of a call, and the status in words with the FMU's message."""
         from fmpy.fmi1 import FMICallException
 
-        _MESSAGE[0], status = "", 0
+        MESSAGE[0], status = "", 0
         try:
             call()
         except FMICallException as error:
@@ -153,7 +155,7 @@ class Runs:
         except RunError as error:
             return 2, str(error)
         word = _STATUS[status] if status < len(_STATUS) else f"status {status}"
-        return status, brief(f"{word}: {_MESSAGE[0]}" if _MESSAGE[0] and status > _WARNING else word, 200)
+        return status, brief(f"{word}: {MESSAGE[0]}" if MESSAGE[0] and status > _WARNING else word, 200)
 
     @contextmanager
     def _instance(self, plan: Plan, *, initialized: bool = True, logging: bool = False) -> Iterator[Any]:
@@ -161,10 +163,12 @@ class Runs:
         from fmpy.fmi1 import FMICallException
         from fmpy.simulation import apply_start_values, instantiate_fmu
 
-        _MESSAGE[0] = ""
+        MESSAGE[0] = ""
         fmu = None
         try:
-            fmu = instantiate_fmu(self._folder, self._description, "CoSimulation", debug_logging=logging, logger=_keep)
+            fmu = instantiate_fmu(
+                self._folder, self._description, "CoSimulation", debug_logging=logging, logger=keep_message
+            )
             if self._version == "2":
                 fmu.setupExperiment(startTime=plan.start, stopTime=plan.stop)
             apply_start_values(fmu, self._description, dict(plan.parameters))
@@ -174,13 +178,9 @@ class Runs:
             if initialized:
                 fmu.exitInitializationMode()
             yield fmu
-        except FMICallException as error:
-            message = f"; the FMU: {_MESSAGE[0]}" if _MESSAGE[0] else ""
-            raise RunError(brief(f"{str(error).rstrip('.')}{message}", 240)) from error
-        except RunError:
-            raise
         except Exception as error:  # FMPy raises that itself
-            raise RunError(brief(str(error).replace(self._folder, "").rstrip("."), 240)) from error
+            message = f"; the FMU: {MESSAGE[0]}" if isinstance(error, FMICallException) and MESSAGE[0] else ""
+            raise RunError(brief(f"{str(error).replace(self._folder, '').rstrip('.')}{message}", 240)) from error
         finally:
             if fmu is not None and fmu.component is not None:
                 if initialized:
@@ -189,31 +189,20 @@ class Runs:
                 # The library stays loaded, because loading one again has crashed processes.
                 getattr(fmu, f"fmi{self._version}FreeInstance")(fmu.component)
 
+    def _read(self, fmu: Any, names: Sequence[str]) -> list[float]:
+        return [float(self._function(fmu, "get", name)()[0]) for name in names]
+
     def _set(self, fmu: Any, values: Mapping[str, float]) -> None:
         for name, value in values.items():
-            variable = self._variables[name]
-            number = value if variable.type in _REAL else int(value)
-            getattr(fmu, f"set{self._function(variable)}")([variable.valueReference], [number])
+            number = value if self._variables[name].type in REAL else int(value)
+            self._function(fmu, "set", name)([number])
 
-    def _reader(self, fmu: Any, names: Sequence[str]) -> Callable[[], list[float]]:
-        """Return a function that reads variables."""
-        groups: dict[str, list[Any]] = {}
-        for name in names:
-            groups.setdefault(self._function(self._variables[name]), []).append(self._variables[name])
-        calls = [(getattr(fmu, f"get{key}"), [v.valueReference for v in some]) for key, some in groups.items()]
-        order = [v.name for some in groups.values() for v in some]
-        places = [order.index(name) for name in names]
-
-        def read() -> list[float]:
-            values = [float(value) for get, references in calls for value in get(references)]
-            return [values[place] for place in places]
-
-        return read
-
-    def _function(self, variable: Any) -> str:
-        """Return the end of the name of the functions that read and set a variable."""
+    def _function(self, fmu: Any, verb: str, name: str) -> Callable[..., Any]:
+        """Return the function that gets or sets a variable, which may be called with its value."""
+        variable = self._variables[name]
         of_enumeration = {"2": "Integer", "3": "Int64"}[self._version]
-        return of_enumeration if variable.type == "Enumeration" else str(variable.type)
+        kind = of_enumeration if variable.type == "Enumeration" else variable.type
+        return partial(getattr(fmu, f"{verb}{kind}"), [variable.valueReference])
 
     @staticmethod
     def _step(fmu: Any, t: float, h: float) -> None:
@@ -222,8 +211,8 @@ class Runs:
             raise RunError(f"the FMU ended the run at {returned[3]:.6g} s")
 
 
-def _keep(*arguments: Any) -> None:
+def keep_message(*arguments: Any) -> None:
     """Keep a warning. The last three arguments of a logger are the same in every version of FMI."""
     status, _, text = arguments[-3:]
     if status >= _WARNING:
-        _MESSAGE[0] = (text or b"").decode(errors="replace")
+        MESSAGE[0] = (text or b"").decode(errors="replace")

@@ -1,8 +1,9 @@
-"""The FMU of which claims are checked: what it has, and the simulation that the measurements repeat."""
+"""The FMU that is proved: what it has, and the simulation that the measurements repeat."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from math import inf
 from pathlib import Path
@@ -19,12 +20,16 @@ from rov_fmu.fmu.experiments import (
     NoResultsError,
     ReferenceResults,
 )
-from rov_fmu.fmu.proof import DISK, MEMORY, TIME_LIMIT, check_binary
 from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.child_process import ChildProcess, Limits
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError
 
+TIME_LIMIT = 60.0
+"""The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
+MEMORY, DISK = 4_000_000_000, 1_000_000_000
+"""The address space of the process of an FMU and the size of each file that it writes, in bytes (Linux)."""
 _TOOL = "rov-fmu "
 """The beginning of the generation tool of our FMUs."""
 
@@ -39,29 +44,34 @@ class Subject:
     """FMPy's description of the FMU."""
     experiments: list[Experiment]
     """None if the FMU carries no expected results."""
-    interface: str | None = None
-    tolerance: float | None = None
-    time_limit: float = TIME_LIMIT
-    key: Path | None = None
+    interface: str | None
+    """The name of one of INTERFACES; None for the first of these that the FMU has."""
+    tolerance: float | None
+    """The relative tolerance of results in place of those of the experiments, or None."""
+    time_limit: float
+    key: Path | None
     """The file of the public key that must have signed the FMU; None if any key may have."""
-    variables: Mapping[str, Any] = field(init=False)
-    """FMPy's variables by name."""
 
-    def __post_init__(self) -> None:
-        """Collect the variables."""
-        object.__setattr__(self, "variables", {v.name: v for v in self.description.modelVariables})
+    @cached_property
+    def variables(self) -> dict[str, Any]:
+        """FMPy's variables by name."""
+        return {v.name: v for v in self.description.modelVariables}
 
-    @property
+    def numbers(self, causality: str, types: Collection[str] = NUMBERS) -> list[str]:
+        """Return the names of the variables of a causality that are single numbers of some types."""
+        own = [v for v in self.variables.values() if v.causality == causality and v.type in types]
+        return [v.name for v in own if not getattr(v, "dimensions", None)]
+
+    @cached_property
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The least and the largest value of each variable, by name. FMPy does not read those of FMI 3.0."""
         root = etree.parse(str(Path(self.folder, "modelDescription.xml"))).getroot()
         types = {one.get("name"): _attributes(one) for one in root.iterfind("TypeDefinitions/*")}
-        found = {}
-        for variable in root.iterfind("ModelVariables/*"):
-            own = _attributes(variable)
+        bounds = {}
+        for own in map(_attributes, root.iterfind("ModelVariables/*")):
             given = types.get(own.get("declaredType"), {}) | own
-            found[own["name"]] = float(given.get("min", -inf)), float(given.get("max", inf))
-        return found
+            bounds[own["name"]] = float(given.get("min", -inf)), float(given.get("max", inf))
+        return bounds
 
     @property
     def is_ours(self) -> bool:
@@ -78,15 +88,17 @@ class Subject:
             return "it has no Co-Simulation"
         return "" if self.plan.outputs else "it has no output that is a number"
 
+    def _default(self, key: str) -> float:
+        """Return an attribute of the default experiment, or 0 if the FMU does not have it."""
+        return float(getattr(self.description.defaultExperiment, key, None) or 0.0)
+
     @property
     def step(self) -> float:
         """The communication step of the default experiment, s."""
-        default = self.description.defaultExperiment
-        given = float(getattr(default, "stepSize", None) or 0.0)
-        length = self.plan.stop - self.plan.start
+        given, length = self._default("stepSize"), self.plan.stop - self.plan.start
         return given if length / MOST_STEPS < given <= length else length / DEFAULT_STEPS
 
-    @property
+    @cached_property
     def experiment(self) -> Experiment | None:
         """The experiment with the most inputs that are held between steps, or None."""
         held = [x for x in self.experiments if x.stimuli and _pieces(x)]
@@ -95,22 +107,16 @@ class Subject:
     @property
     def allowed(self) -> float:
         """The relative tolerance of results."""
-        given = getattr(self.description.defaultExperiment, "tolerance", None)
-        own = self.experiment.tolerance if self.experiment else float(given or DEFAULT_TOLERANCE)
-        return self.tolerance or own
+        own = self.experiment.tolerance if self.experiment else self._default("tolerance")
+        return self.tolerance or own or DEFAULT_TOLERANCE
 
-    @property
+    @cached_property
     def plan(self) -> Plan:
         """The simulation to repeat: an experiment, or the default experiment with the inputs at their start values."""
-        outputs = tuple(
-            v.name
-            for v in self.variables.values()
-            if v.causality == "output" and v.type in NUMBERS and not getattr(v, "dimensions", None)
-        )
+        outputs = self.numbers("output")
         if experiment := self.experiment:
             return Plan(experiment.start, _pieces(experiment), dict(experiment.parameters), outputs)
-        default = self.description.defaultExperiment
-        start, stop = (float(getattr(default, key, None) or 0.0) for key in ("startTime", "stopTime"))
+        start, stop = self._default("startTime"), self._default("stopTime")
         return Plan(start, ((stop if stop > start else start + 1.0, {}),), {}, outputs)
 
     @property
@@ -120,10 +126,10 @@ class Subject:
         return f"the {name} ({self.plan.stop - self.plan.start:.3g} s)"
 
     @contextmanager
-    def runs(self, time: float | None = None) -> Iterator[ChildProcess]:
+    def runs(self, time: float | None = None, kind: type[Runs] = Runs) -> Iterator[ChildProcess]:
         """Yield a child process with the FMU, whose calls are limited in time. Raises ChildError."""
         limits = Limits(time=time or self.time_limit, memory=MEMORY, disk=DISK)
-        with closing(ChildProcess(Runs, self.folder, limits=limits)) as child:
+        with closing(ChildProcess(kind, self.folder, limits=limits)) as child:
             yield child
 
 
@@ -134,19 +140,29 @@ def opened(
     tolerance: float | None = None,
     time_limit: float = TIME_LIMIT,
     key: Path | None = None,
+    *,
+    needs_results: bool = False,
 ) -> Iterator[Subject]:
-    """Unpack an FMU of any exporter for a while. Raises FileError."""
+    """Unpack an FMU of any exporter for a while. Raises FileError.
+
+    With `needs_results`, it raises NoResultsError, a FileError, if the FMU carries no expected results.
+    """
+    import fmpy
+
     check_suffix(fmu, FMU)
+    accepted = suppress(*([] if needs_results else [NoResultsError]))
     experiments: list[Experiment] = []
     with temporary_folder("fmu-") as folder:
-        try:
-            results: ReferenceResults | None = ReferenceResults(fmu)
-        except NoResultsError:
-            results = None
+        results = None
+        with accepted:
+            results = ReferenceResults(fmu)
         description = unpack_fmu(fmu, fmu, Path(folder))
-        check_binary(fmu, folder)
-        with suppress(NoResultsError):
+        with accepted:
             experiments = results.experiments(description) if results else []
+        platforms = fmpy.supported_platforms(folder)
+        if fmpy.platform not in platforms:
+            has = ", ".join(platforms) or "none"
+            raise FileError(f"{fmu}: has no binary for this machine ({fmpy.platform}): {has}")
         yield Subject(fmu, folder, description, experiments, interface, tolerance, time_limit, key)
 
 
@@ -158,14 +174,13 @@ def _attributes(element: Any) -> dict[str, str]:
 def _pieces(experiment: Experiment) -> tuple[tuple[float, Mapping[str, float]], ...]:
     """Return the times up to which the inputs of an experiment are held; none if an input is a ramp."""
     assert experiment.stimuli
-    times, *columns = (list(map(float, values)) for values in experiment.stimuli.values())
-    names = [*experiment.stimuli][1:]
-    rows = list(zip(times, zip(*columns, strict=True), strict=True))
+    _, *names = experiment.stimuli
+    rows = [(time, dict(zip(names, row, strict=True))) for time, *row in zip(*experiment.stimuli.values(), strict=True)]
     pieces = []
     for (before, held), (after, then) in pairwise([*rows, (experiment.stop, rows[-1][1])]):
         end = min(after, experiment.stop)
         if end > max(before, experiment.start):
             if held != then:
                 return ()
-            pieces.append((end, dict(zip(names, held, strict=True))))
+            pieces.append((end, held))
     return tuple(pieces)

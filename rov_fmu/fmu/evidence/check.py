@@ -42,14 +42,14 @@ def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
     fit; FileError if a file cannot be read; InputError if there is a signature and no library to check it.
     """
     check_suffix(fmu, FMU)
-    found = MetaData()
+    evidence = MetaData()
     try:
         with zipfile.ZipFile(fmu) as archive:
             if reason := refusal(archive):
                 raise FileError(f"{fmu}: {reason}")
             if META_DATA in archive.namelist():
-                found = _read(fmu, archive)
-                if found != MetaData() and (change := next(_changes(archive, found.files), "")):
+                evidence = _read(fmu, archive)
+                if evidence != MetaData() and (change := next(_changes(archive, evidence.files), "")):
                     raise ProofError(f"{fmu}: {change}")
     except FileNotFoundError as error:
         raise FileError(f"{fmu}: {NO_FILE}") from error
@@ -57,7 +57,7 @@ def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
         raise
     except Exception as error:  # zipfile raises many kinds on damaged archives
         raise FileError(f"{fmu}: is not an FMU, or is damaged: {brief(str(error))}") from error
-    return replace(found, signer=check_signature(fmu, key))
+    return replace(evidence, signer=check_signature(fmu, key))
 
 
 def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
@@ -90,8 +90,8 @@ def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str
             yield f"{shown(name)} is missing; it was there when the FMU was built"
         elif name not in files and name != META_DATA:
             yield f"{shown(name)} was added after the FMU was built"
-        elif (found := _hash(archive, name)) != (given := files.get(name, "unknown")):
-            differs = f"its SHA3-256 is {found[:16]}…, and was {given[:16]}…" if found else "it is damaged"
+        elif (digest := _hash(archive, name)) != (given := files.get(name, "unknown")):
+            differs = f"its SHA3-256 is {digest[:16]}…, and was {given[:16]}…" if digest else "it is damaged"
             yield f"{shown(name)} was altered after the FMU was built: {differs}"
 
 

@@ -29,27 +29,15 @@ _SOURCES = (".py", ".c", ".h", ".js", ".j2")
 
 def meta_data(vehicle: Vehicle, files: Mapping[str, bytes]) -> bytes:
     """Return the document for an FMU that has these other files. The same files give the same bytes."""
-    made = vehicle.provenance
+    made, generator = vehicle.provenance, f"rov-fmu {__version__}"
+    hashes = [(name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())]
     classifications = {
-        FILES: [
-            *((name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())),
-            (META_DATA, _ZEROS),
-        ],
+        FILES: [*hashes, (META_DATA, _ZEROS)],
         INPUTS: [(name, f"{made.hash}: {digest}") for name, digest in made.inputs.items()] if made else [],
-        GENERATOR: [(f"rov-fmu {__version__}", generator_hash())],
+        GENERATOR: [(generator, generator_hash())],
     }
-    head = {
-        "name": vehicle.name,
-        "description": vehicle.summary,
-        "author": vehicle.source,
-        "fileversion": vehicle.version,
-        "generationTool": f"rov-fmu {__version__}",
-    }
-    document = render(
-        "resourceMetaData.srmd.j2",
-        head=head,
-        classifications={name: entries for name, entries in classifications.items() if entries},
-    ).encode()
+    given = {"vehicle": vehicle, "generator": generator, "classifications": classifications}
+    document = render("resourceMetaData.srmd.j2", **given).encode()
     return _with_own_hash(document, own_hash(document))
 
 
@@ -65,10 +53,10 @@ def _with_own_hash(document: bytes, digest: str) -> bytes:
 @cache
 def generator_hash() -> str:
     """Return the SHA3-256 of the program: of the names and the contents of its files, in the order of their names."""
-    found = sha3_256()
+    digest = sha3_256()
     for name, content in sorted(_program()):
-        found.update(name.encode() + b"\0" + content + b"\0")
-    return found.hexdigest()
+        digest.update(name.encode() + b"\0" + content + b"\0")
+    return digest.hexdigest()
 
 
 def _program() -> Iterator[tuple[str, bytes]]:

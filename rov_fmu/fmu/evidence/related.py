@@ -40,9 +40,9 @@ class Related:
     description: str
 
 
-def manifest(related: Iterable[Related]) -> bytes:
-    """Return fmi-ls-manifest.xml."""
-    return render("fmi-ls-manifest.xml.j2", related=[vars(one) for one in related]).encode()
+def manifest(vehicle: Vehicle, related: Iterable[Related]) -> bytes:
+    """Return fmi-ls-manifest.xml, which names these files, the documentation and the meta-data."""
+    return render("fmi-ls-manifest.xml.j2", vehicle=vehicle, related=related, meta_data=META_DATA).encode()
 
 
 def origin(vehicle: Vehicle) -> tuple[dict[str, bytes], list[Related]]:
@@ -68,13 +68,6 @@ def origin(vehicle: Vehicle) -> tuple[dict[str, bytes], list[Related]]:
     if vehicle.uncertainty.names:
         words = "Standard errors and covariance of the identified coefficients"
         add(COVARIANCE, covariance(vehicle).encode(), "result", "text/csv", words)
-    roles.append(Related("../../documentation/model_card.txt", "report", "text/plain", "Model card"))
-    if vehicle.provenance and vehicle.provenance.report:
-        source = "../../documentation/identification.html"
-        roles.append(Related(source, "report", "text/html", "Report of the identification"))
-    roles.append(Related("../../documentation/index.html", "document", "text/html", "Documentation"))
-    words = "Hashes of the files, of what they were made from, and of the program"
-    roles.append(Related(f"../../{META_DATA}", "meta-data", "application/x-srmd-meta-data", words))
     return files, roles
 
 
@@ -146,10 +139,10 @@ def ends_of_intervals(vehicle: Vehicle) -> Iterator[tuple[str, str, Mapping[str,
 
 def _moved(known: Uncertainty, scores: Sequence[float]) -> dict[str, float]:
     """Return the coefficients that differ from those of the vehicle by some standard errors each."""
-    found = {}
+    coefficients = {}
     for n, (name, score) in enumerate(zip(known.names, scores, strict=True)):
         value, shift, (low, high) = float(known.values[n]), score * float(known.errors[n]), known.bounds[n]
         moved = value * exp(shift / value) if is_factor(name) and value > 0.0 else value + shift
         if score:
-            found[name] = float(format(min(max(moved, float(low)), float(high)), _DIGITS))
-    return found
+            coefficients[name] = float(format(min(max(moved, float(low)), float(high)), _DIGITS))
+    return coefficients

@@ -109,9 +109,9 @@ def check_signature(fmu: Path, key: Path | None = None) -> str:
 
     public, signature = _read(path)
     with fmu.open("rb") as file:
-        found = hash_of(file, _HASH.decode())
+        digest = hash_of(file, _HASH.decode())
     try:
-        Ed25519PublicKey.from_public_bytes(public).verify(signature, _message(found))
+        Ed25519PublicKey.from_public_bytes(public).verify(signature, _message(digest))
     except (InvalidSignature, ValueError) as error:
         reason = "the FMU was altered or built again after it was signed"
         raise ProofError(f"{fmu}: the signature {path} does not fit: {reason}") from error
