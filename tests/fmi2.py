@@ -61,15 +61,17 @@ class Instance(fmi.Instance[Fmu]):
     def setup(self, start: float = 0.0, stop: float | None = None) -> int:
         return self.call("fmi2SetupExperiment", 0, 0.0, start, stop is not None, stop or 0.0)
 
-    def initialize(self, start: float = 0.0, stop: float | None = None) -> int:
-        status = self.setup(start, stop)
-        return status if status != OK else self.call("fmi2EnterInitializationMode")
+    def initialize(self, start: float = 0.0, stop: float | None = None, status: int = OK) -> int:
+        if self.setup(start, stop) != OK:
+            assert status != OK, self.log
+            return status
+        return self.expect("fmi2EnterInitializationMode", status=status)
 
     def update(self) -> None:
         self.expect("fmi2NewDiscreteStates", ctypes.byref(fmi2EventInfo()))
 
-    def step(self, t: float, h: float) -> int:
-        return self.call("fmi2DoStep", t, h, 1)
+    def step(self, t: float, h: float, status: int = OK) -> int:
+        return self.expect("fmi2DoStep", t, h, 1, status=status)
 
     def time(self) -> float:
         value = room()

@@ -25,7 +25,7 @@ from rov_fmu.c.compile import compiler, fmi_headers
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests import fmi2, fmi3
-from tests.fmi import OK, Fmu, reals
+from tests.fmi import Fmu, reals
 
 _EXPORT = "#if defined _WIN32"  # begins the definition of FMI2_Export in FMPy's header
 _NAME = "#define fmi2FullName(name) name"
@@ -114,9 +114,9 @@ def _values(fmu: Fmu, steps: int = 400) -> bytes:
         for _ in range(steps):
             chosen = drawn.sample(fmu.inputs, 4)
             values = {name: drawn.choice((0.0, drawn.uniform(-1.2, 1.2))) for name in chosen}
-            assert rov.set(values | {"beta_r": drawn.uniform(0.5, 2.0)}) == OK
+            rov.set(values | {"beta_r": drawn.uniform(0.5, 2.0)})
             h = 10.0 ** drawn.uniform(-4.0, 1.5)
-            assert rov.step(t, h) == OK
+            rov.step(t, h)
             t += h
             result += bytes(reals(*rov.get([name for name in fmu.variables if name != "time"])))
     return result

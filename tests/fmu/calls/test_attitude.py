@@ -14,7 +14,6 @@ from tests import fmi3
 from tests.fmi import (
     CONTINUOUS,
     DISCARD,
-    ERROR,
     INITIALIZATION,
     MODEL_EXCHANGE,
     OK,
@@ -68,9 +67,9 @@ def heading(psi: float) -> dict[str, float]:
 def test_the_attitude_begins_at_its_parameters(fmu: Fmu) -> None:
     with fmu.instance() as rov:
         assert rov.get(QUATERNION) == [1.0, 0.0, 0.0, 0.0]
-        assert rov.set(START) == OK
+        rov.set(START)
         assert rov.get(ANGLES) == pytest.approx([*START.values()], abs=1e-15)
-        assert rov.set({"psi_0": -9.0}) == OK
+        rov.set({"psi_0": -9.0})
         rov.reach(STEP)
         assert rov.get(ANGLES) == pytest.approx([0.3, -0.8, -9.0], abs=1e-15)
         rov.expect("Reset")
@@ -86,12 +85,12 @@ def test_a_quaternion_before_the_start_is_a_guess_that_the_angles_replace(fmu: F
     with fmu.instance() as rov, fmu.instance() as usual:
         for _ in range(2):  # again after a reset
             assert rov.set(dict.fromkeys(QUATERNION, 0.0)) == OK  # by CasADi
-            assert rov.set({**START, "eta": 0.5}) == OK
-            assert rov.set({"epsilon_2": 2.0}) == OK
+            rov.set({**START, "eta": 0.5})
+            rov.set({"epsilon_2": 2.0})
             (warning,) = [m.text for m in rov.log if m.status == WARNING]
             assert "eta = 0 is replaced by 1, because phi_0, theta_0 and psi_0 determine" in warning
-            assert rov.set({"eta": float("nan")}) == DISCARD
-            assert usual.set(START) == OK
+            rov.set({"eta": float("nan")}, DISCARD)
+            usual.set(START)
             assert rov.save() == usual.save()
             for instance in (rov, usual):
                 instance.reach(STEP)
@@ -113,7 +112,7 @@ def test_steps_are_those_of_python(fmu: Fmu) -> None:
             rov.start({**SIX.coefficients, **inputs, **state, **START})
             expected = states(rov) | {"psi": START["psi_0"]}
             for n in range(5):
-                assert rov.step(0.3 * n, 0.3) == OK
+                rov.step(0.3 * n, 0.3)
                 expected = SIX.step(inputs, expected, 0.3)
             assert rov.get([*expected]) == pytest.approx([*expected.values()], rel=1e-13, abs=1e-13)
 
@@ -129,11 +128,11 @@ def test_a_saved_state_continues_with_the_same_bits_and_turns(fmu: Fmu) -> None:
         saved, turned = rov.save(), rov.get(["psi"])[0]
         assert turned - 8.0 > 4.0 * pi
         rest = spins(rov, (20, 30))
-        assert another.load(saved) == OK
+        another.load(saved)
         assert another.get(["psi"]) == [turned]
         assert another.save() == saved
         assert spins(another, (20, 30)) == rest
-        assert rov.load(saved) == OK
+        rov.load(saved)
         assert spins(rov, (20, 30)) == rest
 
 
@@ -142,7 +141,7 @@ def test_a_saved_state_continues_with_the_same_bits_and_turns(fmu: Fmu) -> None:
 
 def test_turns_are_counted_only_when_an_integrator_completes_a_step(fmu: Fmu) -> None:
     with fmu.instance(MODEL_EXCHANGE) as rov:
-        assert rov.set({"psi_0": 3.0}) == OK
+        rov.set({"psi_0": 3.0})
         rov.reach(CONTINUOUS)
         at = states(rov)
         for psi in (4.0, 5.0, 6.0, 3.0):  # tried by a solver
@@ -220,7 +219,7 @@ def test_directional_derivatives_at_the_start_include_the_angles(fmu: Fmu, point
         point = {name: (float(fmu.variables[name].start) or 0.5) * rng.uniform(0.7, 1.3) for name in knowns(fmu)}
         point |= {name: rng.uniform(-0.9, 0.9) for name in fmu.commands}
         with fmu.instance() as rov:
-            assert rov.set(point) == OK
+            rov.set(point)
             rov.reach(INITIALIZATION)
             for known in point:
                 check_slopes(rov, point, known)
@@ -243,7 +242,7 @@ def test_directional_derivatives_while_moving_are_the_slopes_of_the_equations(fm
         with fmu.instance(MODEL_EXCHANGE) as rov:
             rov.start(SIX.coefficients)
             rov.expect("EnterContinuousTimeMode")
-            assert rov.set(motion) == OK
+            rov.set(motion)
             for known in motion:
                 check_slopes(rov, {**motion, **SIX.coefficients}, known)
 
@@ -262,9 +261,9 @@ def test_output_derivatives_are_the_rates_of_the_outputs(fmu: Fmu) -> None:
 
 def test_a_mass_matrix_that_is_not_positive_definite_is_refused(fmu: Fmu) -> None:
     with fmu.instance() as rov:
-        assert rov.set({"m_a_uq": 1e4}) == OK
-        assert rov.initialize() == OK
-        assert rov.call("ExitInitializationMode") == ERROR
+        rov.set({"m_a_uq": 1e4})
+        rov.initialize()
+        rov.refuse("ExitInitializationMode")
         assert "the mass matrix of these parameters is not positive definite" in rov.log[-1].text
-        assert rov.set({"m_a_uq": 0.0}) == OK
+        rov.set({"m_a_uq": 0.0})
         rov.expect("ExitInitializationMode")

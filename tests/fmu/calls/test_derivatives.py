@@ -12,13 +12,11 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi3
 from tests.fmi import (
     CO_SIMULATION,
-    ERROR,
     EVERY_MODE,
     INITIALIZATION,
     INSTANTIATED,
     MODEL_EXCHANGE,
     MODES,
-    OK,
     STEP,
     AnyInstance,
     Fmu,
@@ -86,7 +84,7 @@ def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
 
 
 def bring(rov: AnyInstance, mode: str, point: dict[str, float]) -> None:
-    assert rov.set(point) == OK
+    rov.set(point)
     rov.reach(mode)
 
 
@@ -206,7 +204,7 @@ def test_the_numbers_of_seeds_and_sensitivities_must_match_the_variables(fmu3: f
         rov.start({"u": 0.5, "r": 0.2})
         for seeds, sensitivities in [(n_seed - 1, 5 - n_seed), (n_seed, 4 - n_seed), (0, 0)]:
             found = room(5 - n_seed)
-            assert rov.call(function, *arguments, reals(1.0, 2.0, 3.0), seeds, found, sensitivities) == ERROR
+            rov.refuse(function, *arguments, reals(1.0, 2.0, 3.0), seeds, found, sensitivities)
             assert list(found) == list(room(5 - n_seed))
             assert f"it takes {n_seed} and {5 - n_seed}" in rov.log[-1].text
         rov.expect(function, *arguments, reals(1.0, 2.0, 3.0), n_seed, found, 5 - n_seed)
