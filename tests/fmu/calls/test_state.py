@@ -78,7 +78,8 @@ def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> N
 
 
 _ELSEWHERE = """
-import sys; from pathlib import Path; from tests.fmu.calls.test_state import WRAPPERS, run
+import sys; from pathlib import Path; from tests.fmu.calls.conftest import WRAPPERS
+from tests.fmu.calls.test_state import run
 with WRAPPERS[int(sys.argv[3])](Path(sys.argv[1])).instance(name='elsewhere') as rov:
     rov.load(Path(sys.argv[2]).read_bytes())
     sys.stdout.write(run(rov, 10, 20).hex())
