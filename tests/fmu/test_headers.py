@@ -180,26 +180,6 @@ def test_a_shared_library_has_plain_names_and_gives_the_same_values(
     assert _values(type(fmu)(fmu.folder, library)) == shipped
 
 
-@pytest.mark.parametrize(
-    ("release", "is_requested"),
-    [
-        ("2.0.4", False),
-        pytest.param("2.0.0", True, marks=pytest.mark.long),
-        pytest.param("3.0", False, marks=pytest.mark.long),
-        *(pytest.param(release, True, marks=pytest.mark.weekly) for release in ("2.0.1", "2.0.4", "3.0")),
-    ],
-)
-def test_the_exports_of_a_static_library_have_a_prefix(
-    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, is_requested: bool
-) -> None:
-    """Some headers add it unless they are told not to; all of them do when it is requested."""
-    fmu = fmus[_version(release)]
-    request = [f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"] * is_requested
-    library = _compile(fmu, headers[release], [*COMPILERS[_NAMES[-1]], "-O0", *request], tmp_path / "a.so")
-    prefix = "videoray_" if is_requested or release in _PLAIN else ""
-    assert _exports(library) == {f"{prefix}{name}" for name in _exports(fmu.library)}
-
-
 _MAIN = r"""
 #include "fmi2FunctionTypes.h"
 #include "fmi3FunctionTypes.h"

@@ -8,6 +8,7 @@ from typing import Any
 
 import fmpy
 import pytest
+from fmpy.validation import validate_model_description
 from lxml import etree
 
 import rov_fmu
@@ -17,13 +18,14 @@ from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.variables import variables
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.fmi import CO_SIMULATION, INTERFACES, MODEL_EXCHANGE
 from tests.fmu.calls.conftest import WRAPPERS
-from tests.vehicles import SIX, VEHICLES, a_vehicle
+from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, a_vehicle, pulsed
 
-ROVS = VEHICLES | {"six axes": SIX}
+ROVS = VEHICLES | {"six axes": SIX, "dead time": load_vehicle(THRUST_EFFECTS)}
+ROVS["pulse widths"] = pulsed(ROVS["dead time"], (1100.0, 1480.0, 1900.0))
 
 SCHEMAS = Path(fmpy.__file__).with_name("schema")
 TIME = {
@@ -141,8 +143,12 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("kind", ROVS)
-def test_the_description_follows_its_schema(kind: str, fmi: int) -> None:
-    check_schema(described(ROVS[kind], fmi), f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
+def test_the_description_follows_its_schema_and_the_rules_of_fmpy(kind: str, fmi: int, tmp_path: Path) -> None:
+    document = described(ROVS[kind], fmi)
+    check_schema(document, f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
+    (tmp_path / "modelDescription.xml").write_bytes(etree.tostring(document))
+    description = fmpy.read_model_description(str(tmp_path), validate=False)
+    assert validate_model_description(description, validate_variable_names=True, validate_model_structure=True) == []
 
 
 def test_the_build_description_follows_its_schema_and_names_the_file_to_compile() -> None:
@@ -153,29 +159,37 @@ def test_the_build_description_follows_its_schema_and_names_the_file_to_compile(
     assert [file.get("name") for file in document.iter("SourceFile")] == ["fmu.c"]
 
 
-def test_fmi_3_declares_its_capabilities() -> None:
+SAVED = {"canGetAndSetFMU{0}tate": "true", "canSerializeFMU{0}tate": "true", "providesDirectionalDerivative{1}": "true"}
+CAN = {
+    2: (
+        SAVED | {"canNotUseMemoryManagementFunctions": "true"},
+        {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"},
+    ),
+    3: (
+        SAVED | {"providesAdjointDerivatives": "true"},
+        {
+            "canHandleVariableCommunicationStepSize": "true",
+            "maxOutputDerivativeOrder": "1",
+            "providesIntermediateUpdate": "true",
+            "mightReturnEarlyFromDoStep": "true",
+            "canReturnEarlyAfterIntermediateUpdate": "true",
+            "hasEventMode": "true",
+        },
+    ),
+}
+"""The capabilities of both interfaces, and further ones of Co-Simulation, by the version of FMI."""
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_declares_its_capabilities(fmi: int) -> None:
     """A capability that is missing is false."""
-    root = described(VEHICLES["VideoRay"], 3)
-    assert root.get("fmiVersion") == "3.0"
-    assert root.get("instantiationToken") == "{1}"
-    both = {
-        "modelIdentifier": "an_rov",
-        "canGetAndSetFMUState": "true",
-        "canSerializeFMUState": "true",
-        "providesDirectionalDerivatives": "true",
-        "providesAdjointDerivatives": "true",
-    }
-    stepped = {
-        "canHandleVariableCommunicationStepSize": "true",
-        "maxOutputDerivativeOrder": "1",
-        "providesIntermediateUpdate": "true",
-        "mightReturnEarlyFromDoStep": "true",
-        "canReturnEarlyAfterIntermediateUpdate": "true",
-        "hasEventMode": "true",
-    }
-    for interface, can in {"ModelExchange": both, "CoSimulation": both | stepped}.items():
+    root = described(VEHICLES["VideoRay"], fmi)
+    assert root.get("fmiVersion") == f"{fmi}.0"
+    assert root.get("instantiationToken" if fmi == 3 else "guid") == "{1}"
+    both = {key.format(*(("s", "") if fmi == 2 else ("S", "s"))): value for key, value in CAN[fmi][0].items()}
+    for interface, more in {"ModelExchange": {}, "CoSimulation": CAN[fmi][1]}.items():
         declared = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
-        assert declared == can
+        assert declared == {"modelIdentifier": "an_rov"} | both | more
     assert root.find("ScheduledExecution") is None
 
 

@@ -6,8 +6,6 @@ from ctypes import c_bool, c_int, pointer
 from math import cos, pi, sin
 
 import pytest
-from fmpy import read_model_description
-from fmpy.validation import validate_model_description
 
 from tests.fmi import (
     CONTINUOUS,
@@ -32,11 +30,6 @@ SPIN = {"p": 0.3, "q": -0.2, "r": 4.0}
 
 
 fmu = of_both_versions("six_dir", "six3_dir", is_two_long=True)
-
-
-def test_the_description_is_valid(fmu: Fmu) -> None:
-    description = read_model_description(str(fmu.folder), validate=False)
-    assert validate_model_description(description, validate_variable_names=True, validate_model_structure=True) == []
 
 
 def complete(rov: AnyInstance, status: int = OK) -> None:
@@ -95,22 +88,6 @@ def test_a_quaternion_before_the_start_is_a_guess_that_the_angles_replace(fmu: F
             for instance in (rov, usual):
                 instance.expect("Reset")
                 instance.log.clear()
-
-
-def test_steps_are_those_of_python(fmu: Fmu) -> None:
-    rng = random.Random(4)
-    for _ in range(5):
-        inputs, state = (
-            random_inputs(rng, SIX),
-            {name: x for name, x in random_state(rng, SIX).items() if name not in QUATERNION},
-        )
-        with fmu.instance() as rov:
-            rov.start({**SIX.coefficients, **inputs, **state, **START})
-            expected = states(rov) | {"psi": START["psi_0"]}
-            for n in range(5):
-                rov.step(0.3 * n, 0.3)
-                expected = SIX.step(inputs, expected, 0.3)
-            assert rov.get([*expected]) == pytest.approx([*expected.values()], rel=1e-13, abs=1e-13)
 
 
 def spins(rov: AnyInstance, steps: Sequence[int]) -> bytes:

@@ -170,17 +170,6 @@ def test_directional_derivatives_are_the_same_in_every_mode(fmu: Fmu, kind: int,
                 assert later.derivatives(unknowns, known) == rov.derivatives(unknowns, known)
 
 
-def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
-    rng = random.Random(3)
-    unknowns, (point,) = fmu.outputs + fmu.derivatives, points(fmu, 1, seed=4)
-    with at_point(fmu, MODEL_EXCHANGE, INITIALIZATION, point) as rov:
-        seeds = {known: rng.uniform(-1.0, 1.0) for known in point}
-        columns = [[seed * d for d in rov.derivatives(unknowns, known)] for known, seed in seeds.items()]
-        result = rov.derivatives(unknowns, seeds)
-        for i, column in enumerate(zip(*columns, strict=True)):
-            assert result[i] == pytest.approx(sum(column), rel=1e-12, abs=1e-12 * max(map(abs, column)))
-
-
 # ---- Adjoint derivatives ----
 
 

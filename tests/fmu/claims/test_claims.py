@@ -20,7 +20,6 @@ from rov_fmu.fmu.claims.measures import Evidence
 from rov_fmu.fmu.claims.subject import Subject, opened
 from rov_fmu.fmu.evidence.meta_data import META_DATA
 from rov_fmu.fmu.experiments import FOLDER
-from rov_fmu.io.messages import ProofError
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.references.vehicles import IDENTIFIED
@@ -143,14 +142,10 @@ def _text(proof: Proof) -> str:
     return " ".join(" ".join(root.xpath("//body//text()")).split())
 
 
-def test_there_are_ten_questions() -> None:
-    assert len(QUESTIONS) == 10
-    assert all(one["question"].endswith("?") and one["answer"] for one in QUESTIONS)
-
-
 @pytest.mark.parametrize("number", range(10))
-def test_the_page_answers(number: int, texts: Texts) -> None:
+def test_the_page_answers_ten_questions(number: int, texts: Texts) -> None:
     question = QUESTIONS[number]
+    assert question["answer"]
     assert question["page"] in texts[question["of"]], question["question"]
 
 
@@ -287,25 +282,6 @@ def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytes
     assert answers["A step of 0 s"] == "it needs more than 1 s"
     assert answers["A step of −0.002 s"] == "it ended its process: SIGABRT"
     assert answers["A step past the stop time"] == "it ended its process: exit code 3"
-
-
-@pytest.mark.parametrize(
-    ("name", "version"),
-    [
-        ("modelDescription.xml", "videoray_fmu"),
-        ("sources/step.c", "videoray_fmu"),
-        pytest.param("modelDescription.xml", "videoray3_fmu", marks=pytest.mark.long),
-        pytest.param("sources/step.c", "videoray3_fmu", marks=pytest.mark.long),
-    ],
-)
-def test_one_changed_byte_is_found(name: str, version: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    fmu = tmp_path / "other.fmu"
-    with zipfile.ZipFile(request.getfixturevalue(version)) as old, zipfile.ZipFile(fmu, "w") as new:
-        for member in old.namelist():
-            content = old.read(member)
-            new.writestr(member, content.replace(b"the ", b"teh ", 1) if member == name else content)
-    with pytest.raises(ProofError, match=f"other.fmu: '{name}' was altered after the FMU was built"):
-        measured(measures.integrity, fmu)
 
 
 @pytest.mark.parametrize(
