@@ -16,7 +16,6 @@ from rov_fmu.c import compile as build_options
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
-from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
@@ -215,23 +214,21 @@ def test_the_description_has_the_elements_of_the_interface_and_its_own_guid(fmi:
 def test_an_fmu_of_one_interface_runs_proves_itself_and_refuses_the_other(
     fmi: int, interface: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "bare.fmu"
+    path, folder = tmp_path / "bare.fmu", tmp_path / "bare"
     options = ["--fmi", str(fmi), "--interface", interface, "--platform", "host", "-o", str(path)]
     assert main(["build", str(BARE), *options]) == 0
     assert "The FMU is valid. In a run, " in capsys.readouterr().out
     assert main(["prove", str(path)]) == 0
     name = {CO_SIMULATION: "co-simulation", MODEL_EXCHANGE: "model-exchange"}
     offered, refused = KINDS[interface]
-    assert prove(path, name[offered])
     assert main(["prove", str(path), "--interface", name[refused]]) == 2
     assert f"has no {name[refused]}, only {name[offered]}\n" in capsys.readouterr().err
-    fmpy.extract(str(path), unzipdir=str(tmp_path / "bare"))
-    page = (tmp_path / "bare" / "documentation" / "index.html").read_text(encoding="utf-8")
-    assert f" · {INTERFACES[offered]} · version" in page
+    fmpy.extract(str(path), unzipdir=str(folder))
+    page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
     assert f"<dt>{INTERFACES[offered]}</dt>" in page
     assert f"<dt>{INTERFACES[refused]}</dt>" not in page
-    (library,) = tmp_path.joinpath("bare", "binaries").glob("*/*")
-    fmu = WRAPPERS[fmi](tmp_path / "bare", library)
+    (library,) = (folder / "binaries").glob("*/*")
+    fmu = WRAPPERS[fmi](folder, library)
     with fmu.instance(offered) as rov:
         rov.start()
     with pytest.raises(AssertionError, match=f"this FMU is for {INTERFACES[offered]} only"):

@@ -299,18 +299,14 @@ def test_a_call_against_the_standard_works_with_one_warning_that_a_reset_allows_
             assert [m.status for m in rov.log] == [ERROR]  # a refused call gives no warning
             rov.log.clear()
             for _ in range(3):
-                assert rov.get(["alpha_u"]) == [float(fmu.variables["alpha_u"].start)]
-            (warning,) = _warnings(rov)
-            assert warning.startswith(f"{fmu.name('GetFloat64')}: ")
-            rov.reach(CONTINUOUS)
+                (start,) = rov.get(["beta_u"])
+            assert len(_warnings(rov)) == 1
             rov.set({"u_l": 0.5, "u": 0.1})
-            assert _warnings(rov) == []
+            rov.reach(CONTINUOUS)
             before = rov.get(["der(u)"])
-            rov.set({"beta_u": 0.5, "I_r": 0.3}, ERROR)
-            rov.log.clear()
             for value in (0.5, 0.25):
                 rov.set({"beta_u": value})
-            assert rov.get(["der(u)"])[0] == pytest.approx(before[0] * 0.25 / float(fmu.variables["beta_u"].start))
+            assert rov.get(["der(u)"])[0] == pytest.approx(before[0] * 0.25 / start)
             (warning,) = _warnings(rov)
             assert warning.startswith(f"{fmu.name('SetFloat64')}: beta_u ")
             rov.expect("EnterEventMode")
