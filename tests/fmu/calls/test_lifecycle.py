@@ -117,7 +117,7 @@ def good_arguments(rov: AnyInstance) -> dict[str, tuple[Any, ...]]:
     state = c_void_p()
     rov.expect("GetFMUState", ctypes.byref(state))
     saved = rov.save(state)
-    n = len(rov.fmu.states)
+    n, sized = len(rov.fmu.states), rov.fmu.sized
     by_common_name: dict[str, tuple[Any, ...]] = {
         "SetDebugLogging": (1, 1, strings(b"logStatusError")),
         "GetFMUState": (ctypes.pointer(c_void_p()),),
@@ -132,17 +132,18 @@ def good_arguments(rov: AnyInstance) -> dict[str, tuple[Any, ...]]:
         "GetEventIndicators": (None, 0),
         "GetContinuousStates": (room(n), n),
         "GetNominalsOfContinuousStates": (room(n), n),
+        "GetFloat64": (references(u[0], u_l[0]), 2, *sized(room(2))),
+        "SetFloat64": (u_l, 1, *sized(reals(0.5))),
+        "GetDirectionalDerivative": (u, 1, u, 1, *sized(reals(1.0)), *sized(room())),
+        "GetAdjointDerivative": (u, 1, u, 1, *sized(reals(1.0)), *sized(room())),
+        "GetOutputDerivatives": (u, 1, integers(1), *sized(room())),
     }
     given: dict[str, tuple[Any, ...]] = {
         **{f"fmi2{do}{t}": (None, 0, None) for do in ("Get", "Set") for t in ("Integer", "Boolean", "String")},
         "fmi2SetupExperiment": (0, 0.0, 0.0, 1, 10.0),
-        "fmi2GetReal": (references(u[0], u_l[0]), 2, room(2)),
-        "fmi2SetReal": (u_l, 1, reals(0.5)),
-        "fmi2GetDirectionalDerivative": (u, 1, u, 1, reals(1.0), room()),
         "fmi2NewDiscreteStates": (ctypes.pointer(fmi2EventInfo(nextEventTime=-7.0)),),
         "fmi2CompletedIntegratorStep": (1, integers(-7), integers(-7)),
         "fmi2SetRealInputDerivatives": (None, 0, None, None),
-        "fmi2GetRealOutputDerivatives": (u, 1, integers(1), room()),
         "fmi2DoStep": (0.0, 0.1, 1),
         "fmi2GetStatus": (0, integers(-7)),
         "fmi2GetRealStatus": (LAST_SUCCESSFUL_TIME, room()),
@@ -151,17 +152,12 @@ def good_arguments(rov: AnyInstance) -> dict[str, tuple[Any, ...]]:
         "fmi2GetStringStatus": (1, strings(None)),
         **{name: tuple(0 if t is c_size_t else None for t in of) for name, of in ABSENT.items()},
         "fmi3EnterInitializationMode": (False, 0.0, 0.0, True, 10.0),
-        "fmi3GetFloat64": (references(u[0], u_l[0]), 2, room(2), 2),
-        "fmi3SetFloat64": (u_l, 1, reals(0.5), 1),
         "fmi3GetNumberOfVariableDependencies": (u[0], ctypes.pointer(c_size_t(7))),
         "fmi3GetVariableDependencies": (u[0], *[None] * 4, 0),
-        "fmi3GetDirectionalDerivative": (u, 1, u, 1, reals(1.0), 1, room(), 1),
-        "fmi3GetAdjointDerivative": (u, 1, u, 1, reals(1.0), 1, room(), 1),
         "fmi3UpdateDiscreteStates": (*(flags(True) for _ in range(5)), room()),
         "fmi3CompletedIntegratorStep": (True, flags(True), flags(True)),
         "fmi3GetNumberOfEventIndicators": (ctypes.pointer(c_size_t(7)),),
         "fmi3GetNumberOfContinuousStates": (ctypes.pointer(c_size_t(7)),),
-        "fmi3GetOutputDerivatives": (u, 1, integers(1), room(), 1),
         "fmi3DoStep": (0.0, 0.1, True, *(flags(True) for _ in range(3)), room()),
         "fmi3ActivateModelPartition": (0, 0.0),
         **{rov.fmu.name(name): arguments for name, arguments in by_common_name.items()},

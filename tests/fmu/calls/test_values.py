@@ -13,6 +13,7 @@ from tests.fmi import (
     EVENT,
     INITIALIZATION,
     MODEL_EXCHANGE,
+    OK,
     STEP,
     WARNING,
     AnyInstance,
@@ -32,7 +33,7 @@ def assert_discarded(rov: AnyInstance, name: str, value: float) -> None:
     before = rov.save()
     (kept,) = rov.get([name])
     rov.log.clear()
-    assert rov.set({companion: 0.875, name: value}) == DISCARD, (name, value)
+    rov.set({companion: 0.875, name: value}, DISCARD)
     (message,) = rov.log
     assert (message.status, message.category) == (DISCARD, "logStatusDiscard")
     assert message.text.startswith(f"{rov.fmu.name('SetFloat64')}: {name} = ")
@@ -133,26 +134,29 @@ def refused(rov: AnyInstance) -> list[str]:
     return [m.category for m in rov.log]
 
 
+SWITCHES: list[tuple[int, str, str]] = [
+    (0, "logEvents", "logStatusError logStatusDiscard"),
+    (0, "logStatusError", "logStatusDiscard"),
+    (0, "", ""),
+    (-1, "logStatusError logEvents", "logEvents logStatusError"),
+    (0, "logStatusError logNoSuch", "logEvents logStatusError"),  # it is refused
+    (1, "logStatusDiscard", "logEvents logStatusError logStatusDiscard"),
+    (0, "logEvents", "logStatusError logStatusDiscard"),
+    (1, "", "logEvents logStatusError logStatusDiscard"),
+    (0, "logStatusError", "logEvents logStatusDiscard"),
+]
+"""Whether categories are switched on or off, which ones, and those that are logged afterwards."""
+
+
 def test_log_categories_are_switched_on_and_off(fmu: Fmu) -> None:
+    every = ["logEvents", "logStatusError", "logStatusDiscard"]
     with fmu.instance(logging=True) as rov:
-        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        rov.expect("SetDebugLogging", 0, 1, strings(b"logEvents"))
-        assert refused(rov) == ["logStatusError", "logStatusDiscard"]
-        rov.expect("SetDebugLogging", 0, 1, strings(b"logStatusError"))
-        assert refused(rov) == ["logStatusDiscard"]
-        rov.expect("SetDebugLogging", 0, 0, None)
-        assert refused(rov) == []
-        rov.expect("SetDebugLogging", -1, 2, strings(b"logStatusError", b"logEvents"))
-        assert refused(rov) == ["logEvents", "logStatusError"]
-        rov.refuse("SetDebugLogging", 0, 2, strings(b"logStatusError", b"logNoSuch"))
-        assert refused(rov) == ["logEvents", "logStatusError"]
-        rov.expect("SetDebugLogging", 1, 1, strings(b"logStatusDiscard"))
-        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        rov.expect("SetDebugLogging", 0, 1, strings(b"logEvents"))
-        assert refused(rov) == ["logStatusError", "logStatusDiscard"]
-        rov.expect("SetDebugLogging", 1, 0, None)
-        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        rov.expect("SetDebugLogging", 0, 1, strings(b"logStatusError"))
+        assert refused(rov) == every
+        for on, names, logged in SWITCHES:
+            categories = strings(*(name.encode() for name in names.split()))
+            status = ERROR if "NoSuch" in names else OK
+            rov.expect("SetDebugLogging", on, len(categories), categories if names else None, status=status)
+            assert refused(rov) == logged.split()
         rov.expect("Reset")  # restores the categories of the instantiation
-        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        assert {c.name for c in fmu.description.logCategories} >= {"logStatusError", "logStatusDiscard", "logEvents"}
+        assert refused(rov) == every
+        assert {c.name for c in fmu.description.logCategories} >= {*every}

@@ -68,6 +68,11 @@ def _rows(files: Mapping[str, bytes], name: str) -> list[dict[str, float]]:
     return [{key: float(value) for key, value in line.items()} for line in lines]
 
 
+def _parameters(files: Mapping[str, bytes], name: str) -> dict[str, float]:
+    parameters = etree.fromstring(files[f"{FOLDER}/{name}"]).iter("{*}Parameter")
+    return {p.get("name"): float(p[0].get("value")) for p in parameters}
+
+
 def _experiments(files: Mapping[str, bytes]) -> dict[str, Any]:
     return {x.get("name"): x for x in etree.fromstring(files[f"{FOLDER}/experiments.exp"])}
 
@@ -130,10 +135,7 @@ def test_the_tables_of_the_paper_are_experiments() -> None:
                 assert after_tau["time"] == pytest.approx(Tau, rel=5e-3)
                 assert after_tau[v] == pytest.approx((1.0 - 1.0 / e) * V_ss, rel=5e-3)
                 assert last[v] == pytest.approx(V_ss, rel=1e-3)
-                ((_, parameters),) = [
-                    (x, {p.get("name"): float(p[0].get("value")) for p in x.iter("{*}Parameter")})
-                    for x in [etree.fromstring(files[f"{FOLDER}/{experiment.find('Parameters').get('source')}"])]
-                ]
+                parameters = _parameters(files, experiment.find("Parameters").get("source"))
                 assert parameters == {key: model[key] for key in parameters}
                 assert len(parameters) == 6
     assert printed == 28
@@ -177,8 +179,7 @@ def test_expected_values_with_roll_and_pitch_are_those_of_the_rigid_body() -> No
     vehicle = a_vehicle(SIX)
     files = reference_results(vehicle)
     check_experiments_of_axes(vehicle, files)
-    parameters = etree.fromstring(files[f"{FOLDER}/attitude.ssv"])
-    angles = {p.get("name"): float(p[0].get("value")) for p in parameters.iter("{*}Parameter")}
+    angles = _parameters(files, "attitude.ssv")
     assert angles.keys() == SIX.layout.initial.keys()
     for name, start in (("roll_100", (0.0, 0.0, 0.0)), ("manoeuvre", [*angles.values()])):
         stimuli, expected = (_rows(files, f"{name}{end}.csv") for end in ("", "_expected"))
