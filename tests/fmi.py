@@ -186,8 +186,11 @@ class Fmu(ABC):
         return token.encode()
 
     @abstractmethod
-    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool | None = None) -> "AnyInstance":
-        """Return a new instance that records its log. By default all messages except events are logged."""
+    def instance(self, kind: int = CO_SIMULATION, **how: Any) -> "AnyInstance":
+        """Return a new instance that records its log. By default all messages except events are logged.
+
+        `how` has its name, whether messages are logged, and in FMI 3.0 what is done in intermediate update.
+        """
 
     def unload(self) -> None:
         fmpy.freeLibrary(self.dll._handle)

@@ -34,8 +34,8 @@ class Fmu(fmi.Fmu):
     PLATFORM = fmpy.platform
     RENAMED = _RENAMED
 
-    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool | None = None) -> "Instance":
-        return Instance(self, kind, name, logging)
+    def instance(self, kind: int = CO_SIMULATION, **how: Any) -> "Instance":
+        return Instance(self, kind, **how)
 
 
 def recording_callbacks(log: list[Message]) -> Any:
@@ -50,7 +50,7 @@ def recording_callbacks(log: list[Message]) -> Any:
 
 
 class Instance(fmi.Instance[Fmu]):
-    def __init__(self, fmu: Fmu, kind: int, name: str, logging: bool | None) -> None:
+    def __init__(self, fmu: Fmu, kind: int, name: str = "rov", logging: bool | None = None) -> None:
         super().__init__(fmu, kind)
         self._callbacks = recording_callbacks(self.log)
         self.component = fmu.dll.fmi2Instantiate(

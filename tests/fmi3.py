@@ -74,16 +74,8 @@ class Fmu(fmi.Fmu):
     VERSION = 3
     PLATFORM = fmpy.platform_tuple
 
-    def instance(
-        self,
-        kind: int = CO_SIMULATION,
-        name: str = "rov",
-        logging: bool | None = None,
-        on_update: OnUpdate | None = None,
-        intermediate: Sequence[str] = (),
-        early: bool = False,
-    ) -> "Instance":
-        return Instance(self, kind, name, logging, on_update, intermediate, early)
+    def instance(self, kind: int = CO_SIMULATION, **how: Any) -> "Instance":
+        return Instance(self, kind, **how)
 
 
 def recorder(log: list[Message]) -> Any:
@@ -102,11 +94,11 @@ class Instance(fmi.Instance[Fmu]):
         self,
         fmu: Fmu,
         kind: int,
-        name: str,
-        logging: bool | None,
-        on_update: OnUpdate | None,
-        intermediate: Sequence[str],
-        early: bool,
+        name: str = "rov",
+        logging: bool | None = None,
+        on_update: OnUpdate | None = None,
+        intermediate: Sequence[str] = (),
+        early: bool = False,
     ) -> None:
         super().__init__(fmu, kind)
         self.stepped: Stepped | None = None
