@@ -151,7 +151,8 @@ def test_a_simulation_has_it_at_every_step(kind: str, built: tuple[Fmu, Vehicle,
     result: Any
     if kind == "Python":
         assert vehicle.path
-        result = rov_fmu.load(vehicle.path).simulate(2.0, commands, start={"u": 0.45})
+        stop = 0.3 if axis == "roll" else 2.0  # later it turns over, which is a warning
+        result = rov_fmu.load(vehicle.path).simulate(stop, commands, start={"u": 0.45})
     else:
         start, output = {**commands, "u": 0.45}, [*names, "outside"]
         result = fmpy.simulate_fmu(
