@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import pytest
@@ -16,11 +17,11 @@ from rov_fmu.c.compile import compile_all
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
+from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, a_vehicle
 
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
 defaultCallbacks.logger = _LOGGER
@@ -57,7 +58,7 @@ def vehicle() -> Vehicle:
 @pytest.fixture(scope="session")
 def heavy() -> Vehicle:
     """Return the BlueROV2 Heavy without roll and pitch."""
-    return four_axes(load_vehicle(SHIPPED["bluerov2_heavy"]))
+    return HEAVY
 
 
 Made = Callable[[str, Callable[[Path], object]], Path]
@@ -133,46 +134,32 @@ def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     return folder
 
 
-@pytest.fixture(scope="session")
-def heavy_dir(made_once: Made, heavy: Vehicle) -> Path:
-    """Return the unzipped FMU of the BlueROV2 Heavy without roll and pitch, which has sway, lag and coupling."""
-    return made_once("heavy", lambda folder: unzipped(heavy, folder))
+def _folder_of(name: str, vehicle: Callable[[], Vehicle], fmi: int = 2) -> Any:
+    """Return a fixture: the folder with the unzipped FMU of a vehicle."""
+
+    @pytest.fixture(scope="session")
+    def folder(made_once: Made) -> Path:
+        return made_once(name, lambda folder: unzipped(vehicle(), folder, fmi))
+
+    return folder
 
 
-@pytest.fixture(scope="session")
-def everything_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of a vehicle with every effect."""
-    return made_once("everything", lambda folder: unzipped(load_vehicle(EVERYTHING), folder))
+def _everything() -> Vehicle:
+    return load_vehicle(EVERYTHING)
 
 
-@pytest.fixture(scope="session")
-def thrust_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of a vehicle with everything that thrust can depend on."""
-    return made_once("thrust", lambda folder: unzipped(load_vehicle(THRUST_EFFECTS), folder))
+def _thrust() -> Vehicle:
+    return load_vehicle(THRUST_EFFECTS)
 
 
-@pytest.fixture(scope="session")
-def thrust3_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of FMI 3.0 of that vehicle."""
-    return made_once("thrust3", lambda folder: unzipped(load_vehicle(THRUST_EFFECTS), folder, fmi=3))
+def _six() -> Vehicle:
+    return a_vehicle(SIX)
 
 
-@pytest.fixture(scope="session")
-def heavy3_dir(made_once: Made, heavy: Vehicle) -> Path:
-    """Return the unzipped FMU of FMI 3.0 of the BlueROV2 Heavy without roll and pitch."""
-    return made_once("heavy3", lambda folder: unzipped(heavy, folder, fmi=3))
-
-
-@pytest.fixture(scope="session")
-def six_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of a vehicle with six axes and every effect."""
-    return made_once("six", lambda folder: unzipped(a_vehicle(SIX), folder))
-
-
-@pytest.fixture(scope="session")
-def six3_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of FMI 3.0 of a vehicle with six axes and every effect."""
-    return made_once("six3", lambda folder: unzipped(a_vehicle(SIX), folder, fmi=3))
+heavy_dir, heavy3_dir = _folder_of("heavy", lambda: HEAVY), _folder_of("heavy3", lambda: HEAVY, 3)
+everything_dir = _folder_of("everything", _everything)
+thrust_dir, thrust3_dir = _folder_of("thrust", _thrust), _folder_of("thrust3", _thrust, 3)
+six_dir, six3_dir = _folder_of("six", _six), _folder_of("six3", _six, 3)
 
 
 @pytest.fixture(scope="module")

@@ -34,8 +34,8 @@ class Fmu(fmi.Fmu):
     PLATFORM = fmpy.platform
     RENAMED = _RENAMED
 
-    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool | None = None) -> "Instance":
-        return Instance(self, kind, name, logging)
+    def instance(self, kind: int = CO_SIMULATION, **how: Any) -> "Instance":
+        return Instance(self, kind, **how)
 
 
 def recording_callbacks(log: list[Message]) -> Any:
@@ -50,7 +50,7 @@ def recording_callbacks(log: list[Message]) -> Any:
 
 
 class Instance(fmi.Instance[Fmu]):
-    def __init__(self, fmu: Fmu, kind: int, name: str, logging: bool | None) -> None:
+    def __init__(self, fmu: Fmu, kind: int, name: str = "rov", logging: bool | None = None) -> None:
         super().__init__(fmu, kind)
         self._callbacks = recording_callbacks(self.log)
         self.component = fmu.dll.fmi2Instantiate(
@@ -61,15 +61,17 @@ class Instance(fmi.Instance[Fmu]):
     def setup(self, start: float = 0.0, stop: float | None = None) -> int:
         return self.call("fmi2SetupExperiment", 0, 0.0, start, stop is not None, stop or 0.0)
 
-    def initialize(self, start: float = 0.0, stop: float | None = None) -> int:
-        status = self.setup(start, stop)
-        return status if status != OK else self.call("fmi2EnterInitializationMode")
+    def initialize(self, start: float = 0.0, stop: float | None = None, status: int = OK) -> int:
+        if self.setup(start, stop) != OK:
+            assert status != OK, self.log
+            return status
+        return self.expect("fmi2EnterInitializationMode", status=status)
 
     def update(self) -> None:
         self.expect("fmi2NewDiscreteStates", ctypes.byref(fmi2EventInfo()))
 
-    def step(self, t: float, h: float) -> int:
-        return self.call("fmi2DoStep", t, h, 1)
+    def step(self, t: float, h: float, status: int = OK) -> int:
+        return self.expect("fmi2DoStep", t, h, 1, status=status)
 
     def time(self) -> float:
         value = room()

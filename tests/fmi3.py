@@ -16,6 +16,7 @@ from tests.fmi import (
     INITIALIZATION,
     INSTANTIATED,
     MODEL_EXCHANGE,
+    OK,
     STEP,
     TERMINATED,
     WITH_EVENTS,
@@ -31,12 +32,9 @@ EVERY_MODE = [(kind, mode) for kind, modes in MODES.items() for mode in modes]
 
 _PROTOTYPES = fmi.prototypes(3, FMU3Slave)
 SIGNATURES = fmi.signatures(_PROTOTYPES)
-_ABSENT = re.compile(r"fmi3[GS]et(Float32|U?Int\d+|Boolean|String|Binary)")
-TYPES = {name: arguments for name, arguments in SIGNATURES.items() if _ABSENT.fullmatch(name)}
-"""The getters and setters of types that no variable has."""
-_OF_CLOCKS = re.compile(r"fmi3[GS]et(Clock|(Interval|Shift)(Decimal|Fraction))")
-CLOCKS = {name: arguments for name, arguments in SIGNATURES.items() if _OF_CLOCKS.fullmatch(name)}
-"""The getters and setters of clocks, which the FMU does not have."""
+_ABSENT = r"fmi3[GS]et(Float32|U?Int\d+|Boolean|String|Binary|Clock|(Interval|Shift)(Decimal|Fraction))"
+ABSENT = {name: arguments for name, arguments in SIGNATURES.items() if re.fullmatch(_ABSENT, name)}
+"""The getters and setters of types that no variable has, and of clocks."""
 _STRING_BUFFERS = {"fmi3SerializeFMUState": 2, "fmi3DeserializeFMUState": 1}
 """Arguments that FMPy declares as arrays of c_uint8, for which ctypes accepts no string buffer."""
 for _name, _position in _STRING_BUFFERS.items():
@@ -76,16 +74,8 @@ class Fmu(fmi.Fmu):
     VERSION = 3
     PLATFORM = fmpy.platform_tuple
 
-    def instance(
-        self,
-        kind: int = CO_SIMULATION,
-        name: str = "rov",
-        logging: bool | None = None,
-        on_update: OnUpdate | None = None,
-        intermediate: Sequence[str] = (),
-        early: bool = False,
-    ) -> "Instance":
-        return Instance(self, kind, name, logging, on_update, intermediate, early)
+    def instance(self, kind: int = CO_SIMULATION, **how: Any) -> "Instance":
+        return Instance(self, kind, **how)
 
 
 def recorder(log: list[Message]) -> Any:
@@ -104,11 +94,11 @@ class Instance(fmi.Instance[Fmu]):
         self,
         fmu: Fmu,
         kind: int,
-        name: str,
-        logging: bool | None,
-        on_update: OnUpdate | None,
-        intermediate: Sequence[str],
-        early: bool,
+        name: str = "rov",
+        logging: bool | None = None,
+        on_update: OnUpdate | None = None,
+        intermediate: Sequence[str] = (),
+        early: bool = False,
     ) -> None:
         super().__init__(fmu, kind)
         self.stepped: Stepped | None = None
@@ -138,19 +128,21 @@ class Instance(fmi.Instance[Fmu]):
         if end is not None:
             early[0], wanted[0] = True, end
 
-    def initialize(self, start: float = 0.0, stop: float | None = None) -> int:
-        return self.call("fmi3EnterInitializationMode", False, 0.0, start, stop is not None, stop or 0.0)
+    def initialize(self, start: float = 0.0, stop: float | None = None, status: int = OK) -> int:
+        arguments = (False, 0.0, start, stop is not None, stop or 0.0)
+        return self.expect("fmi3EnterInitializationMode", *arguments, status=status)
 
     def update(self) -> None:
         self.expect("fmi3UpdateDiscreteStates", *(flags(True) for _ in range(5)), room())
 
-    def step(self, t: float, h: float) -> int:
+    def step(self, t: float, h: float, status: int = OK) -> int:
         results, last = [flags(True) for _ in range(3)], room()
-        status = self.call("fmi3DoStep", t, h, True, *results, last)
+        found = self.call("fmi3DoStep", t, h, True, *results, last)
         needed, terminate, early = (bool(flag[0]) for flag in results)
         self.stepped = Stepped(needed, terminate, early, float(last[0]))
         if self._raised is not None:
             raise self._raised
+        assert found == status, self.log
         return status
 
     def time(self) -> float:

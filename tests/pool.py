@@ -1,6 +1,6 @@
 """Tank tests with disturbances, simulated by the integrator in verification/references/pool.py."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import radians
 
@@ -47,11 +47,7 @@ class Run:
     time: Array
     command: Array
     velocity: Array
-    """The velocity through the water."""
     position: Array
-    """The position over ground, which includes the current."""
-    current: float = 0.0
-    """The velocity of the water along the axis, m/s."""
 
     def recorded(
         self,
@@ -59,19 +55,18 @@ class Run:
         quantity: str,
         file: str = "log.csv",
         *,
-        noise: float = 1.0,
         colour: float = 0.0,
         jitter: float = 0.0,
     ) -> Measured:
-        """Return the recording of a sensor; velocities are over ground, and `noise` is a multiple of NOISE.
+        """Return the recording of a sensor.
 
         `colour` is the correlation of the noise of successive samples, `jitter` the error of time stamps (s).
         """
-        values = self.velocity + self.current if quantity == "velocity" else self.position
+        values = self.velocity if quantity == "velocity" else self.position
         taken = self.time + jitter * random.standard_normal(len(self.time))
         white = random.standard_normal(len(self.time))
         errors = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white) if colour else white
-        values = np.interp(taken, self.time, values) + noise * NOISE[quantity] * errors
+        values = np.interp(taken, self.time, values) + NOISE[quantity] * errors
         return Measured(file, self.axis, quantity, self.time, self.command, values)
 
 
@@ -82,13 +77,11 @@ def run(
     rate: float,
     *,
     delay: float = 0.0,
-    current: float = 0.0,
-    pattern: Mapping[str, float] | None = None,
 ) -> Run:
-    """Run a plan from rest along one axis, with a delay of the commands (s) and a current along the axis (m/s)."""
+    """Run a plan from rest along one axis, with a delay of the commands (s)."""
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
     time = np.arange(len(command)) / rate
-    thrusters = {name: sign * command for name, sign in (pattern or PATTERNS[axis.name]).items()}
-    motion = swim(k, time, thrusters, delay, (current, 0.0))
+    thrusters = {name: sign * command for name, sign in PATTERNS[axis.name].items()}
+    motion = swim(k, time, thrusters, delay)
     place = {"surge": "x", "sway": "y", "heave": "z", "yaw": "psi"}[axis.name]
-    return Run(axis, time, command, motion[axis.velocity], motion[place], current)
+    return Run(axis, time, command, motion[axis.velocity], motion[place])

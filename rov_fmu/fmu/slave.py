@@ -213,4 +213,5 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.time, self.stop_time = state["time"], state["stop_time"]
         self.values |= state["values"]
         self.is_initialized = state["is_initialized"]
-        self.line.acting, self.line.waiting = dict(state["acting"]), list(state["waiting"])
+        self.line.acting = dict(state["acting"])
+        self.line.waiting = [step.Change(*change) for change in state["waiting"]]  # a serialized state has lists

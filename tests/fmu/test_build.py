@@ -2,7 +2,6 @@
 
 import re
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
@@ -12,12 +11,8 @@ from fmpy.validation import validate_fmu
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
-from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE, BARE
-
-_LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
-"""The files that only one version of FMI has, besides its C files."""
 
 
 def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> None:
@@ -54,71 +49,32 @@ def test_every_importer_can_unpack_the_archive(either_fmu: Path) -> None:
         assert not m.flag_bits & 0x1
 
 
-def test_the_archive_has_only_files_of_its_version(either_dir: Path, fmi: int) -> None:
-    here = {path.name for path in (either_dir / "sources").iterdir()}
-    layers = {path.name for path in fmu_compile.C_SOURCES.glob(f"fmi{fmi}_*")} | _LAYERS[fmi]
-    shared = {path.name for path in fmu_compile.C_SOURCES.iterdir() if not path.name.startswith("fmi")}
-    shared -= {"heading.c", "delay.c", "lag.c", "table.c"}  # the VideoRay needs none of these
-    assert here == layers | shared | {"interface.h", "model.h", "equation.h"}
+def test_the_archive_speaks_of_its_version_only(either_dir: Path, fmi: int) -> None:
+    assert not [*(either_dir / "sources").glob(f"fmi{5 - fmi}*")]
     (binaries,) = (either_dir / "binaries").iterdir()
     assert binaries.name == {2: fmpy.platform, 3: fmpy.platform_tuple}[fmi]
-    page = (either_dir / "documentation" / "index.html").read_text(encoding="utf-8")
+    documentation = either_dir / "documentation"
+    page = (documentation / "index.html").read_text(encoding="utf-8")
     for claim in (f"FMI {fmi}.0 ", f"fmi{fmi}Discard", f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"):
         assert claim in page
     words = re.sub(r"[A-Za-z0-9+/=]{200,}", "", page)  # without the binary of the page that flies
     assert not re.findall(f"FMI {5 - fmi}|fmi{5 - fmi}", words)
-    license_ = (either_dir / "documentation" / "licenses" / "fmi-headers.txt").read_text(encoding="utf-8")
+    license_ = (documentation / "licenses" / "fmi-headers.txt").read_text(encoding="utf-8")
     header = (fmu_compile.fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
-    assert license_.startswith("Copyright (C) 2008-2011 MODELISAR")
     assert license_.split() == header[header.index("Copyright (C)") :].partition("*/")[0].split()
-    needed = either_dir / "documentation" / "externalDependencies.txt"
-    assert needed.exists() == (fmi == 3)
+    assert (documentation / "externalDependencies.txt").exists() == (fmi == 3)
 
 
-def test_the_description_says_what_the_interface_declares(videoray_dir: Path, vehicle: Vehicle) -> None:
-    description = fmpy.read_model_description(str(videoray_dir))
-    declared = variables(vehicle)
-    assert [v.name for v in description.modelVariables] == [v.name for v in declared]
-    for read, v in zip(description.modelVariables, declared, strict=True):
-        assert read.valueReference == v.value_reference
-        assert (read.causality, read.variability) == (v.causality, v.variability)
-        assert read.unit == v.unit
-        assert read.displayUnit == v.display_unit
-        assert (None if read.start is None else float(read.start)) == v.start
-        assert read.description == v.description
-    assert {u.name for u in description.unitDefinitions} == {v.unit for v in declared}
-    for interface in (description.coSimulation, description.modelExchange):
-        assert interface.modelIdentifier == vehicle.identifier
-        assert interface.canGetAndSetFMUstate
-        assert interface.canSerializeFMUstate
-        assert interface.providesDirectionalDerivative
-        assert not interface.needsExecutionTool
-    assert description.coSimulation.canHandleVariableCommunicationStepSize
-    assert description.coSimulation.maxOutputDerivativeOrder == 1
-
-
-@pytest.mark.parametrize(
-    ("before", "said"),
-    [
-        (("win64", "linux64", "darwin64"), "Replaced {}, which also had darwin64 and win64."),
-        pytest.param(("linux64",), "", marks=pytest.mark.long),
-        pytest.param(None, "", marks=pytest.mark.long),
-    ],
-)
 @pytest.mark.long
-def test_platforms_that_are_lost_are_named(
-    before: Sequence[str] | None, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_platforms_that_are_lost_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.fmu"
-    path.write_bytes(b"no archive")
-    if before:
+    for before in (("win64", "linux64", "darwin64"), ("linux64",)):
         with zipfile.ZipFile(path, "w") as archive:
-            for name in ("modelDescription.xml", "binaries/", *(f"binaries/{folder}/x.so" for folder in before)):
+            for name in ("modelDescription.xml", *(f"binaries/{folder}/x.so" for folder in before)):
                 archive.writestr(name, "")
-    assert main(["build", str(BARE), "--platform", "linux64", "-o", str(path)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == said.format(path) if said else lines[0].startswith(f"{path}: ")
-    assert sum(line.startswith("Replaced") for line in lines) == bool(said)
+        assert main(["build", str(BARE), "--platform", "linux64", "-o", str(path)]) == 0
+        lost = f"Replaced {path}, which also had darwin64 and win64.\n" if "win64" in before else f"{path}: "
+        assert capsys.readouterr().out.startswith(lost)
 
 
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True)

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
+from rov_fmu.fmu.variables import unit_of
+
 DRAG, CURVES, TUNING = (
     " ".join(f"{kind}_{which}" for kind in kinds.split() for which in whiches.split())
     for kinds, whiches in (("a_d b_d", "u w r"), ("a_t b_t", "rear top"), ("alpha beta", "u w r"))
@@ -24,30 +26,32 @@ NUMBERS = {
     DRAG: (0.0, 1e6, None),
     TUNING: (0.0, 1e3, None),
 }
-# Exponents of kg, m, s, rad.
-UNITS = {
-    "1": (0, 0, 0, 0),
-    "kg": (1, 0, 0, 0),
-    "m": (0, 1, 0, 0),
-    "rad": (0, 0, 0, 1),
-    "m/s": (0, 1, -1, 0),
-    "rad/s": (0, 0, -1, 1),
-    "m/s2": (0, 1, -2, 0),
-    "rad/s2": (0, 0, -2, 1),
-    "N": (1, 1, -2, 0),
-    "N.m": (1, 2, -2, 0),
-    "kg.m2": (1, 2, 0, 0),
-    "N.s/m": (1, 0, -1, 0),
-    "N.s2/m2": (1, -1, 0, 0),
-    "N.m.s/rad": (1, 2, -1, -1),
-    "N.m.s2/rad2": (1, 2, 0, -2),
+# Exponents of kg, m, s, rad, A; then what is displayed, and how often it is contained in the unit.
+UNITS: dict[str, tuple[object, ...]] = {
+    "1": (0, 0, 0, 0, 0, "%", 100.0),
+    "kg": (1, 0, 0, 0, 0),
+    "m": (0, 1, 0, 0, 0),
+    "rad": (0, 0, 0, 1, 0, "deg", 180.0 / pi),
+    "m/s": (0, 1, -1, 0, 0, "knot", 3600.0 / 1852.0),
+    "rad/s": (0, 0, -1, 1, 0, "deg/s", 180.0 / pi),
+    "m/s2": (0, 1, -2, 0, 0),
+    "rad/s2": (0, 0, -2, 1, 0),
+    "N": (1, 1, -2, 0, 0),
+    "N.m": (1, 2, -2, 0, 0),
+    "kg.m2": (1, 2, 0, 0, 0),
+    "N.s/m": (1, 0, -1, 0, 0),
+    "N.s2/m2": (1, -1, 0, 0, 0),
+    "N.m.s/rad": (1, 2, -1, -1, 0),
+    "N.m.s2/rad2": (1, 2, 0, -2, 0),
 }
-DISPLAYED = {
-    ("1", "%"): 100.0,
-    ("rad", "deg"): 180.0 / pi,
-    ("rad/s", "deg/s"): 180.0 / pi,
-    ("m/s", "knot"): 3600.0 / 1852.0,
+FURTHER_UNITS: dict[str, tuple[object, ...]] = {
+    "V": (1, 2, -3, 0, -1),
+    "us": (0, 0, 1, 0, 0),
+    "1/s": (0, 0, -1, 0, 0),
+    "N/s": (1, 1, -3, 0, 0),
+    "N.s2/(m2.rad2)": (1, -1, 0, -2, 0),
 }
+"""Units of other vehicles."""
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +69,16 @@ def test_bounds_and_nominal_values(description: etree._ElementTree) -> None:
 
 
 def test_units(description: etree._ElementTree) -> None:
-    units = {unit.get("name"): unit for unit in description.iter("Unit")}
-    exponents = {
-        name: [unit.find("BaseUnit").get(base, "0") for base in ("kg", "m", "s", "rad")] for name, unit in units.items()
-    }
-    assert {name: tuple(map(int, found)) for name, found in exponents.items()} == UNITS
-    displayed = {
-        (name, shown.get("name")): float(shown.get("factor"))
-        for name, unit in units.items()
-        for shown in unit.iter("DisplayUnit")
-    }
-    assert displayed == pytest.approx(DISPLAYED, rel=1e-15)
+    found = {}
+    for unit in description.iter("Unit"):
+        exponents = (int(unit.find("BaseUnit").get(base, "0")) for base in ("kg", "m", "s", "rad", "A"))
+        shown = ((shown.get("name"), pytest.approx(float(shown.get("factor")))) for shown in unit.iter("DisplayUnit"))
+        found[unit.get("name")] = (*exponents, *(part for pair in shown for part in pair))
+    assert found == UNITS
+
+
+@pytest.mark.parametrize("text", FURTHER_UNITS)
+def test_a_unit_is_read_from_its_text(text: str) -> None:
+    found = unit_of(text)
+    assert tuple(found.exponents.get(base, 0) for base in ("kg", "m", "s", "rad", "A")) == FURTHER_UNITS[text]
+    assert found.size == (1e-6 if text == "us" else 1.0)

@@ -1,16 +1,14 @@
 """The dependencies in modelDescription.xml of vehicles of every kind, against slopes of the reference's equations."""
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import pytest
-from lxml import etree
 
-from rov_fmu.c.compile import INTERFACES
-from rov_fmu.fmu.model_description import model_description
-from rov_fmu.fmu.variables import Variable, variables
+from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import EVERYTHING, SIX, VEHICLES, a_vehicle, numbered, with_axes
+from tests.fmu.test_versions import described, structure
+from tests.vehicles import EVERYTHING, SIX, VEHICLES, numbered, with_axes
 from verification.references.rigid_vehicle import QUATERNION, calculated
 
 Point = dict[str, float]
@@ -50,15 +48,12 @@ def vary(values: Sequence[float]) -> bool:
 
 
 def declared(rov: Vehicle, of: str) -> dict[tuple[str, str], str]:
-    """Return a list of <ModelStructure>."""
-    of_rov = variables(rov)
-    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=INTERFACES["both"]))
-    name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
-    found: dict[tuple[str, str], str] = {}
-    for unknown in root.find(f"ModelStructure/{of}"):
-        kinds = zip(unknown.get("dependencies").split(), unknown.get("dependenciesKind").split(), strict=True)
-        found |= {(name[unknown.get("index")].name, name[known].name): kind for known, kind in kinds}
-    return found
+    """Return a list of <ModelStructure>: each unknown and known with the kind of their dependency."""
+    return {
+        (unknown, known): kind
+        for unknown, knowns, kinds in structure(described(rov, 2), 2)[of]
+        for known, kind in zip(knowns, kinds.split(), strict=True)
+    }
 
 
 _ROVS = {"everything": load_vehicle(EVERYTHING), "six axes": SIX} | VEHICLES

@@ -8,7 +8,6 @@ handle prefixes like 2.0.4.
 """
 
 import platform
-import random
 import re
 import shutil
 import subprocess
@@ -25,7 +24,8 @@ from rov_fmu.c.compile import compiler, fmi_headers
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests import fmi2, fmi3
-from tests.fmi import OK, Fmu, reals
+from tests.fmi import Fmu
+from tests.fmu.calls.test_versions import run
 
 _EXPORT = "#if defined _WIN32"  # begins the definition of FMI2_Export in FMPy's header
 _NAME = "#define fmi2FullName(name) name"
@@ -104,26 +104,15 @@ def _compile(fmu: Fmu, headers: Path, command: Sequence[str], library: Path, war
     return library
 
 
-def _values(fmu: Fmu, steps: int = 400) -> bytes:
+def _values(fmu: Fmu) -> list[bytes]:
     """Return all values along a random motion: turns, reversals, saturation, loads, tuning, long and short steps."""
-    drawn = random.Random(20)
-    result = b""
     with fmu.instance() as rov:
         rov.start({"u": -0.4, "r": 0.9, "psi": 2.0, "gamma": 0.4})
-        t = 0.0
-        for _ in range(steps):
-            chosen = drawn.sample(fmu.inputs, 4)
-            values = {name: drawn.choice((0.0, drawn.uniform(-1.2, 1.2))) for name in chosen}
-            assert rov.set(values | {"beta_r": drawn.uniform(0.5, 2.0)}) == OK
-            h = 10.0 ** drawn.uniform(-4.0, 1.5)
-            assert rov.step(t, h) == OK
-            t += h
-            result += bytes(reals(*rov.get([name for name in fmu.variables if name != "time"])))
-    return result
+        return run(rov, 400)
 
 
 @pytest.fixture(scope="module")
-def shipped(fmu: fmi2.Fmu) -> bytes:
+def shipped(fmu: fmi2.Fmu) -> list[bytes]:
     """Return the values of the FMU that was built, which both versions of FMI share."""
     return _values(fmu)
 
@@ -165,7 +154,7 @@ def _builds() -> Iterator[Any]:
 def test_a_shared_library_has_plain_names_and_gives_the_same_values(
     fmus: dict[int, Fmu],
     headers: dict[str, Path],
-    shipped: bytes,
+    shipped: list[bytes],
     tmp_path: Path,
     release: str,
     name: str,
@@ -178,26 +167,6 @@ def test_a_shared_library_has_plain_names_and_gives_the_same_values(
     library = _compile(fmu, headers[release], command, tmp_path / "videoray.so", warnings)
     assert _exports(library) == _exports(fmu.library)
     assert _values(type(fmu)(fmu.folder, library)) == shipped
-
-
-@pytest.mark.parametrize(
-    ("release", "is_requested"),
-    [
-        ("2.0.4", False),
-        pytest.param("2.0.0", True, marks=pytest.mark.long),
-        pytest.param("3.0", False, marks=pytest.mark.long),
-        *(pytest.param(release, True, marks=pytest.mark.weekly) for release in ("2.0.1", "2.0.4", "3.0")),
-    ],
-)
-def test_the_exports_of_a_static_library_have_a_prefix(
-    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, is_requested: bool
-) -> None:
-    """Some headers add it unless they are told not to; all of them do when it is requested."""
-    fmu = fmus[_version(release)]
-    request = [f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"] * is_requested
-    library = _compile(fmu, headers[release], [*COMPILERS[_NAMES[-1]], "-O0", *request], tmp_path / "a.so")
-    prefix = "videoray_" if is_requested or release in _PLAIN else ""
-    assert _exports(library) == {f"{prefix}{name}" for name in _exports(fmu.library)}
 
 
 _MAIN = r"""

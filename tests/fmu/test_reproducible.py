@@ -25,16 +25,6 @@ def _built(folder: Path, flavour: str, *command: str) -> str:
 _CHECKOUT = str(ROOT / "build_fmu.py")
 
 
-@pytest.mark.long
-def test_built_in_another_folder(tmp_path: Path) -> None:
-    """The native flavour is tested in test_build.py."""
-    one, other = tmp_path / "here", tmp_path / "deep" / "er and other"
-    for folder in (one, other):
-        folder.mkdir(parents=True)
-    here, there = (_built(folder, "pythonfmu", sys.executable, _CHECKOUT) for folder in (one, other))
-    assert here == there
-
-
 @pytest.fixture(scope="module")
 def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Return the hashes of builds by this Python from the checkout, with the versions of constraints.txt."""

@@ -28,7 +28,7 @@ source = "A dive"
 
 def simulated(seconds: float) -> Dive:
     """Return a dive of a BlueROV2 with the noise of its sensors, simulated by the equations written separately."""
-    random, planned = np.random.default_rng(4), sticks(seconds).commands
+    random, planned = np.random.default_rng(4), sticks(seconds)
     time, names = planned.rows, planned.thrusters
     pulses = np.round(1500.0 + 400.0 * planned.at(time))
     moved = swim(TRUTH, time, dict(zip(names, (pulses.T - 1500.0) / 400.0, strict=True)))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
@@ -12,11 +12,22 @@ Case = TypeVar("Case")
 WRAPPERS: dict[int, type[fmi.Fmu]] = {2: fmi2.Fmu, 3: fmi3.Fmu}
 
 
-@pytest.fixture(scope="module", params=WRAPPERS, ids="FMI {}.0".format)
-def fmu(request: pytest.FixtureRequest) -> fmi.Fmu:
-    """Return the FMU of either version, with its shared library loaded for one file of tests."""
-    version: int = request.param
-    return WRAPPERS[version](request.getfixturevalue({2: "videoray_dir", 3: "videoray3_dir"}[version]))
+def of_both_versions(two: str, three: str, is_two_long: bool = False) -> Any:
+    """Return a fixture: the FMUs of FMI 2.0 and FMI 3.0, loaded for one file of tests, whose folders two others return.
+
+    If `is_two_long`, the tests of FMI 2.0 are long.
+    """
+    marks = pytest.mark.long if is_two_long else ()
+
+    @pytest.fixture(scope="module", params=[pytest.param(2, marks=marks), 3], ids="FMI {}.0".format)
+    def fmu(request: pytest.FixtureRequest) -> fmi.Fmu:
+        version: int = request.param
+        return WRAPPERS[version](request.getfixturevalue({2: two, 3: three}[version]))
+
+    return fmu
+
+
+fmu = of_both_versions("videoray_dir", "videoray3_dir")
 
 
 @pytest.fixture(scope="module")

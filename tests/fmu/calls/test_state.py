@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests import fmi3
+from tests.commands import ROOT
 from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
@@ -16,15 +17,12 @@ from tests.fmi import (
     EVENT,
     EVERY_MODE,
     MODEL_EXCHANGE,
-    MODES,
-    OK,
     STEP,
     WITH_EVENTS,
     AnyInstance,
     Fmu,
 )
 
-H = 0.05
 # Parameters, a load, a current and a motion that differ from the start values.
 DISTURBED = {"m_rov": 7.5, "gamma": 0.4, "beta_u": 0.7, "alpha_w": 1.3, "a_d_r": 0.03, "Z_ext": -1.5, "V_E": 0.25}
 DISTURBED |= {"u": -0.4, "w": 0.2, "r": 0.9, "x": 10.0, "psi": 2.0}
@@ -43,7 +41,14 @@ def commands(i: int) -> dict[str, float]:
 
 def run(rov: AnyInstance, first: int, last: int) -> bytes:
     """Return all outputs after each step from `first` to before `last`."""
-    return rov.trajectory(range(first, last), H, commands)
+    return rov.trajectory(range(first, last), 0.05, commands)
+
+
+def midway(rov: AnyInstance) -> bytes:
+    """Take the first ten steps of a new instance, and return its state."""
+    rov.start(DISTURBED, stop=1.0)
+    run(rov, 0, 10)
+    return rov.save()
 
 
 @pytest.fixture(scope="module")
@@ -60,23 +65,10 @@ def half(whole: bytes) -> bytes:
     return whole[len(whole) // 2 :]
 
 
-@pytest.fixture(scope="module")
-def midway(fmu: Fmu) -> bytes:
-    """Return the serialized state after ten steps."""
-    with fmu.instance() as rov:
-        rov.start(DISTURBED, stop=1.0)
-        run(rov, 0, 10)
-        return rov.save()
-
-
-# ---- The same bits ----
-
-
 def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> None:
     state = c_void_p()
     with fmu.instance() as rov:
-        rov.start(DISTURBED, stop=1.0)
-        run(rov, 0, 10)
+        midway(rov)
         rov.expect("GetFMUState", ctypes.byref(state))
         for _ in range(3):
             assert run(rov, 10, 20) == half(whole)
@@ -85,23 +77,21 @@ def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> N
         assert state.value is None
 
 
-def test_a_run_continues_in_another_process(fmu: Fmu, whole: bytes, midway: bytes, tmp_path: Path) -> None:
+_ELSEWHERE = """
+import sys; from pathlib import Path; from tests.fmu.calls.conftest import WRAPPERS
+from tests.fmu.calls.test_state import run
+with WRAPPERS[int(sys.argv[3])](Path(sys.argv[1])).instance(name='elsewhere') as rov:
+    rov.load(Path(sys.argv[2]).read_bytes())
+    sys.stdout.write(run(rov, 10, 20).hex())
+"""
+
+
+def test_a_run_continues_in_another_process(fmu: Fmu, whole: bytes, tmp_path: Path) -> None:
     saved = tmp_path / "state"
-    saved.write_bytes(midway)
-    script = (
-        "import sys; from pathlib import Path; from tests.fmu.calls.conftest import WRAPPERS\n"
-        "from tests.fmu.calls.test_state import run\n"
-        "with WRAPPERS[int(sys.argv[3])](Path(sys.argv[1])).instance(name='elsewhere') as rov:\n"
-        "    assert rov.load(Path(sys.argv[2]).read_bytes()) == 0, rov.log\n"
-        "    sys.stdout.write(run(rov, 10, 20).hex())\n"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", script, str(fmu.folder), str(saved), str(fmu.VERSION)],
-        cwd=Path(__file__).parents[3],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    with fmu.instance() as rov:
+        saved.write_bytes(midway(rov))
+    command = [sys.executable, "-c", _ELSEWHERE, str(fmu.folder), str(saved), str(fmu.VERSION)]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert bytes.fromhex(result.stdout) == half(whole)
 
 
@@ -118,98 +108,80 @@ def test_instances_that_step_in_turns_give_the_same_bits_as_alone(fmu: Fmu, whol
     assert b"".join(row[2] for row in together) == other
 
 
-# ---- Event Mode of Co-Simulation ----
+# ---- The content of a state ----
 
 
-@pytest.mark.parametrize("mode", fmi3.MODES[WITH_EVENTS])
-def test_with_event_mode_a_state_holds_the_mode(fmu3: fmi3.Fmu, mode: str) -> None:
-    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance(WITH_EVENTS) as another:
-        rov.reach(mode)
-        assert another.load(rov.save()) == OK
-        assert another.mode() == mode
-        assert another.save() == rov.save()
+@pytest.mark.parametrize(("kind", "mode"), fmi3.EVERY_MODE)
+def test_a_state_holds_the_mode(fmus: dict[int, Fmu], kind: int, mode: str) -> None:
+    for fmu in fmus.values():
+        if fmu.VERSION == 2 and (kind, mode) not in EVERY_MODE:
+            continue
+        with fmu.instance(kind) as rov, fmu.instance(kind) as another:
+            rov.reach(mode)
+            for before in (None, fmi3.MODES[kind][2]):
+                if before:
+                    another.expect("Reset")
+                    another.reach(before)
+                another.load(rov.save())
+                assert another.mode() == mode
+                assert another.save() == rov.save()
 
 
-def test_a_state_in_event_mode_is_refused_by_an_instance_without_event_mode(fmu3: fmi3.Fmu) -> None:
-    state, restored = c_void_p(), c_void_p()
-    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as other:
-        rov.reach(EVENT)
-        rov.expect("GetFMUState", ctypes.byref(state))
-        before = other.save()
-        assert other.call("SetFMUState", state) == ERROR
-        assert "Event Mode" in other.log[-1].text
-        assert other.deserialize(rov.save(), restored) == ERROR
-        assert restored.value is None
-        assert other.save() == before
-        rov.expect("FreeFMUState", ctypes.byref(state))
+def test_a_state_holds_every_value_and_the_time(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        saved, before = midway(rov), rov.get(list(fmu.variables))
+        rov.expect("Reset")
+        rov.start({"u_l": 0.1, "b_t_top": 3.0, "y": -4.0}, stop=50.0, at=40.0)
+        rov.step(40.0, 1.0)
+        rov.load(saved)
+        assert rov.get(list(fmu.variables)) == before
+        assert rov.time() == pytest.approx(0.5, abs=1e-15)
+        rov.step(0.5, 0.6, ERROR)  # past its stop time
 
 
 def test_a_state_between_steps_can_be_restored_with_event_mode_and_without(fmu3: fmi3.Fmu) -> None:
     with fmu3.instance() as plain, fmu3.instance(WITH_EVENTS) as events:
         plain.start(DISTURBED)
         events.reach(STEP)
-        commanded = {name: value for name, value in commands(0).items() if name in fmu3.inputs}
-        assert plain.set(commanded) == OK
-        assert events.load(plain.save()) == OK
+        plain.set({name: value for name, value in commands(0).items() if name in fmu3.inputs})
+        events.load(plain.save())
         assert events.mode() == STEP
         for rov in (plain, events):
-            assert rov.step(0.0, 0.3) == OK
+            rov.step(0.0, 0.3)
         assert events.get(fmu3.states) == plain.get(fmu3.states)
-        assert plain.load(events.save()) == OK
+        plain.load(events.save())
+
+
+# ---- States that are refused ----
+
+
+def assert_foreign(rov: AnyInstance, other: AnyInstance, reason: str) -> None:
+    """Assert that another instance refuses the state of an instance, in memory and as bytes, and does not change."""
+    state, before = c_void_p(), other.save()
+    rov.expect("GetFMUState", ctypes.byref(state))
+    other.refuse("SetFMUState", state)
+    assert other.log
+    other.load(rov.save(), ERROR)
+    assert reason in other.log[-1].text
+    assert other.save() == before
+    rov.expect("FreeFMUState", ctypes.byref(state))
+
+
+def test_a_state_in_event_mode_is_refused_by_an_instance_without_event_mode(fmu3: fmi3.Fmu) -> None:
+    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as other:
+        rov.reach(EVENT)
+        assert_foreign(rov, other, "Event Mode")
 
 
 def test_a_state_of_the_other_version_is_refused(fmus: dict[int, Fmu]) -> None:
     """A state names its version of FMI, both in memory and as bytes."""
     for version, fmu in fmus.items():
-        state, restored = c_void_p(), c_void_p()
         with fmu.instance() as rov, fmus[5 - version].instance() as other:
-            before = other.save()
-            rov.expect("GetFMUState", ctypes.byref(state))
-            assert other.call("SetFMUState", state) == ERROR
-            assert other.deserialize(rov.save(), restored) == ERROR
-            assert "not a state of this FMU" in other.log[-1].text
-            assert other.save() == before
-            rov.expect("FreeFMUState", ctypes.byref(state))
-
-
-# ---- The content of a state ----
-
-
-@pytest.mark.parametrize(("kind", "mode"), EVERY_MODE)
-def test_a_state_holds_the_mode(fmu: Fmu, kind: int, mode: str) -> None:
-    with fmu.instance(kind) as rov, fmu.instance(kind) as another:
-        rov.reach(mode)
-        assert another.load(rov.save()) == OK
-        assert another.mode() == mode
-        another.expect("Reset")
-        another.reach(MODES[kind][2])
-        assert another.load(rov.save()) == OK
-        assert another.mode() == mode
-
-
-def test_a_state_holds_every_value_and_the_time(fmu: Fmu, midway: bytes) -> None:
-    with fmu.instance() as rov:
-        rov.start(DISTURBED, stop=1.0)
-        run(rov, 0, 10)
-        before = rov.get(list(fmu.variables))
-        rov.expect("Reset")
-        rov.start({"u_l": 0.1, "b_t_top": 3.0, "y": -4.0}, stop=50.0, at=40.0)
-        assert rov.step(40.0, 1.0) == OK
-        assert rov.load(midway) == OK
-        assert rov.get(list(fmu.variables)) == before
-        assert rov.time() == pytest.approx(0.5, abs=1e-15)
-        assert rov.step(0.5, 0.6) == ERROR  # past its stop time
+            assert_foreign(rov, other, "not a state of this FMU")
 
 
 @pytest.mark.parametrize(("kind", "mode"), [(CO_SIMULATION, STEP), (MODEL_EXCHANGE, CONTINUOUS)])
 def test_a_state_of_the_other_interface_is_refused(fmu: Fmu, kind: int, mode: str) -> None:
-    state = c_void_p()
     with fmu.instance(kind) as rov, fmu.instance(1 - kind) as other:
         rov.reach(mode)
-        rov.expect("GetFMUState", ctypes.byref(state))
-        before = other.save()
-        for status in (other.call("SetFMUState", state), other.load(rov.save())):
-            assert status == ERROR
-            assert "interface" in other.log[-1].text
-            assert other.save() == before
-        rov.expect("FreeFMUState", ctypes.byref(state))
+        assert_foreign(rov, other, "interface")

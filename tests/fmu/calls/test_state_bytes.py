@@ -7,7 +7,7 @@ from math import inf, nan
 
 import pytest
 
-from tests.fmi import CO_SIMULATION, ERROR, INITIALIZATION, OK, AnyInstance, Fmu
+from tests.fmi import CO_SIMULATION, ERROR, INITIALIZATION, AnyInstance, Fmu
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +15,7 @@ def serialized(fmu: Fmu) -> bytes:
     """Return a serialized state between steps."""
     with fmu.instance() as rov:
         rov.start({"u_l": 0.3, "u": -0.4, "r": 0.9, "beta_u": 0.7, "V_E": 0.25}, stop=1.0)
-        assert rov.step(0.0, 0.5) == OK
+        rov.step(0.0, 0.5)
         return rov.save()
 
 
@@ -67,8 +67,8 @@ def test_a_state_cut_short_extended_or_foreign_is_refused(fmu: Fmu, serialized: 
 def test_values_that_no_run_can_reach_are_refused_even_with_the_right_checksum(fmu: Fmu) -> None:
     marks = {name: 0.5 + i / 1024 for i, name in enumerate(fmu.inputs + fmu.states + fmu.parameters)}
     with fmu.instance() as rov:
-        assert rov.initialize(start=0.4375) == OK
-        assert rov.set(marks) == OK
+        rov.initialize(start=0.4375)
+        rov.set(marks)
         good = rov.save()
         places = {name: good.index(struct.pack("<d", value)) for name, value in {**marks, "time": 0.4375}.items()}
 
@@ -78,7 +78,7 @@ def test_values_that_no_run_can_reach_are_refused_even_with_the_right_checksum(f
             return bytes(content) + checksum(bytes(content))
 
         assert with_value("u", marks["u"]) == good
-        assert rov.load(with_value("u", -8.5)) == OK
+        rov.load(with_value("u", -8.5))
         assert rov.mode() == INITIALIZATION
         for name in places:
             for value in (nan, inf, -inf):

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from tests import fmi2, fmi3
-from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, AnyInstance, reals
+from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, AnyInstance, reals
 
 _FOLDERS = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
 """The fixtures with the FMUs of two vehicles in both versions."""
@@ -27,8 +27,8 @@ def run(rov: AnyInstance, steps: int) -> list[bytes]:
     rng, t, seen = random.Random(6), 0.0, []
     for _ in range(steps):
         h = 10.0 ** rng.uniform(-4.0, 0.8)
-        assert rov.set({**inputs(rov, rng), f"beta_{rov.fmu.states[0]}": rng.uniform(0.5, 1.0)}) == OK
-        assert rov.step(t, h) == OK
+        rov.set({**inputs(rov, rng), f"beta_{rov.fmu.states[0]}": rng.uniform(0.5, 1.0)})
+        rov.step(t, h)
         t += h
         read = rov.get([name for name in rov.fmu.variables if name != "time"])
         read += rov.rates(rov.fmu.outputs)
@@ -55,7 +55,7 @@ def test_model_exchange_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu]) -> 
         with fmu.instance(MODEL_EXCHANGE) as rov:
             rov.reach(CONTINUOUS)
             for _ in range(300):
-                assert rov.set(inputs(rov, rng)) == OK
+                rov.set(inputs(rov, rng))
                 rov.expect("SetContinuousStates", reals(*(rng.uniform(-2.0, 2.0) for _ in range(n))), n)
                 rates = reals(*[0.0] * n)
                 rov.expect("GetContinuousStateDerivatives", rates, n)

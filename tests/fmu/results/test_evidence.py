@@ -50,26 +50,26 @@ def _roles(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def test_the_roles_are_those_of_the_standard(refit: Mapping[str, bytes]) -> None:
-    roles = _roles(refit)
-    assert roles["vehicle/videoray_refit.toml"] == "model"
-    assert roles["../../documentation/model_card.txt"] == "report"
-    assert roles["surge_70_expected.csv"] == roles["covariance.csv"] == "result"
-    assert roles["experiments.exp"] == "experiment/validation"
-    assert roles["uncertainty.exp"] == "experiment/uncertainty-analysis"
-    assert roles[f"../../{META_DATA}"] == "meta-data"
+    assert {
+        "vehicle/videoray_refit.toml": "model",
+        "../../documentation/model_card.txt": "report",
+        "surge_70_expected.csv": "result",
+        "covariance.csv": "result",
+        "experiments.exp": "experiment/validation",
+        "uncertainty.exp": "experiment/uncertainty-analysis",
+        f"../../{META_DATA}": "meta-data",
+    }.items() <= _roles(refit).items()
 
 
 def test_the_videoray_has_the_tables_of_the_paper(videoray_fmu: Path) -> None:
     with zipfile.ZipFile(videoray_fmu) as fmu:
         files = {name: fmu.read(name) for name in fmu.namelist()}
-    tables = [
-        source for source, role in _roles(files).items() if source.startswith("vehicle/tables") and role == "result"
-    ]
+    roles, folder = _roles(files), SHIPPED["videoray"].parent
+    tables = [source for source, role in roles.items() if source.startswith("vehicle/tables") and role == "result"]
     assert len(tables) == 6
-    folder = SHIPPED["videoray"].parent
     for source in (*tables, "vehicle/videoray.toml"):
         assert files[f"{FOLDER}/{source}"] == (folder / source.removeprefix("vehicle/")).read_bytes()
-    for source in _roles(files):
+    for source in roles:
         assert source.removeprefix("../../") in files or f"{FOLDER}/{source}" in files, "what is listed is there"
 
 
@@ -176,13 +176,33 @@ def test_the_meta_data_of_an_identified_vehicle_have_the_hashes_of_its_logs(tmp_
 # ---- An FMU that was altered -----------------------------------------------------------------------------------------
 
 
-def _altered(fmu: Path, path: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
-    """Write a copy of an FMU whose files have been changed, and return its path."""
-    with zipfile.ZipFile(fmu) as zipped:
-        files = {name: zipped.read(name) for name in zipped.namelist()}
-    change(files)
-    path.write_bytes(archive(files))
+def _write(path: Path, files: Mapping[str, bytes]) -> Path:
+    path.write_bytes(archive(dict(files)))
     return path
+
+
+def _read(fmu: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(fmu) as zipped:
+        return {name: zipped.read(name) for name in zipped.namelist()}
+
+
+def _flipped(content: bytes, place: int) -> bytes:
+    """Return the content with another byte at a place."""
+    return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+
+
+@pytest.fixture
+def refused(capsys: Capsys) -> Callable[..., str]:
+    """Return a function that proves an FMU, which must fail with one line, and returns the reason."""
+
+    def reason(fmu: Path, *options: str, code: int = 1) -> str:
+        capsys.readouterr()
+        assert main(["prove", str(fmu), *options]) == code
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        return err.removeprefix(f"rov-fmu: {fmu}: ")
+
+    return reason
 
 
 @pytest.mark.parametrize(
@@ -202,25 +222,15 @@ def _altered(fmu: Path, path: Path, change: Callable[[dict[str, bytes]], None]) 
 )
 @pytest.mark.parametrize("version", ["videoray_fmu", "videoray3_fmu"])
 def test_one_altered_byte_is_named(
-    part: str, version: str, tmp_path: Path, capsys: Capsys, request: pytest.FixtureRequest
+    part: str, version: str, tmp_path: Path, refused: Callable[..., str], request: pytest.FixtureRequest
 ) -> None:
-    names = []
-
-    def change(files: dict[str, bytes]) -> None:
-        name = next(name for name in files if name.startswith(part))
-        names.append(name)
-        middle = len(files[name]) // 2
-        files[name] = files[name][:middle] + bytes([files[name][middle] ^ 1]) + files[name][middle + 1 :]
-
-    fmu = _altered(request.getfixturevalue(version), tmp_path / "altered.fmu", change)
-    capsys.readouterr()
-    assert main(["prove", str(fmu)]) == 1
-    out, err = capsys.readouterr()
-    assert out == ""
+    files = _read(request.getfixturevalue(version))
+    name = next(name for name in files if name.startswith(part))
+    altered = {**files, name: _flipped(files[name], len(files[name]) // 2)}
     assert re.fullmatch(
-        re.escape(f"rov-fmu: {fmu}: '{names[0]}' was altered after the FMU was built: ")
+        re.escape(f"'{name}' was altered after the FMU was built: ")
         + r"its SHA3-256 is [0-9a-f]{16}…, and was [0-9a-f]{16}…\n",
-        err,
+        refused(_write(tmp_path / "altered.fmu", altered)),
     )
 
 
@@ -228,61 +238,49 @@ def test_no_byte_of_the_meta_data_can_be_altered(tmp_path: Path) -> None:
     """Whether it is a name, a hash, a word or a part of the XML: the line names the meta-data."""
     files = {"a": b"1", "b": b"2"}
     content = meta_data(load_vehicle(_REFIT), files)
-    fmu = tmp_path / "altered.fmu"
     for n in range(len(content)):
-        changed = content[:n] + bytes([content[n] ^ 1]) + content[n + 1 :]
-        fmu.write_bytes(archive({**files, META_DATA: changed}))
+        fmu = _write(tmp_path / "altered.fmu", {**files, META_DATA: _flipped(content, n)})
         with pytest.raises((ProofError, FileError)) as error:
             check_evidence(fmu)
         assert META_DATA in str(error.value)[: len(str(fmu)) + len(META_DATA) + 6], (n, str(error.value))
         assert "\n" not in str(error.value)
 
 
-def test_an_identified_vehicle_whose_data_were_altered_fails(tmp_path: Path, capsys: Capsys) -> None:
+def test_an_identified_vehicle_whose_data_were_altered_fails(tmp_path: Path, refused: Callable[..., str]) -> None:
     """Its covariance, its intervals and its vehicle file."""
     vehicle = load_vehicle(IDENTIFIED)
     files = reference_results(vehicle)
     files[META_DATA] = meta_data(vehicle, files)
-    for name in (
-        "covariance.csv",
-        "uncertainty.exp",
-        "uncertainty/a_d_u_low.ssv",
-        f"vehicle/{vehicle.identifier}.toml",
-    ):
-        path, content = f"{FOLDER}/{name}", files[f"{FOLDER}/{name}"]
-        fmu = tmp_path / "altered.fmu"
-        fmu.write_bytes(archive({**files, path: content[:-2] + bytes([content[-2] ^ 1]) + content[-1:]}))
-        assert main(["prove", str(fmu)]) == 1
-        assert capsys.readouterr().err.startswith(f"rov-fmu: {fmu}: '{path}' was altered after the FMU was built")
+    for name in ("covariance.csv", "uncertainty/a_d_u_low.ssv", f"vehicle/{vehicle.identifier}.toml"):
+        path = f"{FOLDER}/{name}"
+        altered = {**files, path: _flipped(files[path], len(files[path]) - 2)}
+        reason = refused(_write(tmp_path / "altered.fmu", altered))
+        assert reason.startswith(f"'{path}' was altered after the FMU was built")
 
 
-def test_files_that_were_added_or_taken_away_are_named(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
-    for words, change in (
-        ("'resources/more.txt' was added after", lambda files: files.update({"resources/more.txt": b""})),
-        (f"'{MANIFEST}' is missing", lambda files: files.pop(MANIFEST)),
-    ):
-        fmu = _altered(videoray_fmu, tmp_path / "altered.fmu", change)
-        assert main(["prove", str(fmu)]) == 1
-        assert words in capsys.readouterr().err
-    fmu = tmp_path / "two.fmu"
+def test_files_that_were_added_or_taken_away_are_named(
+    videoray_fmu: Path, tmp_path: Path, refused: Callable[..., str]
+) -> None:
+    fmu, files = tmp_path / "altered.fmu", _read(videoray_fmu)
+    more = _write(fmu, {**files, "resources/more.txt": b""})
+    assert refused(more).startswith("'resources/more.txt' was added after")
+    del files[MANIFEST]
+    assert refused(_write(fmu, files)).startswith(f"'{MANIFEST}' is missing")
     files = {"a": b"1"}
-    fmu.write_bytes(archive({**files, META_DATA: meta_data(load_vehicle(_REFIT), files)}))
+    _write(fmu, {**files, META_DATA: meta_data(load_vehicle(_REFIT), files)})
     with zipfile.ZipFile(fmu, "a") as twice, pytest.warns(UserWarning, match="Duplicate name"):
         twice.writestr("a", b"2")
-    assert main(["prove", str(fmu)]) == 1
-    assert capsys.readouterr().err == f"rov-fmu: {fmu}: 'a' is 2 times in the archive\n"
+    assert refused(fmu) == "'a' is 2 times in the archive\n"
 
 
 def test_a_byte_changed_in_the_archive_itself_names_the_file(
-    videoray_fmu: Path, tmp_path: Path, capsys: Capsys
+    videoray_fmu: Path, tmp_path: Path, refused: Callable[..., str]
 ) -> None:
-    content = bytearray(videoray_fmu.read_bytes())
     with zipfile.ZipFile(videoray_fmu) as zipped:
         entry = next(entry for entry in zipped.infolist() if entry.filename.startswith("binaries/"))
-    content[entry.header_offset + 1000] ^= 1
-    (tmp_path / "damaged.fmu").write_bytes(content)
-    assert main(["prove", str(tmp_path / "damaged.fmu")]) == 1
-    assert f"'{entry.filename}' was altered after the FMU was built: " in capsys.readouterr().err
+    fmu = tmp_path / "damaged.fmu"
+    fmu.write_bytes(_flipped(videoray_fmu.read_bytes(), entry.header_offset + 1000))
+    assert refused(fmu).startswith(f"'{entry.filename}' was altered after the FMU was built: ")
 
 
 # ---- Signatures ------------------------------------------------------------------------------------------------------
@@ -352,13 +350,9 @@ def test_openssh_agrees(signed_fmu: Path, keys: Path, tmp_path: Path) -> None:
     assert copy.with_name("refit.fmu.sig").read_bytes() == ours.read_bytes()
 
 
-def test_a_signature_that_does_not_fit_fails(signed_fmu: Path, keys: Path, tmp_path: Path, capsys: Capsys) -> None:
-    def refused(fmu: Path, *options: str) -> str:
-        assert main(["prove", str(fmu), *options]) == 1
-        out, err = capsys.readouterr()
-        assert (out, err.count("\n")) == ("", 1)
-        return err.removeprefix(f"rov-fmu: {fmu}: ")
-
+def test_a_signature_that_does_not_fit_fails(
+    signed_fmu: Path, keys: Path, tmp_path: Path, refused: Callable[..., str]
+) -> None:
     fmu, signature = (Path(shutil.copy(path, tmp_path)) for path in (signed_fmu, f"{signed_fmu}.sig"))
     assert "is signed by another key, SHA256:" in refused(fmu, "--key", str(keys / "other.pub"))
     with zipfile.ZipFile(fmu, "a") as longer:
@@ -373,14 +367,16 @@ def test_no_letter_of_a_signature_can_be_altered(signed_fmu: Path, tmp_path: Pat
     good = Path(f"{signed_fmu}.sig").read_bytes()
     for n, byte in enumerate(good):
         if not chr(byte).isspace():
-            Path(f"{fmu}.sig").write_bytes(good[:n] + bytes([byte ^ 1]) + good[n + 1 :])
+            Path(f"{fmu}.sig").write_bytes(_flipped(good, n))
             with pytest.raises((ProofError, FileError)) as error:
                 check_signature(fmu)
             assert f"{fmu}.sig" in str(error.value)
             assert "\n" not in str(error.value)
 
 
-def test_bad_keys_and_signatures_are_one_line(signed_fmu: Path, keys: Path, tmp_path: Path, capsys: Capsys) -> None:
+def test_bad_keys_and_signatures_are_one_line(
+    signed_fmu: Path, keys: Path, tmp_path: Path, capsys: Capsys, refused: Callable[..., str]
+) -> None:
     make = "must be an Ed25519 key, which `ssh-keygen -t ed25519 -f KEY` makes"
     for name, reason in {
         "text": f"is not a private key: {make}",
@@ -393,14 +389,12 @@ def test_bad_keys_and_signatures_are_one_line(signed_fmu: Path, keys: Path, tmp_
         assert capsys.readouterr().err == f"rov-fmu: {keys / name}: {reason}\n"
     assert not [*tmp_path.iterdir()]
     for name in ("text", "none", "key"):
-        assert main(["prove", str(signed_fmu), "--key", str(keys / name)]) == 2
-        assert capsys.readouterr().err.startswith(f"rov-fmu: {keys / name}: ")
+        assert refused(signed_fmu, "--key", str(keys / name), code=2).startswith(f"rov-fmu: {keys / name}: ")
     fmu, good = Path(shutil.copy(signed_fmu, tmp_path)), Path(f"{signed_fmu}.sig").read_text(encoding="ascii")
     for text in ("", "none", good[:100], good.replace("U1NIU0lH", "U1NIU0lI"), good.replace("\nAAAA", "\nBBBB")[::-1]):
         Path(f"{fmu}.sig").write_text(text, encoding="ascii")
-        assert main(["prove", str(fmu)]) == 2
         expected = f"rov-fmu: {fmu}.sig: is not a signature by Ed25519 for rov-fmu, in OpenSSH's format\n"
-        assert capsys.readouterr().err == expected
+        assert refused(fmu, code=2) == expected
 
 
 def test_without_the_library_a_line_says_what_to_install(

@@ -1,16 +1,13 @@
 """Reading the experiments in an FMU: defaults, limits and mistakes (rov_fmu/fmu/experiments.py)."""
 
 import zipfile
-from array import array
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST, Experiment, ReferenceResults
-from rov_fmu.fmu.proof import _deviation
 from rov_fmu.io.messages import FileError
 
 _ROWS = "time,y\n0,0\n1,1\n"
@@ -109,26 +106,3 @@ def test_a_mistake_is_one_line(given: dict[str, Any], reason: str, tmp_path: Pat
         read(tmp_path, **given)
     path = "extra/org.fmi-standard.fmi-ls-ref/"
     assert str(caught.value).startswith(f"{tmp_path / 'one.fmu'}: {path}{reason}")
-
-
-# ---- Comparison ----
-
-
-@pytest.mark.parametrize(
-    ("at", "expected", "deviation"),
-    [
-        ((0.0, 1.0, 3.0), (0.0, 10.0, 30.0), 0.0),
-        ((0.5,), (5.25,), 0.25),  # between two times
-        ((2.0,), (21.0,), 1.0),  # the nearer of the two values at an event
-        ((2.0,), (-6.0,), 1.0),
-        ((1.0 + 0.9e-9,), (10.0,), 0.0),
-        ((3.0, 3.1), (30.0, 30.0), np.inf),
-        ((-0.1,), (0.0,), np.inf),
-        ((4.0,), (0.0,), np.inf),
-        ((3.0, 1.0), (32.0, 11.0), 2.0),
-    ],
-)
-def test_the_deviation_is_the_largest(at: tuple[float, ...], expected: tuple[float, ...], deviation: float) -> None:
-    run, values = np.array([0.0, 1.0, 2.0, 2.0, 3.0]), [0.0, 10.0, 20.0, -5.0, 30.0]
-    assert _deviation(run, values, array("d", at), array("d", expected)) == pytest.approx(deviation, abs=1e-12)
-    assert _deviation(run, [*values[:4], np.nan], array("d", (3.0,)), array("d", (30.0,))) == np.inf

@@ -68,6 +68,11 @@ def _rows(files: Mapping[str, bytes], name: str) -> list[dict[str, float]]:
     return [{key: float(value) for key, value in line.items()} for line in lines]
 
 
+def _parameters(files: Mapping[str, bytes], name: str) -> dict[str, float]:
+    parameters = etree.fromstring(files[f"{FOLDER}/{name}"]).iter("{*}Parameter")
+    return {p.get("name"): float(p[0].get("value")) for p in parameters}
+
+
 def _experiments(files: Mapping[str, bytes]) -> dict[str, Any]:
     return {x.get("name"): x for x in etree.fromstring(files[f"{FOLDER}/experiments.exp"])}
 
@@ -107,22 +112,6 @@ def check_experiments_of_axes(vehicle: Vehicle, files: Mapping[str, bytes]) -> N
     assert moved.keys() - {"time"} == (vehicle.layout.state | vehicle.layout.angles).keys() - set(QUATERNION)
 
 
-def test_a_step_response_is_eight_time_constants_and_a_manoeuvre_four_phases_in_tenths() -> None:
-    """Tau is that of the closed form, to three digits, but at most 10 s."""
-    vehicle, files = _shipped("videoray")
-    slow = load_tables(vehicle)[0].rows
-    times = {}
-    for experiment in etree.fromstring(files[f"{FOLDER}/experiments.exp"]).iter("Experiment"):
-        name, stop, step = (experiment.get(key) for key in ("name", "stopTime", "stepSize"))
-        times[name] = float(stop), float(step)
-    for name, (stop, step) in times.items():
-        assert stop / step == pytest.approx(40.0 if name == "manoeuvre" else 80.0)
-    for row in slow:
-        for model, response in (("tuned", row.scaled), ("untuned", row.non_linear)):
-            Tau = min(float(f"{response.Tau.computed:.3g}"), 10.0)
-            assert times[f"heave_{row.command:g}_{model}"][0] == pytest.approx(8.0 * Tau, rel=1e-10)
-
-
 def test_the_tables_of_the_paper_are_experiments() -> None:
     vehicle, files = _shipped("videoray")
     experiments, printed = _experiments(files), 0
@@ -146,10 +135,7 @@ def test_the_tables_of_the_paper_are_experiments() -> None:
                 assert after_tau["time"] == pytest.approx(Tau, rel=5e-3)
                 assert after_tau[v] == pytest.approx((1.0 - 1.0 / e) * V_ss, rel=5e-3)
                 assert last[v] == pytest.approx(V_ss, rel=1e-3)
-                ((_, parameters),) = [
-                    (x, {p.get("name"): float(p[0].get("value")) for p in x.iter("{*}Parameter")})
-                    for x in [etree.fromstring(files[f"{FOLDER}/{experiment.find('Parameters').get('source')}"])]
-                ]
+                parameters = _parameters(files, experiment.find("Parameters").get("source"))
                 assert parameters == {key: model[key] for key in parameters}
                 assert len(parameters) == 6
     assert printed == 28
@@ -172,33 +158,19 @@ def _check(rov: Vehicle, files: Mapping[str, bytes], name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "experiment"),
+    ("name", "experiments"),
     [
-        ("videoray", "surge_30_tuned"),
-        ("videoray", "manoeuvre"),
-        pytest.param("bluerov2_heavy", "heave_100", marks=pytest.mark.long),
+        ("videoray", ["surge_30_tuned", "manoeuvre"]),
+        pytest.param("bluerov2_heavy", ["heave_100"], marks=pytest.mark.long),
+        pytest.param("videoray", [], marks=pytest.mark.long),
+        *(pytest.param(name, [], marks=pytest.mark.weekly) for name in SHIPPED if name != "videoray"),
     ],
 )
-def test_expected_values_are_right_to_their_last_digit(name: str, experiment: str) -> None:
+def test_expected_values_are_right_to_their_last_digit(name: str, experiments: list[str]) -> None:
+    """Those of all experiments if none is named; with coupling and lag, 50 digits take minutes."""
     vehicle, files = _shipped(name)
-    _check(vehicle, files, experiment)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.long if name == "videoray" else pytest.mark.weekly) for name in SHIPPED],
-)
-def test_all_expected_values_are_right_to_their_last_digit(name: str) -> None:
-    """All experiments of the shipped vehicles; with coupling and lag, 50 digits take minutes."""
-    vehicle, files = _shipped(name)
-    for experiment in _experiments(files):
+    for experiment in experiments or _experiments(files):
         _check(untuned(vehicle) if experiment.endswith("_untuned") else vehicle, files, experiment)
-
-
-# ---- Fast motions ----------------------------------------------------------------------------------------------------
-
-
-# ---- Roll and pitch --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.long
@@ -207,8 +179,7 @@ def test_expected_values_with_roll_and_pitch_are_those_of_the_rigid_body() -> No
     vehicle = a_vehicle(SIX)
     files = reference_results(vehicle)
     check_experiments_of_axes(vehicle, files)
-    parameters = etree.fromstring(files[f"{FOLDER}/attitude.ssv"])
-    angles = {p.get("name"): float(p[0].get("value")) for p in parameters.iter("{*}Parameter")}
+    angles = _parameters(files, "attitude.ssv")
     assert angles.keys() == SIX.layout.initial.keys()
     for name, start in (("roll_100", (0.0, 0.0, 0.0)), ("manoeuvre", [*angles.values()])):
         stimuli, expected = (_rows(files, f"{name}{end}.csv") for end in ("", "_expected"))
