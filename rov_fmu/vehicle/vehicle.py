@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache
+from itertools import chain
 from math import inf, isfinite, sin
 from numbers import Real
 from pathlib import Path
@@ -53,8 +54,8 @@ class _Formulas:
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
         self.alone = {
-            form.axis.name: compiled(alone_formulas(layout, form.axis.velocity), equation.measured)
-            for form in layout.axes
+            vehicle_axis.axis.name: compiled(alone_formulas(layout, vehicle_axis.axis.velocity), equation.measured)
+            for vehicle_axis in layout.axes
         }
         self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
 
@@ -164,12 +165,14 @@ class Vehicle:
     @property
     def files(self) -> list[Path]:
         """The existing files that belong to the vehicle file: its tables, pictures and report."""
-        report = self.provenance.report if self.provenance else None
-        tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
         measured = [table for curve in self.layout.curves for table in (*curve.tables, curve.electric_current)]
-        tables += [table.path for table in measured if table and table.path]
-        pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
-        return [path for path in (*tables, *pictures, report) if path and path.is_file()]
+        paths = [
+            *(self.data and self.data / name for name in chain(*TABLES.values())),
+            *(table and table.path for table in measured),
+            *(self.pictures and self.pictures / name for name in PICTURES),
+            self.provenance and self.provenance.report,
+        ]
+        return [path for path in paths if path and path.is_file()]
 
     @property
     def uncertainty(self) -> "Uncertainty":
@@ -265,9 +268,9 @@ class Vehicle:
 
     # ---- One axis alone ----
 
-    def effective_inertia(self, form: VehicleAxis) -> float:
+    def effective_inertia(self, vehicle_axis: VehicleAxis) -> float:
         """Return the effective inertia m/β (kg, kg.m2): the load per acceleration along an axis alone."""
-        gain = self.parameters[self._formulas.names("gain", form.axis.velocity).identifier]
+        gain = self.parameters[self._formulas.names("gain", vehicle_axis.axis.velocity).identifier]
         return 1.0 / gain if gain > 0.0 else inf
 
     def alone(self, axis: Axis, inputs: Values) -> AxisAlone:
@@ -277,7 +280,9 @@ class Vehicle:
     def motions(self, inputs: Values) -> tuple[AxisAlone, ...]:
         """Return the motion of each axis alone under held inputs, once the thrust is steady."""
         values = {**self._steady(inputs), **self.parameters}
-        return tuple(AxisAlone.of(self._formulas.alone[form.axis.name](values)) for form in self.layout.axes)
+        return tuple(
+            AxisAlone.of(self._formulas.alone[vehicle_axis.axis.name](values)) for vehicle_axis in self.layout.axes
+        )
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
