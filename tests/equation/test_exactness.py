@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Iterable
-from functools import partial
 from itertools import islice, product
 from math import copysign, cos, sin
 from time import process_time
@@ -13,13 +12,11 @@ from mpmath import mp
 from scipy.integrate import solve_ivp
 
 from rov_fmu.equation.alone import AxisAlone as Axis
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.equation.steps import Step, errors, in_fmu, in_python
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.equation.steps import Step, errors, in_python
 from tests.fmi import ERROR
 from tests.fmi2 import Fmu
 from tests.vehicles import (
-    EVERYTHING,
-    HEAVY,
     VEHICLES,
     VIDEORAY,
     Case,
@@ -68,25 +65,6 @@ def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> Non
     """The tolerance is larger because some forces nearly cancel, such as two opposite thrusters, or load and thrust."""
     rng = random.Random(1)
     hold([in_python], [random_case(rng, random_vehicle(rng), longest=longest) for _ in range(number)], 1e-12, 1e-12)
-
-
-@pytest.mark.parametrize(
-    ("number", "longest"), [(2, 0.3), pytest.param(8, 2.0, marks=LONG), pytest.param(30, 2.0, marks=WEEKLY)]
-)
-@pytest.mark.parametrize(("name", "rov"), [("heavy", HEAVY), ("everything", load_vehicle(EVERYTHING))])
-def test_a_step_with_coupling_and_lag_is_exact_in_c(
-    request: pytest.FixtureRequest, name: str, rov: Vehicle, number: int, longest: float
-) -> None:
-    rng, step = random.Random(2), partial(in_fmu, Fmu(request.getfixturevalue(f"{name}_dir")))
-    hold([step], [random_case(rng, rov, longest=longest) for _ in range(number)])
-
-
-@pytest.mark.parametrize("number", [10, pytest.param(60, marks=LONG), pytest.param(400, marks=WEEKLY)])
-def test_a_step_of_any_vehicle_of_the_paper_is_exact(steps: list[Step], number: int) -> None:
-    """Random coefficients replace those of the VideoRay."""
-    rng = random.Random(3)
-    vehicles = (random_vehicle(rng, VIDEORAY.layout) for _ in range(number))
-    hold(steps, [random_case(rng, rov, longest=1.0) for rov in vehicles], 1e-12, 1e-12)
 
 
 @pytest.mark.parametrize("stride", [17, pytest.param(1, marks=LONG)])
@@ -146,19 +124,6 @@ def test_a_spin_that_drag_slows_down_is_exact(steps: list[Step], stride: int) ->
                 position = mp.mpc(found["x"], copysign(found["y"], r * found["y"]))
                 assert abs(position - exact) <= size * 2e-15 * (1 + turn)
                 assert abs(abs(found["psi"]) - turn) <= 1e-15 * turn
-
-
-def spin_up(turn: float, h: float) -> float:
-    """Return the angular acceleration that turns a vehicle by this angle in h seconds from rest."""
-    return 2.0 * turn / h**2
-
-
-@pytest.mark.parametrize("stride", [7, pytest.param(1, marks=LONG)])
-def test_a_turn_that_begins_at_rest_is_exact(steps: list[Step], stride: int) -> None:
-    cases = product((1e-3, 0.1), (0.01, 0.05, 0.12, 0.7, 2.0, 4.0), (0.0, 0.3), (0.0, 0.1))
-    for h, turn, B, share in islice(cases, 0, None, stride):
-        C = spin_up(turn, h)
-        hold(steps, [of_axes(Axis(0.1, 0.2, 0.0), Axis(0.0, B, C), 0.5, share * C * h, h)])
 
 
 # Axes of surge and yaw, u, r and h. Some numbers are huge, others next to nothing.
