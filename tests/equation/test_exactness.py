@@ -130,13 +130,11 @@ def test_a_spin_that_drag_slows_down_is_exact(steps: list[Step], stride: int) ->
 CALM = Axis(0.5, 1.4, 0.27)
 OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e308 m
     "turn": of_axes(CALM, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
-    "spin": of_axes(CALM, Axis(0.0055, 0.0, 0.0), 0.0, 1.7e308, 1e308),
-    "distance": of_axes(Axis(0.0, 0.0, 1e300), CALM, 0.0, 1.0, 1e8),
     "both": of_axes(Axis(0.0, 0.0, -1.0), Axis(0.0, 0.0, 0.0), 1e10, 1e300, 1e10 + 10.0),
 }
 
 
-@pytest.mark.parametrize("name", ["turn", *(pytest.param(name, marks=LONG) for name in ("spin", "distance", "both"))])
+@pytest.mark.parametrize("name", ["turn", pytest.param("both", marks=LONG)])
 def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: Fmu, name: str) -> None:
     rov, inputs, before, h = OVERFLOWING[name]
     start = process_time()
@@ -153,11 +151,7 @@ AHEAD = {"u_l": 0.5, "u_r": 0.5}
 MANOEUVRES: dict[str, tuple[Values, Values]] = {
     "ahead": (AHEAD, {}),
     "astern": ({"u_l": -0.7, "u_r": -0.7}, {}),
-    "reversing": ({"u_l": -0.5, "u_r": -0.5}, {"u": 1.2}),
     "turning": ({"u_l": 0.6, "u_r": 0.3}, {"psi": 1.0}),
-    "turning back": ({"u_l": 0.3, "u_r": 0.6}, {"u": 0.8, "r": 1.5}),
-    "spinning": ({"u_l": 0.7, "u_r": -0.7}, {"u": 0.5}),
-    "diving": ({"u_t": 0.7}, {"w": -0.3, "z": 5.0}),
     "against loads": (
         {"u_l": 0.4, "u_r": 0.2, "u_t": -0.3, "X_ext": -3.0, "Z_ext": 1.5, "N_ext": 0.1},
         {"u": 0.5, "w": 0.2, "r": -1.0},
@@ -221,14 +215,3 @@ def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(steps: list[Ste
             found = step(VIDEORAY, inputs, before, 1000.0)
             assert process_time() - started < 0.1
             assert max(errors(found, exact.state, exact.scale, before)) <= 1e-14
-
-
-@pytest.mark.parametrize("psi", [1e3, -1e6, 1e9])
-def test_a_heading_far_from_zero_is_as_good_as_one_near_it(steps: list[Step], psi: float) -> None:
-    inputs, before = {**still(VIDEORAY), "u_l": 0.6, "u_r": 0.3}, {**at_rest(VIDEORAY), "u": 0.5}
-    for step in steps:
-        near, far = (step(VIDEORAY, inputs, {**before, "psi": start}, 10.0) for start in (0.0, psi))
-        assert (far["u"], far["r"]) == pytest.approx((near["u"], near["r"]), rel=1e-14)
-        c, d, x, y = cos(psi), sin(psi), near["x"], near["y"]
-        assert (far["x"], far["y"]) == pytest.approx((x * c - y * d, x * d + y * c), rel=1e-13, abs=1e-15)
-        assert far["psi"] == pytest.approx(psi + near["psi"], rel=1e-15)

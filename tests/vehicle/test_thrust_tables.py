@@ -232,6 +232,8 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"fin.rudder.direction": {"value": [0, 0, 1], "source": "x"}, "axes.heave": GONE, "thruster.top": GONE},
         "fin.rudder: its lift acts on no axis of the vehicle, which are surge, sway, yaw",
     ),
+    "no such file": ({"curves.bow.table": "none.csv"}, "curves.bow.table = 'none.csv': there is no such file"),
+    "a file outside": ({"curves.bow.table": "../x.csv"}, "must lead to a place inside the folder of this file"),
 }
 
 

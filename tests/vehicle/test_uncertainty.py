@@ -19,7 +19,6 @@ from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
-ROW = "b_d_u = { error = 1.30987, correlation = { a_d_u = -0.883478 } }"
 
 
 @pytest.fixture(scope="module")

@@ -79,8 +79,6 @@ def value(name: str, text: str) -> Callable[[str], str]:
     return edit(rf"(?<=^{name} = {{ value = )[^,]*", text)
 
 
-_COEFFICIENTS_OF_VERSION_1 = '[coefficients]\nm_rov = { value = 6.57, unit = "kg", source = "Table 9" }\n'
-
 # How the file is changed, and what the one line must contain: the key, the value, what is allowed.
 BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown coefficient": (
@@ -88,28 +86,15 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
         ("arm.mass: there is no such key, only R, gamma",),
     ),
     "missing coefficient": (edit(r"^m_rov = .*$", ""), ("body.m_rov", "missing")),
-    "missing unit": (
-        edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""),
-        ('arm.R.unit: this key is missing: write unit = "m"',),
-    ),
     "number without unit and source": (
         edit(r"^R = .*$", "R = 0.22"),
         ('arm.R = 0.22: must be { value = ..., unit = "m", source = ... }',),
     ),
     "text for a number": (value("m_rov", '"heavy"'), ("body.m_rov.value", "'heavy'", "number")),
-    "list for a number": (value("m_rov", "[6.57]"), ("body.m_rov.value = [6.57]: must be a number",)),
-    "number for a text": (edit(r"^name = .*$", "name = 4"), ("vehicle.name", "4", "must be text in quotes")),
     "negative mass": (value("m_rov", "-6.57"), ("body.m_rov", "-6.57", "0.001")),
     "gamma in degrees": (value("gamma", "24.2"), ("arm.gamma", "24.2", "1.57")),
     "infinity": (value("b_t", "inf"), ("curves.rear.b_t.value", "inf", "finite")),
-    "an interval without ends": (value("m_rov", "6.57, interval = []"), ("m_rov.interval = []: must have 2 entries",)),
-    "a table with an endless name that is none": (
-        lambda text: f"{text}\n[alternatives]\n{'x' * 300} = ''",
-        ("alternatives.xx", "must be a table: write [altern", "x..."),
-    ),
-    "larger than a double": (value("b_t", "1e999"), ("curves.rear.b_t.value", "inf", "finite")),
     "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("body.m_rov", "'lb'", "'kg'")),
-    "identifier with a digit first": (edit(r"^identifier = .*$", 'identifier = "4pro"'), ("identifier", "'4pro'")),
     **{
         f"identifier {name}, which Windows reserves": (
             edit(r"^identifier = .*$", f'identifier = "{name}"'),
@@ -119,18 +104,32 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     },
     "blank name": (edit(r"^name = .*$", 'name = " "'), ("vehicle.name = ' ': must not be blank",)),
     "commands in percent": (edit(r"^command_max = .*$", "command_max = 70.0"), ("validity.command_max", "70.0")),
-    "range upside down": (edit(r"^command_min = .*$", "command_min = 0.8"), ("validity.command_min", "0.8", "0.7")),
     "a list in a list in a list": (lambda text: text + "deep = " + "[" * 5000, ("not TOML",)),
     "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), ("vehicle.data", "'nowhere'", "no such folder")),
     "a decimal comma": (value("m_rov", "6,57"), ("not TOML", "(a number needs a decimal point)")),
     "not TOML": (edit(r"^\[body\]$", "[body"), ("not TOML", "line ", ": [body")),
-    "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
     "no format": (edit("^format = 2$", ""), ("format: this key is missing: write format = 2",)),
-    "an unknown table": (edit(r"^\[body\]$", "[bodyy]"), ("bodyy: there is no such key; did you mean body?",)),
     "a number in a list of texts": (
         edit(r"^limits = \[", "limits = [3, "),
         ("validity.limits = [3, ", "entry 1 must be text in quotes"),
     ),
+    "missing section": (
+        lambda text: text.split("[validity]")[0] + "[body]" + text.split("[body]")[1],
+        ("validity", "missing"),
+    ),
+    "an unknown table": (edit(r"^\[body\]$", "[bodyy]"), ("bodyy: there is no such key; did you mean body?",)),
+    "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
+    "no range of commands": (
+        edit(r"^command_max = .*$", "command_max = 0.2"),
+        ("validity.command_min", "0.2", "less than", "command_max"),
+    ),
+    "missing unit": (
+        edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""),
+        ('arm.R.unit: this key is missing: write unit = "m"',),
+    ),
+    "identifier with a digit first": (edit(r"^identifier = .*$", 'identifier = "4pro"'), ("identifier", "'4pro'")),
+    "integer larger than a double": (value("b_t", "1" + 400 * "0"), ("curves.rear.b_t", "at most 308 digits")),
+    "an interval without ends": (value("m_rov", "6.57, interval = []"), ("m_rov.interval = []: must have 2 entries",)),
 }
 
 
