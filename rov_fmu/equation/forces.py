@@ -88,14 +88,14 @@ def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
 
 def effects_of(layout: Layout) -> list[Effect]:
     """Return the effects that a vehicle has, each once."""
-    found = [force.effect for force in forces_of(layout, Names())]
+    of_forces = [force.effect for force in forces_of(layout, Names())]
     has = {
         LAG: bool(layout.lagging),
         DEAD_BAND: any("c_0" in curve.keys or curve.tables for curve in layout.curves),  # a table may have one
         DEAD_TIME: layout.has_dead_time,
         COUPLING: layout.coupled,
     }
-    return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *found]))
+    return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *of_forces]))
 
 
 # ---- The forces ------------------------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ def thrusts(
 
     `arriving` gives the changes of these thrusts until they are steady.
     """
-    found = []
+    parts = []
     for t in layout.drivers(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
@@ -133,8 +133,8 @@ def thrusts(
                 force = steady_name(t.name, own, names) - force
             if axis is YAW and t.position is None and t.arm:
                 force = names("arm") * force
-            found.append(scaled(t.effect(axis), force))
-    return found
+            parts.append(scaled(t.effect(axis), force))
+    return parts
 
 
 def _drag(layout: Layout) -> Iterator[Force]:

@@ -153,12 +153,12 @@ class Equation:
     @cached_property
     def _reach(self) -> dict[str, set[str]]:
         """For each state, the states on which it depends, directly or through others."""
-        found = {name: set(states) for name, states in self.states_in_rate.items()}
+        reach = {name: set(states) for name, states in self.states_in_rate.items()}
         for middle in self.states:
             for name in self.states:
-                if middle in found[name]:
-                    found[name] |= found[middle]
-        return found
+                if middle in reach[name]:
+                    reach[name] |= reach[middle]
+        return reach
 
     @cached_property
     def _settling(self) -> frozenset[str]:
@@ -191,12 +191,12 @@ class Equation:
     @cached_property
     def rates(self) -> dict[str, Expression]:
         """The time derivative of each state of the vehicle, as a formula of its states and of `program`."""
-        found = {name: rate for name, (rate, _) in self.lagging.items()}
+        rates = {name: rate for name, (rate, _) in self.lagging.items()}
         for name, terms in self.rows.items():
-            found[name] = rate_formula(term for term in terms if not self._is_lag(term))
+            rates[name] = rate_formula(term for term in terms if not self._is_lag(term))
         if self.ends:
-            found |= quaternion_rates(frozenset(self.states))
-        return found
+            rates |= quaternion_rates(frozenset(self.states))
+        return rates
 
     def _is_lag(self, term: Term) -> bool:
         """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
@@ -205,8 +205,8 @@ class Equation:
     @cached_property
     def monitored(self) -> tuple[str, ...]:
         """The velocities whose reversals end a piece of a step."""
-        found = {directed.velocity for directed in self.directed.values()}
-        return tuple(name for name in self.states if name in found)
+        velocities = {directed.velocity for directed in self.directed.values()}
+        return tuple(name for name in self.states if name in velocities)
 
 
 def rate_formula(terms: Iterable[Term]) -> Expression:
@@ -398,7 +398,7 @@ def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
     With s = w w, a cubic drag is c s w, and s' = 2 w w' again has products of at most two states: w w is s.
     """
     products: dict[tuple[str, ...], str] = {}
-    found: Rows = {}
+    new_rows: Rows = {}
     waiting = dict(rows)
 
     def shortened(factors: tuple[str, ...]) -> tuple[str, ...]:
@@ -419,8 +419,8 @@ def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
 
     while waiting:
         name = next(iter(waiting))
-        found[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
-    return found, {name: product(*map(Name, pair)) for pair, name in products.items()}
+        new_rows[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
+    return new_rows, {name: product(*map(Name, pair)) for pair, name in products.items()}
 
 
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
@@ -467,22 +467,22 @@ sign and a coordinate."""
 
 def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
     """Return formulas for the inverse of the mass matrix (18), the arm (4), the lags' rates, and restoring."""
-    found = mass.parameters()
+    formulas = mass.parameters()
     if layout.has_arm:
-        found[names("arm").identifier] = Name("R") * call("sin", Name("gamma"))
+        formulas[names("arm").identifier] = Name("R") * call("sin", Name("gamma"))
     for curve in layout.curves:
         if curve.has_lag:
-            found[names("rate", curve.name).identifier] = 1.0 / Name(curve.coefficient("T"))
+            formulas[names("rate", curve.name).identifier] = 1.0 / Name(curve.coefficient("T"))
     if layout.restoring:
-        found[names("net_weight").identifier] = Name("W") - Name("B")
+        formulas[names("net_weight").identifier] = Name("W") - Name("B")
         for axis in "xyz":
             moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
-            found[names("righting", axis).identifier] = total(
+            formulas[names("righting", axis).identifier] = total(
                 scaled(sign, Name(force) * Name(centre))
                 for sign, force, centre in moments
                 if centre in layout.restoring
             )
-    return found
+    return formulas
 
 
 def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
@@ -503,7 +503,7 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
     """
     if not layout.identified:
         return {}
-    found: dict[str, Expression] = {}
+    formulas: dict[str, Expression] = {}
     limited = {*layout.velocities, *(name for name in ("phi", "theta") if name in layout.angles)}
     largest: Expression = of(0.0)
     for one in layout.identified:
@@ -512,10 +512,10 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
             quantities = {(one.name, t.name): call("abs", names("command", t.name)) for t in layout.thrusters}
         for owners, x in quantities.items():
             beyond, up_to = names("outside", *owners), names("largest", *owners)
-            found[beyond.identifier] = _beyond(x, one)
-            found[up_to.identifier] = where(largest < beyond, beyond, largest)
+            formulas[beyond.identifier] = _beyond(x, one)
+            formulas[up_to.identifier] = where(largest < beyond, beyond, largest)
             largest = up_to
-    return {**found, "outside": largest}
+    return {**formulas, "outside": largest}
 
 
 def _beyond(x: Expression, known: Range) -> Expression:

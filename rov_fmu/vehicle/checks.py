@@ -397,10 +397,10 @@ def _wrong_correlation(name: str, other: str, rows: Mapping[str, Estimated]) -> 
 
 
 def check_quantities(
-    table: str, found: Mapping[str, Quantity], declarations: Mapping[str, Declaration]
+    table: str, quantities: Mapping[str, Quantity], declarations: Mapping[str, Declaration]
 ) -> Iterator[str]:
     """Yield a line for each coefficient that is unknown, has a wrong unit, or is out of its bounds."""
-    for name, quantity in found.items():
+    for name, quantity in quantities.items():
         key = f"{table}.{name}"
         if (declaration := declarations.get(name)) is None:
             yield key_line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, declarations)}")

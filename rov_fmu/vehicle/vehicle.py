@@ -205,9 +205,11 @@ class Vehicle:
 
     def commanded(self, inputs: Values) -> dict[str, float]:
         """Return the steady thrust of every thruster (N), by its name, for the commands."""
-        found = self._steady(inputs)
+        values = self._steady(inputs)
         names = self._formulas.names
-        return {name: found[steady_name(name, curve, names).identifier] for name, curve in self.layout.curve_of.items()}
+        return {
+            name: values[steady_name(name, curve, names).identifier] for name, curve in self.layout.curve_of.items()
+        }
 
     def _steady(self, inputs: Values) -> dict[str, float]:
         """Return the values of all formulas from the commands to the steady thrust."""
@@ -231,23 +233,23 @@ class Vehicle:
 
     def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
-        found = self._formulas.calculate(self._values(inputs, state))
+        values = self._formulas.calculate(self._values(inputs, state))
         for name in self.layout.continued:
-            found[name] = heading(found, state.get(name, found[name]))
-        return {name: found[name] for name in self.layout.calculated}
+            values[name] = heading(values, state.get(name, values[name]))
+        return {name: values[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
-        found = thruster.effect(axis)
+        effect = thruster.effect(axis)
         by_arm = axis is YAW and thruster.position is None and thruster.arm
-        return found * arm(*(self[name] for name in ARM)) if by_arm else found
+        return effect * arm(*(self[name] for name in ARM)) if by_arm else effect
 
     # ---- Motion ----
 
     def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the time derivatives of the states by their names."""
-        found = self._formulas.calculate(self._values(inputs, state))
-        return {name: found[f"der_{name}"] for name in self.layout.state}
+        values = self._formulas.calculate(self._values(inputs, state))
+        return {name: values[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
@@ -364,8 +366,8 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     assert head, "read_tables tells that it is missing"
     assert validity, "read_tables tells that it is missing"
     layout = replace(file.layout, identified=validity.ranges)
-    found = file.quantities(layout)
-    coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
+    quantities = file.quantities(layout)
+    coefficients = {name: q.value if q else UNTUNED for name, q in quantities.items()}
     if mistakes := [*check_mass(layout, coefficients)]:
         raise VehicleFileError(*lines_on(path, mistakes))
     for doubt in doubts(layout, coefficients):
@@ -374,11 +376,11 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         layout,
         coefficients,
         **dict(head),
-        sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
+        sources={name: q.source if q else NOT_GIVEN for name, q in quantities.items()},
         command_range=validity.command_range,
         alternatives=file.alternatives,
         limits=validity.limits,
-        intervals={name: q.interval for name, q in found.items() if q and q.interval},
+        intervals={name: q.interval for name, q in quantities.items() if q and q.interval},
         estimates=file.estimates,
         provenance=file.provenance,
         path=path,
