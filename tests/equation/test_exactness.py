@@ -3,12 +3,11 @@
 import random
 from collections.abc import Iterable
 from itertools import islice, product
-from math import copysign, cos, sin
+from math import cos, sin
 from time import process_time
 from typing import Any
 
 import pytest
-from mpmath import mp
 from scipy.integrate import solve_ivp
 
 from rov_fmu.equation.alone import AxisAlone as Axis
@@ -107,23 +106,6 @@ def test_a_reversal_while_spinning_is_exact(steps: list[Step], stride: int) -> N
     for after, (surge, yaw, u, r) in islice(product((1.0, 1.3, 0.9, 2.5), REVERSALS), 0, None, stride):
         rest = reference.time_to_rest(surge.A, surge.B, -abs(surge.C), abs(u))
         hold(steps, [of_axes(surge, yaw, u, r, after * rest)], 3e-14, 3e-13)  # of many pieces
-
-
-@pytest.mark.parametrize("stride", [7, pytest.param(1, marks=LONG)])
-def test_a_spin_that_drag_slows_down_is_exact(steps: list[Step], stride: int) -> None:
-    """With a steady u and only A in yaw, x + iy = u ((1 + A r h)^(1 + i/A) - 1)/(r (A + i)) for any angle."""
-    for h, r, A in islice(product((0.01, 1e3), (-1.0, 1e3, 1e6), (4.9e-3, 0.01, 0.3, 3.0)), 0, None, stride):
-        case = of_axes(Axis(0.0, 2.0, 1.0), Axis(A, 0.0, 0.0), 0.5, r, h)
-        with mp.workdps(60):
-            growth = 1 + mp.mpf(A) * abs(r) * h
-            turn = mp.log(growth) / A
-            exact = (growth * mp.expj(turn) - 1) / (2 * abs(r) * mp.mpc(A, 1))
-            size = min(h, growth / abs(r)) / 2
-            for found in (step(*case) for step in steps):
-                # the direction cannot be better than the rounding of the turn
-                position = mp.mpc(found["x"], copysign(found["y"], r * found["y"]))
-                assert abs(position - exact) <= size * 2e-15 * (1 + turn)
-                assert abs(abs(found["psi"]) - turn) <= 1e-15 * turn
 
 
 # Axes of surge and yaw, u, r and h. Some numbers are huge, others next to nothing.

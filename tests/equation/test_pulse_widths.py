@@ -50,7 +50,8 @@ def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
         state = {name: found[name] for name in state}
 
 
-def test_neutral_gives_no_thrust_and_is_the_start_value(rov: Vehicle) -> None:
+def test_neutral_gives_no_thrust_and_is_the_start_value() -> None:
+    rov = ROVS["thrust"]
     of_pulses = pulsed(rov, PULSE)
     usual = of_pulses.layout.usual_inputs
     for name, command in of_pulses.layout.commands.items():
