@@ -85,9 +85,9 @@ def _drag(forces: Iterable[Force], gain: Expression) -> dict[str, Expression]:
 
 def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """Return the formulas of V_ss and Tau of an axis alone, after those that they contain."""
-    found = alone_formulas(layout, velocity)
-    drag = {key: directed(Name("C"), found[key], found[key + REVERSE]) for key in POWERS.values()}
-    return {"C": found["C"], **drag, **closed_form(*map(Name, "ABC"))}
+    formulas = alone_formulas(layout, velocity)
+    drag = {key: directed(Name("C"), formulas[key], formulas[key + REVERSE]) for key in POWERS.values()}
+    return {"C": formulas["C"], **drag, **closed_form(*map(Name, "ABC"))}
 
 
 _closed_form = compiled(closed_form(*map(Name, "ABC")))

@@ -19,12 +19,12 @@ def entry(row: int, column: int) -> str:
 
 def rotation_terms(row: int, velocities: frozenset[str]) -> dict[str, list[tuple[float, tuple[str, str]]]]:
     """Return the terms of R' = R S(omega) for the entries of a row: signs and factors."""
-    found = {}
+    by_entry = {}
     for column in (1, 2, 3):
         following, last = column % 3 + 1, (column + 1) % 3 + 1
         terms = [(1.0, (_RATES[last], entry(row, following))), (-1.0, (_RATES[following], entry(row, last)))]
-        found[entry(row, column)] = [term for term in terms if term[1][0] in velocities]
-    return found
+        by_entry[entry(row, column)] = [term for term in terms if term[1][0] in velocities]
+    return by_entry
 
 
 def rotation_formulas() -> Formulas:
@@ -93,11 +93,11 @@ def quaternion_rates(velocities: frozenset[str]) -> Formulas:
         b: ((1, e, "q"), (1, c, "p"), (-1, a, "r")),
         c: ((1, e, "r"), (1, a, "q"), (-1, b, "p")),
     }
-    found = {}
+    rates = {}
     for name, terms in products.items():
         parts = [scaled(sign, Name(factor) * Name(rate)) for sign, factor, rate in terms if rate in velocities]
-        found[name] = 0.5 * total(parts) if parts else total(())
-    return found
+        rates[name] = 0.5 * total(parts) if parts else total(())
+    return rates
 
 
 def quaternion_formulas() -> Formulas:
@@ -107,13 +107,13 @@ def quaternion_formulas() -> Formulas:
     its length (Shepperd, Quaternion from rotation matrix, Journal of Guidance and Control, 1978).
     """
     R = {(i, j): Name(entry(i, j)) for i in (1, 2, 3) for j in (1, 2, 3)}
-    found: Formulas = {
+    formulas: Formulas = {
         "square_0": 1.0 + R[1, 1] + R[2, 2] + R[3, 3],
         "square_1": 1.0 + R[1, 1] - R[2, 2] - R[3, 3],
         "square_2": 1.0 - R[1, 1] + R[2, 2] - R[3, 3],
         "square_3": 1.0 - R[1, 1] - R[2, 2] + R[3, 3],
     }
-    square = [*map(Name, found)]
+    square = [*map(Name, formulas)]
     others = {
         (0, 1): R[3, 2] - R[2, 3],
         (0, 2): R[1, 3] - R[3, 1],
@@ -123,18 +123,18 @@ def quaternion_formulas() -> Formulas:
         (2, 3): R[2, 3] + R[3, 2],
     }
     is_early, is_late = square[0] >= square[1], square[2] >= square[3]
-    found["larger_01"] = where(is_early, square[0], square[1])
-    found["larger_23"] = where(is_late, square[2], square[3])
+    formulas["larger_01"] = where(is_early, square[0], square[1])
+    formulas["larger_23"] = where(is_late, square[2], square[3])
     for n in range(4):
         row = [square[n] if k == n else others[min(k, n), max(k, n)] for k in range(4)]
-        found[f"first_{n}"] = where(is_early, row[0], row[1])
-        found[f"second_{n}"] = where(is_late, row[2], row[3])
-        found[f"row_{n}"] = where(Name("larger_01") >= Name("larger_23"), Name(f"first_{n}"), Name(f"second_{n}"))
+        formulas[f"first_{n}"] = where(is_early, row[0], row[1])
+        formulas[f"second_{n}"] = where(is_late, row[2], row[3])
+        formulas[f"row_{n}"] = where(Name("larger_01") >= Name("larger_23"), Name(f"first_{n}"), Name(f"second_{n}"))
     rows, length = [Name(f"row_{n}") for n in range(4)], Name("length")
     agreement = total(row * Name(name) for row, name in zip(rows, QUATERNION, strict=True))
-    found["length"] = call("sqrt", total(row * row for row in rows))
-    found["divisor"] = directed(agreement, length, -length)
-    return found | {f"next_{name}": row / Name("divisor") for row, name in zip(rows, QUATERNION, strict=True)}
+    formulas["length"] = call("sqrt", total(row * row for row in rows))
+    formulas["divisor"] = directed(agreement, length, -length)
+    return formulas | {f"next_{name}": row / Name("divisor") for row, name in zip(rows, QUATERNION, strict=True)}
 
 
 def angle_formulas() -> Formulas:

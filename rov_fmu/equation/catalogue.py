@@ -134,10 +134,10 @@ def cross_name(key: str, *velocities: str) -> str:
 
 def cross_of(name: str) -> tuple[str, ...] | None:
     """Return the key and the velocities of a coefficient of two or three axes, by its name, or None."""
-    if found := re.fullmatch(r"(m_a|b_d|a_d)_([uvwpqr])([uvwpqr])", name):
-        return found.groups()
-    if found := re.fullmatch(r"([XYZKMN])_([uvwpqr])([uvwpqr])", name):
-        return ("lift", "uvwpqr"["XYZKMN".index(found[1])], found[2], found[3])
+    if match := re.fullmatch(r"(m_a|b_d|a_d)_([uvwpqr])([uvwpqr])", name):
+        return match.groups()
+    if match := re.fullmatch(r"([XYZKMN])_([uvwpqr])([uvwpqr])", name):
+        return ("lift", "uvwpqr"["XYZKMN".index(match[1])], match[2], match[3])
     return None
 
 

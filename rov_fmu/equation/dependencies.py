@@ -45,12 +45,12 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
     formulas = _formulas(layout)
     if layout.has_attitude:
         formulas = start_formulas() | formulas | start_angle_formulas()
-    found: dict[str, set[str]] = {}
+    used: dict[str, set[str]] = {}
     for name, formula in formulas.items():
-        found[name] = set().union(*(found.get(other, {other}) for other in formula.names))
+        used[name] = set().union(*(used.get(other, {other}) for other in formula.names))
     parameters = (*layout.coefficients, *layout.initial)
     calculated = (*_calculated(layout), *(name for name in QUATERNION if name in layout.state))
-    return {name: tuple(p for p in parameters if p in found[name]) for name in calculated}
+    return {name: tuple(p for p in parameters if p in used[name]) for name in calculated}
 
 
 def _calculated(layout: Layout) -> tuple[str, ...]:
@@ -65,10 +65,10 @@ def _formulas(layout: Layout) -> dict[str, Expression]:
 
 def _kinds(layout: Layout, formulas: Mapping[str, Expression]) -> dict[str, int]:
     """Return for each name its kind as a factor, which is an index of KINDS."""
-    found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
-    found |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
+    kinds = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
+    kinds |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
     for name, declaration in layout.coefficients.items():
-        found[name] = KINDS.index("tunable" if declaration.tunable else "fixed")
+        kinds[name] = KINDS.index("tunable" if declaration.tunable else "fixed")
     for name, formula in formulas.items():
-        found[name] = max((found[other] for other in formula.names), default=0)
-    return found
+        kinds[name] = max((kinds[other] for other in formula.names), default=0)
+    return kinds

@@ -109,11 +109,11 @@ class Names:
 
 def unused(text: str, taken: Iterable[str]) -> str:
     """Return a text, with the first number from 2 on that makes it none of the taken ones, if it is one of them."""
-    number, found = 1, text
-    while found in taken:
+    number, free = 1, text
+    while free in taken:
         number += 1
-        found = f"{text}_{number}"
-    return found
+        free = f"{text}_{number}"
+    return free
 
 
 # ---- Building --------------------------------------------------------------------------------------------------------
@@ -357,8 +357,8 @@ class _Product(NamedTuple):
     def formula(self, factors: Callable[[Iterable[Expression]], Iterable[Expression]] = iter) -> Expression:
         """Return the product as an expression. `factors` changes its factors."""
         above, below = product(*factors(self.above)), product(*factors(self.below))
-        found = above / below if self.below else above
-        return -found if self.sign < 0 else found
+        fraction = above / below if self.below else above
+        return -fraction if self.sign < 0 else fraction
 
 
 def collected(x: Expression) -> Expression:
@@ -387,11 +387,11 @@ def _products(x: Expression) -> list[_Product]:
         head = one.above[0] if len(one.above) > 1 else None
         key = f"{head.value:.12g}" if isinstance(head, Number) else head or place
         alike.setdefault(key, []).append(one)
-    found = []
+    products = []
     for first, *others in alike.values():
         rest = total(_Product(one.sign * first.sign, one.above[1:], one.below).formula() for one in (first, *others))
-        found.append(_Product(first.sign, first.above[:1]).times(_product(rest)) if others else first)
-    return found
+        products.append(_Product(first.sign, first.above[:1]).times(_product(rest)) if others else first)
+    return products
 
 
 def _terms(x: Expression) -> list[_Product]:
@@ -457,9 +457,9 @@ def compiled(
     known, code = {**_IN_PYTHON, **functions}, compile("\n".join(lines), "<formulas>", "exec")
 
     def evaluate(values: Mapping[str, Any]) -> dict[str, Any]:
-        found = dict(values)
-        exec(code, known, found)
-        return found
+        variables = dict(values)
+        exec(code, known, variables)
+        return variables
 
     return evaluate
 

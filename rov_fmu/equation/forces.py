@@ -88,14 +88,14 @@ def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
 
 def effects_of(layout: Layout) -> list[Effect]:
     """Return the effects that a vehicle has, each once."""
-    found = [force.effect for force in forces_of(layout, Names())]
+    of_forces = [force.effect for force in forces_of(layout, Names())]
     has = {
         LAG: bool(layout.lagging),
         DEAD_BAND: any("c_0" in curve.keys or curve.tables for curve in layout.curves),  # a table may have one
         DEAD_TIME: layout.has_dead_time,
         COUPLING: layout.coupled,
     }
-    return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *found]))
+    return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *of_forces]))
 
 
 # ---- The forces ------------------------------------------------------------------------------------------------------
@@ -103,16 +103,16 @@ def effects_of(layout: Layout) -> list[Effect]:
 
 def _loads(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield what is constant while the inputs are held: thrust, external and constant load, and the net weight."""
-    for form in layout.axes:
-        axis, v = form.axis, form.axis.velocity
+    for vehicle_axis in layout.axes:
+        axis, v = vehicle_axis.axis, vehicle_axis.axis.velocity
         thrust = thrusts(layout, axis, names)
         if axis is YAW:  # each of these torques is an output
             thrust = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
         if thrust:
             yield Force(THRUST, v, 1, (Name(axis.coefficient("alpha")), total(thrust)))
         yield Force(LOAD, v, 1, (Name(axis.external),))
-        if "F_0" in form.keys:
-            yield Force(LOAD, v, 1, (Name(form.coefficient("F_0")),))
+        if "F_0" in vehicle_axis.keys:
+            yield Force(LOAD, v, 1, (Name(vehicle_axis.coefficient("F_0")),))
         if axis is HEAVE and layout.restoring and not layout.has_attitude:
             yield Force(WEIGHT, v, 1, (names("net_weight"),))
 
@@ -124,7 +124,7 @@ def thrusts(
 
     `arriving` gives the changes of these thrusts until they are steady.
     """
-    found = []
+    parts = []
     for t in layout.drivers(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
@@ -133,16 +133,16 @@ def thrusts(
                 force = steady_name(t.name, own, names) - force
             if axis is YAW and t.position is None and t.arm:
                 force = names("arm") * force
-            found.append(scaled(t.effect(axis), force))
-    return found
+            parts.append(scaled(t.effect(axis), force))
+    return parts
 
 
 def _drag(layout: Layout) -> Iterator[Force]:
     """Yield the damping: linear and quadratic drag of each axis, and the cross terms."""
-    for form in layout.axes:
-        v = form.axis.velocity
+    for vehicle_axis in layout.axes:
+        v = vehicle_axis.axis.velocity
         for key, effect, factors in (("b_d", LINEAR, (v,)), ("a_d", QUADRATIC, (v, v))):
-            ahead, astern = (Name(form.coefficient(key + end)) for end in ("", REVERSE))
+            ahead, astern = (Name(vehicle_axis.coefficient(key + end)) for end in ("", REVERSE))
             yield Force(effect, v, -1, (ahead,), factors, v, (astern,), turns=key == "a_d")
     for key, axis, *others in layout.cross:
         coefficient = (Name(cross_name(key, axis, *others)),)
@@ -160,8 +160,8 @@ def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
         return
     x, y, z = (entry(3, n) for n in (1, 2, 3))
     arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
-    for form in layout.axes:
-        v = form.axis.velocity
+    for vehicle_axis in layout.axes:
+        v = vehicle_axis.axis.velocity
         if v in "uvw":
             yield Force(RESTORING, v, 1, (names("net_weight"),), ((x, y, z)["uvw".index(v)],))
             continue
@@ -175,29 +175,29 @@ def _advance(layout: Layout, names: Names) -> Iterator[Force]:
 
     The thrust is F - d |c| v_a, and the speed of advance v_a is linear in the velocities.
     """
-    for form in layout.axes:
+    for vehicle_axis in layout.axes:
         for other in layout.axes:
             parts = []
             for t in layout.thrusters:
-                effect = t.effect(form.axis) * t.effect(other.axis)
+                effect = t.effect(vehicle_axis.axis) * t.effect(other.axis)
                 if "d" in layout.curve_of[t.name].keys and abs(effect) > FAINT:
                     parts.append(scaled(effect, names("loss", t.name)))
             if parts:
-                lost = Name(form.axis.coefficient("alpha")), total(parts)
-                yield Force(ADVANCE, form.axis.velocity, -1, lost, (other.axis.velocity,))
+                lost = Name(vehicle_axis.axis.coefficient("alpha")), total(parts)
+                yield Force(ADVANCE, vehicle_axis.axis.velocity, -1, lost, (other.axis.velocity,))
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield the lift of the fins, lift |u|u δ, and their drag, which is proportional to |u|u δ²."""
     ahead = (1.0, 0.0, 0.0)
-    for form in layout.axes:
+    for vehicle_axis in layout.axes:
         parts = []
         for fin in layout.fins:
             angle = names("angle", fin.name)
-            parts.append((fin.effect(form.axis), Name(fin.coefficient("lift")) * angle))
+            parts.append((fin.effect(vehicle_axis.axis), Name(fin.coefficient("lift")) * angle))
             if fin.has_drag:
-                effect = effect_along(form.axis, ahead, fin.place)
+                effect = effect_along(vehicle_axis.axis, ahead, fin.place)
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
         acting = total(scaled(*part) for part in parts if abs(part[0]) > FAINT)
         if acting.names:
-            yield Force(STEERING, form.axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)
+            yield Force(STEERING, vehicle_axis.axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)

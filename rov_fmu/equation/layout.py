@@ -296,8 +296,8 @@ class Fin(Driven):
 
     def effect(self, axis: Axis) -> float:
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
-        found = effect_along(axis, self.direction.value, self.place)
-        return found if abs(found) > FAINT else 0.0
+        effect = effect_along(axis, self.direction.value, self.place)
+        return effect if abs(effect) > FAINT else 0.0
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient by its key."""
@@ -389,10 +389,10 @@ class Layout:
         def named(part: _Part) -> _Part:
             others = []
             for key in part.keys:
-                name = coefficient_name(key, part.owner)
-                found = unused(name, taken)
-                taken.add(found)
-                others += [(key, found)] if found != name else []
+                usual = coefficient_name(key, part.owner)
+                name = unused(usual, taken)
+                taken.add(name)
+                others += [(key, name)] if name != usual else []
             return replace(part, others=tuple(others)) if others or part.others else part
 
         object.__setattr__(self, "axes", tuple(map(named, self.axes)))
@@ -406,7 +406,7 @@ class Layout:
 
         return replace(
             self,
-            axes=tuple(replace(form, keys=keys(form, AXIS)) for form in self.axes),
+            axes=tuple(replace(vehicle_axis, keys=keys(vehicle_axis, AXIS)) for vehicle_axis in self.axes),
             curves=tuple(replace(curve, keys=keys(curve, CURVE)) for curve in self.curves),
         )
 
@@ -419,7 +419,7 @@ class Layout:
         axes, source = tuple(axes), "The axis of the body"
         centre = Position(value=(0.0, 0.0, 0.0), unit="m", source=source)
         forces = []
-        for axis in (form.axis for form in axes):
+        for axis in (vehicle_axis.axis for vehicle_axis in axes):
             x, y, z = (float(n == axis.place) for n in range(3))
             along, name = Direction(value=(x, y, z), source=source), axis.external
             forces.append(BodyForce(name=name, curve=name, direction=along, position=centre, axis=axis))
@@ -435,12 +435,12 @@ class Layout:
     @cached_property
     def kinds(self) -> dict[str, VehicleAxis]:
         """The axes by name."""
-        return {form.axis.name: form for form in self.axes}
+        return {vehicle_axis.axis.name: vehicle_axis for vehicle_axis in self.axes}
 
     @cached_property
     def by_velocity(self) -> dict[str, VehicleAxis]:
         """The axes by their velocities."""
-        return {form.axis.velocity: form for form in self.axes}
+        return {vehicle_axis.axis.velocity: vehicle_axis for vehicle_axis in self.axes}
 
     @cached_property
     def curves_by_name(self) -> dict[str, Curve]:
@@ -520,46 +520,55 @@ class Layout:
     @cached_property
     def owners(self) -> tuple[Owner, ...]:
         """The tables of the vehicle file with coefficients, in the order of the FMU's variables, except [cross]."""
-        inertias = {form.axis.inertia for form in self.axes}
-        dead_time = COMMANDS if self.has_dead_time else {}
-        found = [
-            Owner(("body",), {key: key for key in BODY if key in inertias}, BODY, {}),
-            Owner(("body",), {key: key for key in self.restoring}, RESTORING, {}),
-            Owner(("arm",), {key: key for key in ARM if self.has_arm}, ARM, {}),
-            Owner(("commands",), {key: key for key in dead_time}, COMMANDS, {}),
-        ]
-        return (*found, *map(_of_curve, self.curves), *map(_of_fin, self.fins), *self._owners_of_axes)
+        inertias = {vehicle_axis.axis.inertia for vehicle_axis in self.axes}
+        of_vehicle = (
+            ("body", [key for key in BODY if key in inertias], BODY),
+            ("body", self.restoring, RESTORING),
+            ("arm", ARM if self.has_arm else (), ARM),
+            ("commands", COMMANDS if self.has_dead_time else (), COMMANDS),
+        )
+        return (
+            *(Owner((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
+            *map(_of_curve, self.curves),
+            *map(_of_fin, self.fins),
+            *self._owners_of_axes,
+        )
 
     @property
     def _owners_of_axes(self) -> Iterator[Owner]:
         for kinds in (AXIS, TUNING):
-            for form in self.axes:
-                names = {key: form.coefficient(key) for key in kinds if kinds is TUNING or key in form.keys}
-                yield Owner(("axes", form.axis.name), names, kinds, axis_words(form.axis))
+            for vehicle_axis in self.axes:
+                names = {
+                    key: vehicle_axis.coefficient(key) for key in kinds if kinds is TUNING or key in vehicle_axis.keys
+                }
+                yield Owner(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
 
     @cached_property
     def keys_in_file(self) -> dict[str, tuple[str, ...]]:
         """The tables and the key of each coefficient in the vehicle file, by its name in the FMU."""
-        found = {name: (*one.place, key) for one in self.owners for key, name in one.names.items()}
-        return found | {name: ("cross", name) for name in (cross_name(*row) for row in self.cross)}
+        places = {name: (*owner.place, key) for owner in self.owners for key, name in owner.names.items()}
+        return places | {name: ("cross", name) for name in (cross_name(*row) for row in self.cross)}
 
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
         """The coefficients, in the order of the FMU's variables."""
-        found = {name: one.kinds[key].filled(**one.words) for one in self.owners for key, name in one.names.items()}
-        for key, *velocities in self.cross:
-            found[cross_name(key, *velocities)] = cross_declaration(key, *velocities)
+        declared = {
+            name: owner.kinds[key].filled(**owner.words) for owner in self.owners for key, name in owner.names.items()
+        }
+        declared |= {cross_name(*row): cross_declaration(*row) for row in self.cross}
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
-            for axis in (form.axis for form in self.axes if self.has_attitude or form.axis is not HEAVE):
+            for axis in (
+                vehicle_axis.axis for vehicle_axis in self.axes if self.has_attitude or vehicle_axis.axis is not HEAVE
+            ):
                 beta = axis.coefficient("beta")
-                description = found[beta].description.removesuffix(AT_ZERO)
-                found[beta] = replace(found[beta], description=description, minimum=LEAST_BETA)
-        return found
+                description = declared[beta].description.removesuffix(AT_ZERO)
+                declared[beta] = replace(declared[beta], description=description, minimum=LEAST_BETA)
+        return declared
 
     @cached_property
     def tuning(self) -> tuple[str, ...]:
         """The names of the tuning factors α and β. They are tunable in the FMU, as the mass and the ballast are."""
-        return tuple(form.axis.coefficient(key) for form in self.axes for key in TUNING)
+        return tuple(vehicle_axis.axis.coefficient(key) for vehicle_axis in self.axes for key in TUNING)
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:
@@ -567,13 +576,10 @@ class Layout:
 
         If the vehicle has `pulse`, they are pulse widths instead.
         """
-        if self.mix:
-            words = {
-                name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
-                for name, gains in self.mix.items()
-            }
-        else:
-            words = {driven.name: _command(driven) for driven in self.driven}
+        words = {
+            name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
+            for name, gains in self.mix.items()
+        } or {driven.name: _command(driven) for driven in self.driven}
         return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
 
     def command_of(self, fraction: float) -> float:
@@ -601,15 +607,14 @@ class Layout:
     @cached_property
     def inputs(self) -> dict[str, Declaration]:
         """The inputs: commands, loads from outside, current, voltage."""
-        found = dict(self.commands)
-        found |= {form.axis.external: load_declaration(form.axis) for form in self.axes}
+        inputs = dict(self.commands)
+        inputs |= {vehicle_axis.axis.external: load_declaration(vehicle_axis.axis) for vehicle_axis in self.axes}
         if self.has(SURGE, SWAY) or (self.has_attitude and self.has(HEAVE)):
-            found |= CURRENT | (CURRENT_DOWN if self.has_attitude else {})
+            inputs |= CURRENT | (CURRENT_DOWN if self.has_attitude else {})
         if self.voltage is not None:
             lows, highs = zip(*(self.voltage_ranges or [(0.0, inf)]), strict=True)
-            low, high = min(lows), max(highs)
-            found["voltage"] = voltage_declaration(low, high, self.voltage)
-        return found
+            inputs["voltage"] = voltage_declaration(min(lows), max(highs), self.voltage)
+        return inputs
 
     @cached_property
     def voltage_ranges(self) -> dict[tuple[float, float], str]:
@@ -631,7 +636,7 @@ class Layout:
     @cached_property
     def velocities(self) -> dict[str, Declaration]:
         """The velocities through the water, which are the first states."""
-        return {form.axis.velocity: velocity_declaration(form.axis) for form in self.axes}
+        return {vehicle_axis.axis.velocity: velocity_declaration(vehicle_axis.axis) for vehicle_axis in self.axes}
 
     @cached_property
     def pose(self) -> dict[str, Declaration]:
@@ -648,9 +653,12 @@ class Layout:
     @cached_property
     def lagging(self) -> dict[str, Declaration]:
         """The forces that follow the commands with a lag, which are the last states."""
-        return {
-            f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters if self.curve_of[t.name].has_lag
-        }
+        return self._forces(lag=True)
+
+    def _forces(self, *, lag: bool) -> dict[str, Declaration]:
+        """Return the forces of the thrusters that follow the commands with a lag, or those of the others."""
+        curves = ((t, self.curve_of[t.name]) for t in self.thrusters)
+        return {f"F_{t.name}": _thrust(t, curve) for t, curve in curves if curve.has_lag == lag}
 
     @cached_property
     def state(self) -> dict[str, Declaration]:
@@ -664,16 +672,12 @@ class Layout:
         They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, the Euler angles
         of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
         """
-        found = {
-            f"F_{t.name}": _thrust(t, self.curve_of[t.name])
-            for t in self.thrusters
-            if not self.curve_of[t.name].has_lag
-        }
+        torques = {}
         for curve in self.turning_curves:
             of = f"of the {curve.description}" if curve.description else curve.name
             words = f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard"
-            found[f"tau_{curve.name}"] = Declaration("N.m", words)
-        return found | self.angles | self.outside
+            torques[f"tau_{curve.name}"] = Declaration("N.m", words)
+        return self._forces(lag=False) | torques | self.angles | self.outside
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:
@@ -698,12 +702,10 @@ class Layout:
     @cached_property
     def places(self) -> dict[str, int]:
         """The index of each variable in the arrays of the C code. That of der(x) is the index of x plus len(state)."""
-        found = {name: place for place, name in enumerate([*self.inputs, *self.state])}
-        first = len(found) + len(self.state)
-        return found | {
-            name: first + place
-            for place, name in enumerate([*self.calculated, *self.delayed, *self.coefficients, *self.initial])
-        }
+        variables = [*self.inputs, *self.state]
+        others = [*self.calculated, *self.delayed, *self.coefficients, *self.initial]
+        places = {name: place for place, name in enumerate(variables)}
+        return places | {name: place for place, name in enumerate(others, len(variables) + len(self.state))}
 
     @cached_property
     def turning_curves(self) -> tuple[Curve, ...]:

@@ -42,11 +42,11 @@ class MassMatrix:
     @cached_property
     def blocks(self) -> tuple[tuple[str, ...], ...]:
         """The groups of two or more axes that entries off the diagonal connect."""
-        found: list[set[str]] = []
+        blocks: list[set[str]] = []
         for pair in (pair for pair in self.entries if set(pair) <= self.gains.keys()):
-            joined_blocks = [block for block in found if block & set(pair)]
-            found = [block for block in found if block not in joined_blocks] + [set(pair).union(*joined_blocks)]
-        return tuple(tuple(name for name in self.gains if name in block) for block in found)
+            joined_blocks = [block for block in blocks if block & set(pair)]
+            blocks = [block for block in blocks if block not in joined_blocks] + [set(pair).union(*joined_blocks)]
+        return tuple(tuple(name for name in self.gains if name in block) for block in blocks)
 
     def _is_alone(self, axis: str) -> bool:
         return not any(axis in block for block in self.blocks)
@@ -66,40 +66,40 @@ class MassMatrix:
 
     def parameters(self) -> dict[str, Expression]:
         """Return the formulas of the names in `inverse` and of the entries."""
-        found = {self.names("gain", axis).identifier: formula for axis, formula in self.gains.items()}
+        formulas = {self.names("gain", axis).identifier: formula for axis, formula in self.gains.items()}
         entries = {self._name("mass", *pair).identifier: formula for pair, formula in self.entries.items()}
         for block in self.blocks:
-            found |= {self._name("mass", axis, axis).identifier: 1.0 / self.names("gain", axis) for axis in block}
+            formulas |= {self._name("mass", axis, axis).identifier: 1.0 / self.names("gain", axis) for axis in block}
             own = [self._name("mass", *pair).identifier for pair in self.entries if {*pair} <= {*block}]
-            found |= {name: entries[name] for name in own}
-            found |= self._inverse_of(block)
-        return found | {name: formula for name, formula in entries.items() if name not in found}
+            formulas |= {name: entries[name] for name in own}
+            formulas |= self._inverse_of(block)
+        return formulas | {name: formula for name, formula in entries.items() if name not in formulas}
 
     def _inverse_of(self, block: tuple[str, ...]) -> dict[str, Expression]:
         """Return formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
         pivot = {axis: self.names("pivot", axis) for axis in block}
-        found, factor = self._decomposed(block, pivot)
+        formulas, factor = self._decomposed(block, pivot)
         for n, row in enumerate(block):  # K L = 1, from the diagonal outwards; K has the names undo_..
             for m in reversed(range(n)):
                 column = block[m]
-                found[self._name("undo", row, column).identifier] = total(
+                formulas[self._name("undo", row, column).identifier] = total(
                     minus(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
                     for k in block[m + 1 : n + 1]
                     if (k, column) in factor
                 )
         for n, row in enumerate(block):  # K^T D^-1 K
             for column in block[n:]:
-                found[self._name("inverse", row, column).identifier] = total(
+                formulas[self._name("inverse", row, column).identifier] = total(
                     product(*(self._name("undo", k, axis) for axis in (row, column) if axis != k)) / pivot[k]
                     for k in block[block.index(column) :]
                 )
-        return found
+        return formulas
 
     def _decomposed(
         self, block: tuple[str, ...], pivot: Mapping[str, Name]
     ) -> tuple[dict[str, Expression], dict[tuple[str, str], Name]]:
         """Return formulas for M = L D L^T, row by row, and the names of the factors in L. D has the pivots."""
-        found: dict[str, Expression] = {}
+        formulas: dict[str, Expression] = {}
         factor: dict[tuple[str, str], Name] = {}
         for n, row in enumerate(block):
             for m, column in enumerate(block[:n]):
@@ -111,19 +111,19 @@ class MassMatrix:
                 ]
                 if parts:
                     factor[row, column] = self._name("factor", row, column)
-                    found[factor[row, column].identifier] = total(parts) / pivot[column]
+                    formulas[factor[row, column].identifier] = total(parts) / pivot[column]
             squares = [minus(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
-            found[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
-        return found, factor
+            formulas[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
+        return formulas, factor
 
     def coriolis(self, axis: str) -> dict[tuple[str, str], Expression]:
         """Return the coefficients of products of two velocities in the acceleration of an axis, as formulas."""
-        found: dict[tuple[str, str], list[Expression]] = {}
+        by_pair: dict[tuple[str, str], list[Expression]] = {}
         for other, inverse in self.inverse(axis).items():
             for pair, entries in self.products(other).items():
                 parts = (scaled(sign, self._term(inverse, entry)) for sign, entry in entries)
-                found.setdefault(pair, []).extend(parts)
-        return {pair: total(parts) for pair, parts in sorted(found.items(), key=lambda item: _places(item[0]))}
+                by_pair.setdefault(pair, []).extend(parts)
+        return {pair: total(parts) for pair, parts in sorted(by_pair.items(), key=lambda item: _places(item[0]))}
 
     def _term(self, inverse: Name, entry: tuple[str, str]) -> Expression:
         a, b = entry
@@ -135,19 +135,19 @@ class MassMatrix:
 
         For each product of two velocities, it has entries of the mass matrix with their signs.
         """
-        found: dict[tuple[str, str], list[tuple[int, tuple[str, str]]]] = {}
+        by_pair: dict[tuple[str, str], list[tuple[int, tuple[str, str]]]] = {}
         for sign, momentum, velocity in _KIRCHHOFF[axis]:
             if velocity not in self.gains:
                 continue
             for other in self.gains:
                 entry = _sorted(momentum, other)
                 if momentum == other or entry in self.entries:
-                    signed = found.setdefault(_sorted(other, velocity), [])
+                    signed = by_pair.setdefault(_sorted(other, velocity), [])
                     if (-sign, entry) in signed:
                         signed.remove((-sign, entry))
                     else:
                         signed.append((sign, entry))
-        ordered = sorted(found.items(), key=lambda item: _places(item[0]))
+        ordered = sorted(by_pair.items(), key=lambda item: _places(item[0]))
         return {pair: entries for pair, entries in ordered if entries}
 
 

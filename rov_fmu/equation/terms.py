@@ -138,29 +138,27 @@ class Equation:
         The groups that may settle come before the kinematic ones.
         """
         reach = self._reach
-        groups: list[tuple[str, ...]] = []
-        for name in self.states:
-            group = tuple(n for n in self.states if n == name or (n in reach[name] and name in reach[n]))
-            if group not in groups:
-                groups.append(group)
+        groups = dict.fromkeys(
+            tuple(n for n in self.states if n == name or (n in reach[name] and name in reach[n]))
+            for name in self.states
+        )
         done: list[tuple[str, ...]] = []
         while groups:
             placed = {name for group in done for name in group}
-            following = next(g for g in groups if all(reach[name] <= placed | set(g) for name in g))
-            done.append(following)
-            groups.remove(following)
+            done.append(next(g for g in groups if all(reach[name] <= placed.union(g) for name in g)))
+            del groups[done[-1]]
         settling = self._settling.union(*(reach[name] for name in self._settling))
         return tuple(sorted(done, key=settling.isdisjoint))
 
     @cached_property
     def _reach(self) -> dict[str, set[str]]:
         """For each state, the states on which it depends, directly or through others."""
-        found = {name: set(states) for name, states in self.states_in_rate.items()}
+        reach = {name: set(states) for name, states in self.states_in_rate.items()}
         for middle in self.states:
             for name in self.states:
-                if middle in found[name]:
-                    found[name] |= found[middle]
-        return found
+                if middle in reach[name]:
+                    reach[name] |= reach[middle]
+        return reach
 
     @cached_property
     def _settling(self) -> frozenset[str]:
@@ -193,12 +191,12 @@ class Equation:
     @cached_property
     def rates(self) -> dict[str, Expression]:
         """The time derivative of each state of the vehicle, as a formula of its states and of `program`."""
-        found = {name: rate for name, (rate, _) in self.lagging.items()}
+        rates = {name: rate for name, (rate, _) in self.lagging.items()}
         for name, terms in self.rows.items():
-            found[name] = rate_formula(term for term in terms if not self._is_lag(term))
+            rates[name] = rate_formula(term for term in terms if not self._is_lag(term))
         if self.ends:
-            found |= quaternion_rates(frozenset(self.states))
-        return found
+            rates |= quaternion_rates(frozenset(self.states))
+        return rates
 
     def _is_lag(self, term: Term) -> bool:
         """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
@@ -207,8 +205,8 @@ class Equation:
     @cached_property
     def monitored(self) -> tuple[str, ...]:
         """The velocities whose reversals end a piece of a step."""
-        found = {directed.velocity for directed in self.directed.values()}
-        return tuple(name for name in self.states if name in found)
+        velocities = {directed.velocity for directed in self.directed.values()}
+        return tuple(name for name in self.states if name in velocities)
 
 
 def rate_formula(terms: Iterable[Term]) -> Expression:
@@ -323,11 +321,7 @@ class _Table:
             *self._arriving(v, inverse),
             *(self._term(v, forces, inverse) for forces in alike.values()),
             *(
-                Term(
-                    self._named(formula, "coupling", v, *([] if len(coriolis) == 1 else ["".join(pair)])),
-                    pair,
-                    COUPLING,
-                )
+                Term(self._named(formula, "coupling", v, *["".join(pair)][: len(coriolis) - 1]), pair, COUPLING)
                 for pair, formula in coriolis.items()
             ),
         )
@@ -364,11 +358,11 @@ class _Table:
 
     def lags(self) -> dict[str, tuple[Term, ...]]:
         """Return the rows of the arrived fractions, p' = (1 - p) / T."""
-        found: dict[str, tuple[Term, ...]] = {}
+        lags: Rows = {}
         for curve in (curve for curve in self.layout.curves if curve.has_lag):
             arrived, rate = self.names("arrived", curve.name).identifier, self.names("rate", curve.name)
-            found[arrived] = (Term(rate), Term(-rate, (arrived,)))
-        return found
+            lags[arrived] = (Term(rate), Term(-rate, (arrived,)))
+        return lags
 
     def pose(self) -> dict[str, tuple[Term, ...]]:
         """Return the rows of the pose, which follows from the velocities and a steady current.
@@ -377,24 +371,19 @@ class _Table:
         """
         layout = self.layout
         rows: dict[str, tuple[Term, ...]] = {}
-        rotation: list[tuple[str, str, Expression, tuple[str, ...]]]
+        turned: dict[str, list[Term]]
         if layout.has_attitude:
-            rotation = [(x, v, ONE, (entry(i, n),)) for i, x in enumerate("xyz", 1) for n, v in enumerate("uvw", 1)]
+            turned = {x: [Term(ONE, (v, entry(i, n))) for n, v in enumerate("uvw", 1)] for i, x in enumerate("xyz", 1)}
         else:
-            rotation = [("x", "u", ONE, ()), ("y", "v", ONE, ()), ("z", "w", ONE, ())]
+            turned = {x: [Term(ONE, (v,))] for x, v in zip("xyz", "uvw", strict=True)}
             if layout.has(YAW) and "x" in layout.pose:
                 rows = {"cos_psi": (Term(-ONE, ("r", "sin_psi")),), "sin_psi": (Term(ONE, ("r", "cos_psi")),)}
-                rotation[:2] = [
-                    ("x", "u", ONE, ("cos_psi",)),
-                    ("x", "v", -ONE, ("sin_psi",)),
-                    ("y", "u", ONE, ("sin_psi",)),
-                    ("y", "v", ONE, ("cos_psi",)),
-                ]
+                turned["x"] = [Term(ONE, ("u", "cos_psi")), Term(-ONE, ("v", "sin_psi"))]
+                turned["y"] = [Term(ONE, ("u", "sin_psi")), Term(ONE, ("v", "cos_psi"))]
         for x, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
             if x in layout.pose:
-                terms = [Term(self._named(Name(current), "constant", x))] if current in layout.inputs else []
-                own = [turned for turned in rotation if turned[0] == x and turned[1] in layout.velocities]
-                rows[x] = (*terms, *(Term(sign, (v, *entries)) for _, v, sign, entries in own))
+                steady = [Term(self._named(Name(current), "constant", x))] if current in layout.inputs else []
+                rows[x] = (*steady, *(term for term in turned[x] if term.factors[0] in layout.velocities))
         if "psi" in layout.pose:
             rows["psi"] = (Term(ONE, ("r",)),)
         return rows
@@ -409,7 +398,7 @@ def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
     With s = w w, a cubic drag is c s w, and s' = 2 w w' again has products of at most two states: w w is s.
     """
     products: dict[tuple[str, ...], str] = {}
-    found: Rows = {}
+    new_rows: Rows = {}
     waiting = dict(rows)
 
     def shortened(factors: tuple[str, ...]) -> tuple[str, ...]:
@@ -430,18 +419,18 @@ def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
 
     while waiting:
         name = next(iter(waiting))
-        found[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
-    return found, {name: product(*map(Name, pair)) for pair, name in products.items()}
+        new_rows[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
+    return new_rows, {name: product(*map(Name, pair)) for pair, name in products.items()}
 
 
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
     """Return the mass matrix with the tuning of (18)."""
     gains: dict[str, Expression] = {}
-    for form in layout.axes:
-        inertia: Expression = Name(form.axis.inertia)
-        if "m_a" in form.keys:
-            inertia = inertia + Name(form.coefficient("m_a"))
-        gains[form.axis.velocity] = Name(form.axis.coefficient("beta")) / inertia
+    for vehicle_axis in layout.axes:
+        inertia: Expression = Name(vehicle_axis.axis.inertia)
+        if "m_a" in vehicle_axis.keys:
+            inertia = inertia + Name(vehicle_axis.coefficient("m_a"))
+        gains[vehicle_axis.axis.velocity] = Name(vehicle_axis.axis.coefficient("beta")) / inertia
     entries = {}
     for pair, sums in _inertia_of_two_axes(layout).items():
         betas = product(*(Name(f"beta_{axis}") for axis in pair if axis in gains))
@@ -478,33 +467,32 @@ sign and a coordinate."""
 
 def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
     """Return formulas for the inverse of the mass matrix (18), the arm (4), the lags' rates, and restoring."""
-    found = mass.parameters()
+    formulas = mass.parameters()
     if layout.has_arm:
-        found[names("arm").identifier] = Name("R") * call("sin", Name("gamma"))
+        formulas[names("arm").identifier] = Name("R") * call("sin", Name("gamma"))
     for curve in layout.curves:
         if curve.has_lag:
-            found[names("rate", curve.name).identifier] = 1.0 / Name(curve.coefficient("T"))
+            formulas[names("rate", curve.name).identifier] = 1.0 / Name(curve.coefficient("T"))
     if layout.restoring:
-        found[names("net_weight").identifier] = Name("W") - Name("B")
+        formulas[names("net_weight").identifier] = Name("W") - Name("B")
         for axis in "xyz":
             moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
-            found[names("righting", axis).identifier] = total(
+            formulas[names("righting", axis).identifier] = total(
                 scaled(sign, Name(force) * Name(centre))
                 for sign, force, centre in moments
                 if centre in layout.restoring
             )
-    return found
+    return formulas
 
 
 def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
     """Return the rows of the rotation matrix, if the vehicle rolls or pitches."""
-    rows: dict[str, tuple[Term, ...]] = {}
-    if layout.has_attitude:
-        velocities = frozenset(layout.velocities)
-        for row in (1, 2, 3):
-            for name, terms in rotation_terms(row, velocities).items():
-                rows[name] = tuple(Term(of(sign), factors) for sign, factors in terms)
-    return rows
+    velocities = frozenset(layout.velocities)
+    return {
+        name: tuple(Term(of(sign), factors) for sign, factors in terms)
+        for row in ((1, 2, 3) if layout.has_attitude else ())
+        for name, terms in rotation_terms(row, velocities).items()
+    }
 
 
 def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
@@ -515,7 +503,7 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
     """
     if not layout.identified:
         return {}
-    found: dict[str, Expression] = {}
+    formulas: dict[str, Expression] = {}
     limited = {*layout.velocities, *(name for name in ("phi", "theta") if name in layout.angles)}
     largest: Expression = of(0.0)
     for one in layout.identified:
@@ -524,10 +512,10 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
             quantities = {(one.name, t.name): call("abs", names("command", t.name)) for t in layout.thrusters}
         for owners, x in quantities.items():
             beyond, up_to = names("outside", *owners), names("largest", *owners)
-            found[beyond.identifier] = _beyond(x, one)
-            found[up_to.identifier] = where(largest < beyond, beyond, largest)
+            formulas[beyond.identifier] = _beyond(x, one)
+            formulas[up_to.identifier] = where(largest < beyond, beyond, largest)
             largest = up_to
-    return {**found, "outside": largest}
+    return {**formulas, "outside": largest}
 
 
 def _beyond(x: Expression, known: Range) -> Expression:

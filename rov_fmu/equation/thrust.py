@@ -30,33 +30,33 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
 
     Each input saturates at ±1, and so does each sum of inputs.
     """
-    found: Formulas = {}
+    formulas: Formulas = {}
     if layout.voltage is not None:
-        found |= _battery(names)
+        formulas |= _battery(names)
     for name, gains in layout.gains.items():
         parts: list[tuple[float, Expression]] = []
         for command, gain in gains.items():
             acting = Name(delayed_name(command) if layout.has_dead_time else command)
             if layout.pulse:
                 fraction = names("fraction", command)
-                found[fraction.identifier] = _fraction(acting, layout.pulse)
+                formulas[fraction.identifier] = _fraction(acting, layout.pulse)
                 acting = fraction
             limited = names("saturated", command)
-            found[limited.identifier] = saturated(acting)
+            formulas[limited.identifier] = saturated(acting)
             parts.append((gain, limited))
         command_of = names("command", name).identifier
         if list(gains.values()) == [1.0]:
-            found[command_of] = parts[0][1]
+            formulas[command_of] = parts[0][1]
         else:
             mixed = names("mixed", name)
-            found[mixed.identifier] = total(scaled(*part) for part in parts)
-            found[command_of] = saturated(mixed)
+            formulas[mixed.identifier] = total(scaled(*part) for part in parts)
+            formulas[command_of] = saturated(mixed)
         if name in layout.curve_of:
-            found |= _steady_thrust(name, layout.curve_of[name], names)
+            formulas |= _steady_thrust(name, layout.curve_of[name], names)
     for fin in layout.fins:
         angle = Name(fin.coefficient("angle_max")) * names("command", fin.name)
-        found[names("angle", fin.name).identifier] = angle
-    return found
+        formulas[names("angle", fin.name).identifier] = angle
+    return formulas
 
 
 def curve_formulas(curve: Curve) -> Formulas:
@@ -89,17 +89,17 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
 def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
     command, share = names("command", name), _share(curve)
-    found, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
+    formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
         loss = product(by_direction(command, curve, "d"), call("abs", command), *share)
-        found[names("loss", name).identifier] = loss
+        formulas[names("loss", name).identifier] = loss
     if curve.tables:
         force = product(force, *share)
     # + 0 makes 0.0 of -0.0
-    return found | {steady_name(name, curve, names).identifier: force + 0.0}
+    return formulas | {steady_name(name, curve, names).identifier: force + 0.0}
 
 
 def _share(curve: Curve) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """Checks that the tables of a vehicle file describe a possible vehicle. Each mistake gives one line."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import sin
 from typing import Any
 
@@ -89,11 +89,11 @@ def check_names_and_keys(parts: Tables, lost: set[str], data: Toml) -> Iterator[
 
 def _check_names(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
     """Check the names of thrusters, curves and inputs."""
-    entries = _found(data, "thruster", list)
+    entries = _entries(data, "thruster", list)
     thrusters = [(n, entry) for n, entry in enumerate(entries) if isinstance(entry, dict)]
-    names = [(n, entry["name"]) for n, entry in thrusters if isinstance(entry.get("name"), str)]
-    yield from _check_distinct([(f"thruster#{n + 1}", name) for n, name in names], ".name")
-    curves = [*_found(data, "curves", dict)]
+    names = {f"thruster#{n + 1}": entry["name"] for n, entry in thrusters if isinstance(entry.get("name"), str)}
+    yield from _check_distinct([*names.items()], ".name")
+    curves = [*_entries(data, "curves", dict)]
     yield from _check_distinct([(f"curves.{name}", name) for name in curves])
     yield from _check_distinct([(f"inputs.{name}", name) for name in parts.inputs])
     for n, entry in thrusters:
@@ -101,13 +101,13 @@ def _check_names(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
             reason = f"there is no such curve{only(curve, curves, join_names(curves))}"
             yield key_line(f"{entry_label('thruster', entries, n)}.curve", reason, curve)
     if "thruster" not in lost:
-        yield from _check_use(parts, lost, [name for _, name in names])
+        yield from _check_use(parts, lost, [*names.values()])
 
 
-def _found(data: Toml, key: str, kind: type[Any]) -> Any:
-    """Return what a file has for a key, or something empty if that is not of its kind."""
-    found = data.get(key)
-    return found if isinstance(found, kind) else kind()
+def _entries(data: Toml, key: str, kind: type[Any]) -> Any:
+    """Return the list or the table that a file has for a key, or an empty one."""
+    entries = data.get(key)
+    return entries if isinstance(entries, kind) else kind()
 
 
 def _check_use(parts: Tables, lost: set[str], thrusters: Sequence[str]) -> Iterator[str]:
@@ -132,19 +132,16 @@ def _check_distinct(names: Sequence[tuple[str, str]], key: str = "") -> Iterator
 
 def _check_gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> Iterator[str]:
     """Check that each input drives thrusters that exist; if all do, check that each thruster has an input."""
-    wrong = False
+    mistakes = []
     for name, gains in inputs.items():
         for driven in gains:
             if driven not in names:
                 reason = f"there is no such thruster{only(driven, names, join_names(names))}"
-                yield key_line(f"inputs.{name}.{driven}", reason)
-                wrong = True
+                mistakes.append(key_line(f"inputs.{name}.{driven}", reason))
         if not any(gains.values()):
-            yield key_line(f"inputs.{name}", "drives no thruster: give one a gain other than 0")
-            wrong = True
-    if wrong or not inputs:
-        return
-    for name in names:
+            mistakes.append(key_line(f"inputs.{name}", "drives no thruster: give one a gain other than 0"))
+    yield from mistakes
+    for name in names if inputs and not mistakes else ():
         if not any(gains.get(name) for gains in inputs.values()):
             yield key_line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
 
@@ -153,17 +150,15 @@ def _check_keys(parts: Tables) -> Iterator[str]:
     """Check that each key of a curve or an axis has the other keys that it needs."""
     for name, curve in parts.curves.items():
         quantities = given_quantities(curve, CURVE)
-        unpaired = [*_check_reverse_pairs(f"curves.{name}", quantities)]
+        unpaired = [*_check_needed_by(f"curves.{name}", quantities, _REVERSE_PAIRS)]
         yield from unpaired
         if not unpaired and {"a_t", "b_t"} <= quantities.keys():
             thrust = Curve(name, tuple(quantities))
             values = {thrust.coefficient(key): q.value for key, q in quantities.items()}
             yield from no_thrust(thrust, values, f"curves.{name}")
-        for key in ("c_0", "d"):
-            if key + REVERSE in quantities and key not in quantities:
-                yield key_line(f"curves.{name}.{key}", f"this key is missing, and {key}{REVERSE} is there")
+        yield from _check_needed_by(f"curves.{name}", quantities, [(key + REVERSE, key) for key in ("c_0", "d")])
     for axis, table in parts.axis_tables.items():
-        yield from _check_reverse_pairs(f"axes.{axis.name}", given_quantities(table, AXIS))
+        yield from _check_needed_by(f"axes.{axis.name}", given_quantities(table, AXIS), _REVERSE_PAIRS)
 
 
 def check_tables_of_thrust(parts: Tables) -> Iterator[str]:
@@ -197,9 +192,7 @@ def _check_keys_of_thrust(place: str, curve: schema.Curve) -> Iterator[str]:
         yield from (key_line(f"{place}.{key}", "this key is missing") for key in ("a_t", "b_t") if key not in given)
         if "k_t" in given:
             yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
-    for one, other in (("V_0", "n_V"), ("n_V", "V_0")):
-        if one in given and other not in given:
-            yield key_line(f"{place}.{other}", f"this key is missing, and {one} is there")
+    yield from _check_needed_by(place, given, _both_ways("V_0", "n_V"))
 
 
 def _check_electric_currents(parts: File) -> Iterator[str]:
@@ -225,12 +218,14 @@ def _check_fins(parts: File, layout: Layout) -> Iterator[str]:
             yield key_line(
                 f"fin.{fin.name}", "its force depends on the velocity in surge, which the vehicle does not have"
             )
-        elif not any(fin.effect(form.axis) for form in layout.axes):
-            axes = join_names([form.axis.name for form in layout.axes])
+        elif not any(fin.effect(vehicle_axis.axis) for vehicle_axis in layout.axes):
+            axes = join_names([vehicle_axis.axis.name for vehicle_axis in layout.axes])
             yield key_line(f"fin.{fin.name}", f"its lift acts on no axis of the vehicle, which are {axes}")
-    for n, name in enumerate(names := [*(t.name for t in parts.thruster), *(fin.name for fin in parts.fin)]):
-        if n >= len(parts.thruster) and name in names[:n]:
-            yield key_line(f"fin.{name}", "a thruster or a fin before it has this name")
+    names = {thruster.name for thruster in parts.thruster}
+    for fin in layout.fins:
+        if fin.name in names:
+            yield key_line(f"fin.{fin.name}", "a thruster or a fin before it has this name")
+        names.add(fin.name)
 
 
 def _check_needed_tables(parts: File, lost: set[str]) -> Iterator[str]:
@@ -253,17 +248,25 @@ def _check_needed_tables(parts: File, lost: set[str]) -> Iterator[str]:
         yield key_line("arm", "this table with R and gamma is missing, and a thruster has the key arm")
 
 
-def _check_reverse_pairs(table: str, keys: Mapping[str, Quantity]) -> Iterator[str]:
-    """Check that the quadratic and the linear coefficient in reverse are both given, or neither."""
-    for one, other in (("a_t", "b_t"), ("b_t", "a_t"), ("a_d", "b_d"), ("b_d", "a_d")):
-        if one + REVERSE in keys and other + REVERSE not in keys:
-            yield key_line(f"{table}.{other}{REVERSE}", f"this key is missing, and {one}{REVERSE} is there")
+def _both_ways(one: str, other: str) -> list[tuple[str, str]]:
+    """Return two keys of which each needs the other, for `_check_needed_by`."""
+    return [(one, other), (other, one)]
+
+
+_REVERSE_PAIRS = [*_both_ways("a_t_reverse", "b_t_reverse"), *_both_ways("a_d_reverse", "b_d_reverse")]
+"""The quadratic and the linear coefficient in reverse."""
+
+
+def _check_needed_by(table: str, keys: Collection[str], pairs: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Check that the second key of each pair is given where the first is."""
+    for key, needed in pairs:
+        if key in keys and needed not in keys:
+            yield key_line(f"{table}.{needed}", f"this key is missing, and {key} is there")
 
 
 def no_thrust(curve: Curve, values: Mapping[str, float], place: str) -> Iterator[str]:
     """Yield a line for each direction in which full command gives no force, or a force of the wrong sign."""
-    has_reverse = any(key.endswith(REVERSE) for key in curve.keys)
-    for end in ("", REVERSE) if has_reverse else ("",):
+    for end in ("", REVERSE) if any(key.endswith(REVERSE) for key in curve.keys) else ("",):
         a_t, b_t, c_0 = (curve.coefficient(key + end) for key in ("a_t", "b_t", "c_0"))
         m = 1.0 - values.get(c_0, 0.0)
         force = (values[a_t] * m + values[b_t]) * m
@@ -336,11 +339,10 @@ def _check_cross(parts: Tables) -> Iterator[str]:
 def _check_arm(parts: File, layout: Layout) -> Iterator[str]:
     """Check that the arm R sin γ is not zero."""
     if layout.has_arm and parts.arm and parts.arm.R and parts.arm.gamma:
+        reason = "must be more than 0, because otherwise the arm R sin γ is 0"
         for name, factor in (("R", parts.arm.R.value), ("gamma", sin(parts.arm.gamma.value))):
             if factor == 0.0:
-                yield key_line(
-                    f"arm.{name}.value", "must be more than 0, because otherwise the arm R sin γ is 0", factor
-                )
+                yield key_line(f"arm.{name}.value", reason, factor)
 
 
 def _check_coupling(parts: File, layout: Layout) -> Iterator[str]:
@@ -395,10 +397,10 @@ def _wrong_correlation(name: str, other: str, rows: Mapping[str, Estimated]) -> 
 
 
 def check_quantities(
-    table: str, found: Mapping[str, Quantity], declarations: Mapping[str, Declaration]
+    table: str, quantities: Mapping[str, Quantity], declarations: Mapping[str, Declaration]
 ) -> Iterator[str]:
     """Yield a line for each coefficient that is unknown, has a wrong unit, or is out of its bounds."""
-    for name, quantity in found.items():
+    for name, quantity in quantities.items():
         key = f"{table}.{name}"
         if (declaration := declarations.get(name)) is None:
             yield key_line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, declarations)}")

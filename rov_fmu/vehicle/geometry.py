@@ -10,7 +10,7 @@ from typing import Any
 
 from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Layout, Thruster
+from rov_fmu.equation.layout import Layout, Part, Thruster
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
@@ -82,7 +82,7 @@ def undriven_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[tupl
     """
     if not layout.driven:
         return
-    axes = sorted((form.axis for form in layout.axes), key=lambda axis: axis is SWAY)
+    axes = sorted((vehicle_axis.axis for vehicle_axis in layout.axes), key=lambda axis: axis is SWAY)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
     for axis in (axis for axis in axes if axis not in _RIGHTED or axis.name in driven):
         if not layout.drivers(axis) and any(fin.effect(axis) for fin in layout.fins):
@@ -120,17 +120,12 @@ def check_inputs(layout: Layout) -> Iterator[str]:
     """Check that each input drives an axis; if all do, check that each axis has an input."""
     driven = {axis: layout.signs(axis) for axis in (one.axis for one in layout.axes) if layout.drivers(axis)}
     steering = {name for fin in layout.fins for name in layout.gains[fin.name]}
-    idle = [
-        name
-        for name in layout.mix
-        if f"u_{name}" not in steering and not any(f"u_{name}" in signs for signs in driven.values())
-    ]
+    used = steering.union(*driven.values())
+    idle = [name for name in layout.mix if f"u_{name}" not in used]
     for name in idle:
         yield key_line(f"inputs.{name}", "drives no axis of the vehicle: its gains cancel")
-    if idle:
-        return
     for axis, signs in driven.items():
-        if not signs and axis not in _RIGHTED:
+        if not (idle or signs or axis in _RIGHTED):
             yield key_line(f"axes.{axis.name}", "no input drives it: the gains cancel")
 
 
@@ -142,11 +137,12 @@ def _unit(row: Sequence[float]) -> list[float]:
 
 def check_part_names(layout: Layout) -> Iterator[str]:
     """Check that all coefficients have their usual names, by which the identification knows them."""
-    parts = [(f"axes.{form.axis.name}", form.others) for form in layout.axes]
-    parts += [(f"curves.{curve.name}", curve.others) for curve in layout.curves]
-    for part, others in parts:
-        for key, name in others:
-            yield key_line(f"{part}.{key}", f"another variable has its name, and it would be {name}; rename a part")
+    tables: Mapping[str, Mapping[str, Part]] = {"axes": layout.kinds, "curves": layout.curves_by_name}
+    for table, parts in tables.items():
+        for part in parts:
+            for key, name in parts[part].others:
+                reason = f"another variable has its name, and it would be {name}; rename a part"
+                yield key_line(f"{table}.{part}.{key}", reason)
 
 
 # ---- Mass, damping, weight -------------------------------------------------------------------------------------------
@@ -228,8 +224,8 @@ def _doubts_of_damping(layout: Layout, coefficients: Mapping[str, float]) -> Ite
     if not cross:
         return
     damping = {
-        form.axis.velocity: min(coefficients[form.coefficient(key)] for key in ("b_d", "b_d_reverse"))
-        for form in layout.axes
+        vehicle_axis.axis.velocity: min(coefficients[vehicle_axis.coefficient(key)] for key in ("b_d", "b_d_reverse"))
+        for vehicle_axis in layout.axes
     }
     entries = {a + a: value for a, value in damping.items()}
     adds = "the linear damping adds energy to some slow motions of"
@@ -247,7 +243,9 @@ def _doubts_of_damping(layout: Layout, coefficients: Mapping[str, float]) -> Ite
 
 def _axes_of(layout: Layout, *velocities: str) -> str:
     """Return the names of the axes with some velocities, in the order of the vehicle."""
-    return listed([form.axis.name for velocity, form in layout.by_velocity.items() if velocity in velocities])
+    return listed(
+        [vehicle_axis.axis.name for velocity, vehicle_axis in layout.by_velocity.items() if velocity in velocities]
+    )
 
 
 def _doubts_of_voltage(layout: Layout, coefficients: Mapping[str, float]) -> Iterator[str]:

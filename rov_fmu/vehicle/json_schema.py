@@ -11,8 +11,8 @@ _NULL = {"type": "null"}
 
 def json_schema(of: type[Strict] = File) -> dict[str, Any]:
     """Return the schema of a TOML file."""
-    found: dict[str, Any] = _simplified(of.model_json_schema())
-    return found
+    schema: dict[str, Any] = _simplified(of.model_json_schema())
+    return schema
 
 
 def json_schema_text() -> str:

@@ -113,10 +113,10 @@ def derivative_hint(key: str) -> str:
     if inertia := re.fullmatch(r"I_?([xyz])\1?", key):
         return f"; write I_{dict(zip('xyz', 'pqr', strict=True))[inertia[1]]} in [body]"
     for name, form in _FORMS.items():
-        if not (found := form.fullmatch(key)):
+        if not (match := form.fullmatch(key)):
             continue
-        along = _AXES["uvwpqr"[_LETTERS.index(found[1])]]
-        velocities = [velocity for velocity in found.groups()[1:] if velocity]
+        along = _AXES["uvwpqr"[_LETTERS.index(match[1])]]
+        velocities = [velocity for velocity in match.groups()[1:] if velocity]
         if {*velocities} == {along.velocity}:
             return f"; give -{derivative(name, along)}, which is positive, as {name} of [axes.{along.name}]"
         pair = [along.velocity, velocities[-1]]

@@ -6,7 +6,7 @@
 import os
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
@@ -108,8 +108,8 @@ def _pulses(given: object) -> tuple[float, ...]:
     """Return pulse widths as a tuple. Raises ValueError."""
     low, high = _PULSES
     numbers = given if isinstance(given, list) else []
-    usable = [float(x) for x in numbers if isinstance(x, int | float) and not isinstance(x, bool) and low <= x <= high]
-    if len(numbers) != 3 or len(usable) != 3 or any(b - a < _CLOSEST for a, b in pairwise(usable)):
+    usable = [float(x) for x in numbers if type(x) in (int, float) and low <= x <= high]
+    if not len(numbers) == len(usable) == 3 or any(b - a < _CLOSEST for a, b in pairwise(usable)):
         reason = f"three rising numbers within {low:g} ... {high:g} us and at least {_CLOSEST:g} us apart"
         raise ValueError(f"must be {reason}: full reverse, neutral, full thrust ahead")
     return tuple(usable)
@@ -211,20 +211,16 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     def for_model(self, name: str) -> layout.Curve:
         """Return the curve of the model."""
         keys, current = _coefficient_keys(self, CURVE), self.electric_current
-        measured = [replace(self.table, name=f"0_{name}")] if self.table else []
-        if not measured:
-            rows = enumerate(self.tables or (), 1)
-            measured = [replace(row.table, name=f"{n}_{name}", voltage=row.voltage) for n, row in rows]
-        if measured:
+        tables = {0: (0.0, self.table)} if self.table else {}
+        tables = tables or {n: (row.voltage, row.table) for n, row in enumerate(self.tables or (), 1)}
+        if tables:
             keys = ("k_t", *(key for key in keys if key not in ("k_t", *REPLACED_BY_TABLE)))
         return layout.Curve(
             name,
             keys,
-            self.together,
-            self.description,
-            self.equation,
-            tuple(measured),
-            replace(current.table, voltage=current.voltage) if current else None,
+            **{key: getattr(self, key) for key in ("together", "description", "equation")},
+            tables=tuple(replace(t, name=f"{n}_{name}", voltage=voltage) for n, (voltage, t) in tables.items()),
+            electric_current=replace(current.table, voltage=current.voltage) if current else None,
         )
 
 
@@ -338,41 +334,33 @@ class Tables(Strict):
     @cached_property
     def layout(self) -> Layout:
         """The layout of the vehicle, for the model."""
-        axes = tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items())
-        curves = tuple(curve.for_model(name) for name, curve in self.curves.items())
-        coupled = bool(self.body and self.body.coupling)
-        cross = tuple(filter(None, map(cross_of, self.cross)))
-        restoring = tuple(given_quantities(self.body, RESTORING)) if self.body else ()
-        fins = tuple(fin.for_model() for fin in self.fin)
-        has_dead_time = bool(self.commands and self.commands.T_d)
-        voltage = self.battery.voltage.value if self.battery else None
-        source = self.battery.voltage.source if self.battery else ""
-        pulse = self.commands.pulse if self.commands else None
+        body, commands, voltage = self.body, self.commands, self.battery.voltage if self.battery else None
         return Layout(
-            axes,
-            curves,
-            tuple(self.thruster),
-            self.inputs,
-            coupled,
-            cross,
-            restoring,
-            fins,
-            has_dead_time,
-            voltage,
-            pulse,
-            source,
+            axes=tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items()),
+            curves=tuple(curve.for_model(name) for name, curve in self.curves.items()),
+            thrusters=tuple(self.thruster),
+            mix=self.inputs,
+            coupled=bool(body and body.coupling),
+            cross=tuple(filter(None, map(cross_of, self.cross))),
+            restoring=tuple(given_quantities(body, RESTORING)) if body else (),
+            fins=tuple(fin.for_model() for fin in self.fin),
+            has_dead_time=bool(commands and commands.T_d),
+            voltage=voltage.value if voltage else None,
+            voltage_source=voltage.source if voltage else "",
+            pulse=commands.pulse if commands else None,
         )
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
         """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
-        found: dict[str, Quantity | None] = {}
-        fins = {fin.name: fin for fin in self.fin}
-        for name, (first, *keys) in of.keys_in_file.items():
-            table: Any = fins if first == "fin" else getattr(self, first)
-            for key in keys:
-                table = table.get(key) if isinstance(table, dict) else getattr(table, key, None)
-            found[name] = table
-        return found
+        fins: Any = {fin.name: fin for fin in self.fin}
+
+        def entry(table: Any, key: str) -> Any:
+            return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
+
+        return {
+            name: reduce(entry, keys, fins if first == "fin" else getattr(self, first))
+            for name, (first, *keys) in of.keys_in_file.items()
+        }
 
 
 class _Head(Strict):

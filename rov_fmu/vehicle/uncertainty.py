@@ -144,11 +144,11 @@ def uncertainty(
 def correlation(names: Sequence[str], estimates: Mapping[str, Estimated]) -> Array:
     """Return the matrix of correlations of some coefficients."""
     place = {name: n for n, name in enumerate(names)}
-    found = np.eye(len(names))
+    matrix = np.eye(len(names))
     for name in place.keys() & estimates.keys():
         for other, value in estimates[name].correlation.items():
-            found[place[name], place[other]] = found[place[other], place[name]] = value
-    return found
+            matrix[place[name], place[other]] = matrix[place[other], place[name]] = value
+    return matrix
 
 
 def least_eigenvalue(estimates: Mapping[str, Estimated]) -> float:

@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, lru_cache
+from itertools import chain
 from math import inf, isfinite, sin
 from numbers import Real
 from pathlib import Path
@@ -53,8 +54,8 @@ class _Formulas:
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
         self.alone = {
-            form.axis.name: compiled(alone_formulas(layout, form.axis.velocity), equation.measured)
-            for form in layout.axes
+            vehicle_axis.axis.name: compiled(alone_formulas(layout, vehicle_axis.axis.velocity), equation.measured)
+            for vehicle_axis in layout.axes
         }
         self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
 
@@ -164,12 +165,14 @@ class Vehicle:
     @property
     def files(self) -> list[Path]:
         """The existing files that belong to the vehicle file: its tables, pictures and report."""
-        report = self.provenance.report if self.provenance else None
-        tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
         measured = [table for curve in self.layout.curves for table in (*curve.tables, curve.electric_current)]
-        tables += [table.path for table in measured if table and table.path]
-        pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
-        return [path for path in (*tables, *pictures, report) if path and path.is_file()]
+        paths = [
+            *(self.data and self.data / name for name in chain(*TABLES.values())),
+            *(table and table.path for table in measured),
+            *(self.pictures and self.pictures / name for name in PICTURES),
+            self.provenance and self.provenance.report,
+        ]
+        return [path for path in paths if path and path.is_file()]
 
     @property
     def uncertainty(self) -> "Uncertainty":
@@ -202,9 +205,11 @@ class Vehicle:
 
     def commanded(self, inputs: Values) -> dict[str, float]:
         """Return the steady thrust of every thruster (N), by its name, for the commands."""
-        found = self._steady(inputs)
+        values = self._steady(inputs)
         names = self._formulas.names
-        return {name: found[steady_name(name, curve, names).identifier] for name, curve in self.layout.curve_of.items()}
+        return {
+            name: values[steady_name(name, curve, names).identifier] for name, curve in self.layout.curve_of.items()
+        }
 
     def _steady(self, inputs: Values) -> dict[str, float]:
         """Return the values of all formulas from the commands to the steady thrust."""
@@ -228,23 +233,23 @@ class Vehicle:
 
     def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
-        found = self._formulas.calculate(self._values(inputs, state))
+        values = self._formulas.calculate(self._values(inputs, state))
         for name in self.layout.continued:
-            found[name] = heading(found, state.get(name, found[name]))
-        return {name: found[name] for name in self.layout.calculated}
+            values[name] = heading(values, state.get(name, values[name]))
+        return {name: values[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
-        found = thruster.effect(axis)
+        effect = thruster.effect(axis)
         by_arm = axis is YAW and thruster.position is None and thruster.arm
-        return found * arm(*(self[name] for name in ARM)) if by_arm else found
+        return effect * arm(*(self[name] for name in ARM)) if by_arm else effect
 
     # ---- Motion ----
 
     def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the time derivatives of the states by their names."""
-        found = self._formulas.calculate(self._values(inputs, state))
-        return {name: found[f"der_{name}"] for name in self.layout.state}
+        values = self._formulas.calculate(self._values(inputs, state))
+        return {name: values[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
@@ -265,9 +270,9 @@ class Vehicle:
 
     # ---- One axis alone ----
 
-    def effective_inertia(self, form: VehicleAxis) -> float:
+    def effective_inertia(self, vehicle_axis: VehicleAxis) -> float:
         """Return the effective inertia m/β (kg, kg.m2): the load per acceleration along an axis alone."""
-        gain = self.parameters[self._formulas.names("gain", form.axis.velocity).identifier]
+        gain = self.parameters[self._formulas.names("gain", vehicle_axis.axis.velocity).identifier]
         return 1.0 / gain if gain > 0.0 else inf
 
     def alone(self, axis: Axis, inputs: Values) -> AxisAlone:
@@ -277,7 +282,9 @@ class Vehicle:
     def motions(self, inputs: Values) -> tuple[AxisAlone, ...]:
         """Return the motion of each axis alone under held inputs, once the thrust is steady."""
         values = {**self._steady(inputs), **self.parameters}
-        return tuple(AxisAlone.of(self._formulas.alone[form.axis.name](values)) for form in self.layout.axes)
+        return tuple(
+            AxisAlone.of(self._formulas.alone[vehicle_axis.axis.name](values)) for vehicle_axis in self.layout.axes
+        )
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
@@ -359,8 +366,8 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     assert head, "read_tables tells that it is missing"
     assert validity, "read_tables tells that it is missing"
     layout = replace(file.layout, identified=validity.ranges)
-    found = file.quantities(layout)
-    coefficients = {name: q.value if q else UNTUNED for name, q in found.items()}
+    quantities = file.quantities(layout)
+    coefficients = {name: q.value if q else UNTUNED for name, q in quantities.items()}
     if mistakes := [*check_mass(layout, coefficients)]:
         raise VehicleFileError(*lines_on(path, mistakes))
     for doubt in doubts(layout, coefficients):
@@ -369,11 +376,11 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         layout,
         coefficients,
         **dict(head),
-        sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
+        sources={name: q.source if q else NOT_GIVEN for name, q in quantities.items()},
         command_range=validity.command_range,
         alternatives=file.alternatives,
         limits=validity.limits,
-        intervals={name: q.interval for name, q in found.items() if q and q.interval},
+        intervals={name: q.interval for name, q in quantities.items() if q and q.interval},
         estimates=file.estimates,
         provenance=file.provenance,
         path=path,

@@ -87,32 +87,6 @@ def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -
         assert rov.derivatives(inputs, state) == pytest.approx(expected, rel=1e-13, abs=1e-13 * size)
 
 
-@pytest.mark.parametrize("stronger", ["forward", "reverse"])
-def test_the_strongest_thrust_is_that_of_the_better_direction(stronger: str) -> None:
-    better, worse = (29.30, 31.51), (21.76, 25.52)  # a_t and b_t of a T200
-    forward, reverse = (better, worse) if stronger == "forward" else (worse, better)
-    ends = (forward[0], forward[1], reverse[0], reverse[1], 0.0872)
-    keys = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
-    rov = HEAVY.replaced(dict(zip(keys, ends, strict=True)))
-    m = 1.0 - 0.0872
-    assert rov.strongest(HEAVE) == pytest.approx(4.0 * (better[0] * m + better[1]) * m, rel=1e-12)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_within_the_dead_band_and_on_its_edge_there_is_no_thrust(sign: float) -> None:
-    c_0 = HEAVY["c_0_t200"]
-    for command in (0.0, 0.5 * c_0, c_0):
-        assert set(HEAVY.commanded(held(HEAVY, u_1=sign * command)).values()) == {0.0}
-    assert HEAVY.commanded(held(HEAVY, u_1=sign * (c_0 + 1e-6)))["1"] * sign > 0.0
-
-
-def test_one_input_drives_several_thrusters_and_each_of_them_saturates() -> None:
-    rov = VEHICLES["with an input mix"]
-    both, ahead = (rov.commanded(held(rov, **inputs)) for inputs in ({"u_ahead": 1.0, "u_turn": 1.0}, {"u_ahead": 1.0}))
-    assert both["2"] == ahead["2"] == rov.curve_force(rov.layout.curves[0], 1.0)
-    assert both["1"] == rov.curve_force(rov.layout.curves[0], 0.5)
-
-
 # ---- Signs ----
 
 
@@ -136,14 +110,6 @@ def test_one_input_drives_several_thrusters_and_each_of_them_saturates() -> None
 def test_the_signs_are_those_of_the_body_and_earth_frames(k: Vehicle, inputs: Values, signs: dict[str, int]) -> None:
     after = k.step({**still(k), **inputs}, at_rest(k), 0.5)
     assert {name: copysign(1, value) for name, value in after.items() if value != 0.0} == signs
-
-
-def test_a_current_displaces_and_does_nothing_else(k: Vehicle) -> None:
-    calm = held(k, u_l=0.5, u_r=0.2, u_t=-0.4)
-    before = {**at_rest(k), "u": 0.3, "w": 0.1, "r": -1.0, "psi": 0.7}
-    a, b = (k.step(inputs, before, 3.0) for inputs in (calm, {**calm, "V_N": 0.5, "V_E": -0.25}))
-    assert {**b, "x": a["x"], "y": a["y"]} == pytest.approx(a, rel=1e-13)  # the substeps depend on the current
-    assert (b["x"] - a["x"], b["y"] - a["y"]) == pytest.approx((1.5, -0.75), rel=1e-13)
 
 
 # ---- Rates and steps ----

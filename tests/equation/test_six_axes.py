@@ -18,13 +18,11 @@ from tests.vehicles import (
     SIX,
     Values,
     at_rest,
-    frictionless,
     random_body,
     random_case,
     random_inputs,
     random_state,
     still,
-    with_axes,
 )
 from verification.references import rigid_vehicle
 from verification.references.rigid_vehicle import compared, places
@@ -95,30 +93,6 @@ def test_a_step_in_c_agrees_with_python_and_50_digits(cases: int) -> None:
             exact = rigid_vehicle.step(rov, inputs, state, 0.01 * h)
             near = rov.step(inputs, state, 0.01 * h)
             assert gap(compared(rov, places(rov, near)), compared(rov, exact)) <= 1e-13
-
-
-@pytest.mark.parametrize("axes", [pytest.param(axes, marks=LONG) for axes in ("q", "uwq", "vpr", "uvpq", "wpqr")])
-def test_a_step_in_c_agrees_with_python_for_other_axes(axes: str) -> None:
-    rng = random.Random(axes)
-    rov = random_body(rng, axes)
-    for _ in range(20):
-        _, inputs, state, h = random_case(rng, rov, longest=0.5)
-        expected = list(rov.step(inputs, state, h).values())
-        assert in_c(rov, inputs, state, [0.0, h])[:, 1].tolist() == pytest.approx(expected, rel=1e-13, abs=1e-13)
-
-
-@pytest.mark.parametrize(("h", "seeds"), [(100.0, 1), pytest.param(1000.0, 3, marks=LONG)])
-def test_a_long_step_is_many_short_ones(h: float, seeds: int) -> None:
-    """The vehicle has settled to a spiral after a while, so that errors fade and only the angle adds them up."""
-    for seed in range(seeds):
-        rng = random.Random(seed)
-        inputs, state = random_inputs(rng, SIX), random_state(rng, SIX)
-        once, often = (in_c(SIX, inputs, state, np.linspace(0.0, h, steps + 1))[:, -1] for steps in (1, 1000))
-        after = SIX.step(inputs, state, h)
-        assert [*once] == pytest.approx([*after.values()], rel=1e-12, abs=1e-14 * abs(after["psi"]))
-        ends = (dict(zip([*SIX.layout.state, "psi"], y.tolist(), strict=True)) for y in (once, often))
-        (one, many), turned = ([*(compared(SIX, places(SIX, end))), end["psi"]] for end in ends), abs(after["psi"])
-        assert one == pytest.approx(many, rel=1e-12, abs=1e-14 * turned)
 
 
 # ---- The heading ----
@@ -209,11 +183,3 @@ def test_psi_and_the_sign_of_the_quaternion_do_not_depend_on_the_steps() -> None
         for _ in range(2):
             state = HEAVY.step(inputs, state, 1.5)
         assert [state[name] for name in (*QUATERNION, "psi")] == pytest.approx(once[:5, n].tolist(), abs=1e-9), start
-
-
-@pytest.mark.parametrize("start", [0.0, -4.0 * pi])
-def test_a_thousand_turns_are_counted_in_one_step(start: float) -> None:
-    rov = frictionless(with_axes("pr"))
-    after = rov.step(still(rov), at_rest(rov) | {"r": 2.0 * pi, "psi": start}, 1000.0)
-    (psi,) = simulate(rov, [0.0, 1000.0], {"r": 2.0 * pi, "psi_0": start}, ["psi"]).values[:, 0, 1]
-    assert [after["psi"], psi] == pytest.approx([start + 2000.0 * pi] * 2, rel=1e-14)

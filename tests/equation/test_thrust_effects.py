@@ -2,7 +2,6 @@
 
 import csv
 import random
-import re
 from dataclasses import replace
 from itertools import pairwise
 from math import isfinite
@@ -11,10 +10,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.equation.layout import Curve, ThrustTable
 from rov_fmu.equation.step import MOST_WAITING, Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -43,11 +40,6 @@ def immediate(rov: Vehicle) -> Vehicle:
 
 
 NOW = immediate(ROV)
-
-
-def gap(a: list[float], b: list[float]) -> float:
-    """Return the largest difference of two states."""
-    return max(abs(float(x - y)) for x, y in zip(a, b, strict=True))
 
 
 def inputs_of(rng: random.Random, rov: Vehicle) -> dict[str, float]:
@@ -115,11 +107,6 @@ def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_bal
     assert heavy.step(heavy.held_inputs(HEAVE, -0.3), at_rest(heavy), 100.0)["w"] == pytest.approx(V_ss, rel=1e-9)
 
 
-def test_coefficients_of_a_vehicle_with_tables_can_be_changed() -> None:
-    vehicle = load_vehicle(THRUST_EFFECTS)
-    assert vehicle.with_(k_t_main=1.1, T_d=0.3)["k_t_main"] == 1.1
-
-
 # ---- Motion ----
 
 
@@ -133,21 +120,6 @@ def test_a_step_is_exact(rov: Vehicle) -> None:
             assert abs(x - y) <= 1e-13 * (1.0 + abs(y)), h
 
 
-@pytest.mark.parametrize("rov", [NOW, pytest.param(FINNED, marks=pytest.mark.long)], ids=["four axes", "six axes"])
-def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(rov: Vehicle) -> None:
-    rng = random.Random(3)
-    state = random_state(rng, rov)
-    y = places(rov, state)
-    changed = [x + 1e-13 for x in y]
-    for _ in range(6):
-        inputs = inputs_of(rng, rov)
-        state = rov.step(inputs, state, 5.0)
-        y, changed = (list(rigid_vehicle.integrate(rov, inputs, start, 5.0)) for start in (y, changed))
-    found, expected, other = (compared(rov, of) for of in (places(rov, state), y, changed))
-    error = gap(found, expected)
-    assert error <= 1e-10 or error <= 100.0 * gap(other, expected)
-
-
 @pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
 def test_c_agrees_with_python(rov: Vehicle) -> None:
     rng = random.Random(4)
@@ -156,32 +128,6 @@ def test_c_agrees_with_python(rov: Vehicle) -> None:
         expected = rov.step(inputs, state, h)
         found = simulate(rov, np.array([0.0, h]), {**inputs, **state}, workers=1).values[:, 0, 1]
         assert found.tolist() == pytest.approx([expected[name] for name in rov.layout.state], rel=1e-13, abs=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("voltage", "force"),
-    [(10.0, 10.0), (12.0, 10.0), (13.0, 12.0), (14.0, 14.0), (15.0, 17.0), (16.0, 20.0), (18.0, 20.0)],
-)
-def test_thrust_is_linear_between_the_voltages_of_the_tables_and_constant_beyond(voltage: float, force: float) -> None:
-    rows = ((12.0, 10.0), (14.0, 14.0), (16.0, 20.0))
-    tables = tuple(ThrustTable(f"t_{V:g}", (-1.0, 1.0), (-F, F), (F, F), V) for V, F in rows)
-    curve = Curve("c", ("k_t",), 2, tables=tables)
-    layout = replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage)
-    for command in (1.0, -0.5, 0.0, 2.0):
-        share = max(-1.0, min(1.0, command)) * 1.5 / 2.0
-        assert Vehicle(layout, {"k_t_c": 1.5}).curve_force(curve, command) == pytest.approx(share * force, rel=1e-15)
-
-
-def test_thrust_rises_with_a_power_of_the_voltage_and_a_dead_band_comes_first() -> None:
-    curve = Curve("c", ("V_0", "n_V", "a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse"), 4)
-    numbers = {"V_0_c": 10.0, "n_V_c": 2.0, "a_t_c": 40.0, "b_t_c": 8.0, "a_t_c_reverse": 20.0, "b_t_c_reverse": 4.0}
-    numbers |= {"c_0_c": 0.25, "c_0_c_reverse": 0.5}
-    for voltage, factor in ((10.0, 1.0), (15.0, 2.25), (0.0, 0.0), (-5.0, 0.0)):
-        rov = Vehicle(replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage), numbers)
-        forces = {1.0: (40.0 * 0.75 + 8.0) * 0.75 / 4.0, 0.5: (40.0 * 0.25 + 8.0) * 0.25 / 4.0, 0.25: 0.0, 0.1: 0.0}
-        forces |= {-1.0: -(20.0 * 0.5 + 4.0) * 0.5 / 4.0, -0.5: 0.0, -0.3: 0.0}
-        found = {command: rov.curve_force(curve, command) for command in forces}
-        assert found == pytest.approx({command: factor * force for command, force in forces.items()}, rel=1e-15)
 
 
 # ---- Dead time ----
@@ -256,11 +202,6 @@ def test_a_dead_time_that_ends_inside_a_step_is_as_exact_late_in_a_run() -> None
         assert line.acting["u_l"] == 0.0
         state = line.step(ROV, inputs, state, n * h, h)
     assert (line.waiting, line.acting["u_l"]) == ([], 0.5)
-
-
-def test_as_many_changes_may_wait_as_in_c() -> None:
-    (in_c,) = re.findall(r"MOST_WAITING = (\d+)", (C_SOURCES / "delay.c").read_text(encoding="utf-8"))
-    assert int(in_c) == MOST_WAITING == 1024
 
 
 def test_too_many_changes_are_refused() -> None:

@@ -103,22 +103,6 @@ def test_thrusters_are_numbered_and_directed_as_ardusubs_motors(name: str) -> No
             assert (abs(effect) > 0.1) == (factor != 0), f"{thruster.name} {axis}"
 
 
-@pytest.mark.parametrize("name", BOTH)
-@pytest.mark.parametrize("axis", STICKS)
-def test_a_stick_moves_its_axis_alone(name: str, axis: str) -> None:
-    """The commands of ArduSub's mixer for one stick give a force along its axis and, by symmetry, no other force.
-
-    The horizontal thrusters push below the origin, so surge pitches the vehicle and sway rolls it.
-    """
-    vehicle, (place, sign) = load_vehicle(SHIPPED[name]), STICKS[axis]
-    inputs = dict.fromkeys(vehicle.layout.inputs, 0.0)
-    inputs |= {f"u_{n}": 0.4 * sign * factors[place] for n, factors in ARDUSUB[name].items()}
-    F = vehicle.commanded(inputs)
-    for other in (AXES[name] for name in STICKS):
-        force = sum(thruster.effect(other) * F[thruster.name] for thruster in vehicle.layout.thrusters)
-        assert (force > 1.0) if other.name == axis else (abs(force) < 1e-12), other.name
-
-
 @pytest.mark.parametrize(("name", "axis"), [("bluerov2", "roll"), *product(["bluerov2_heavy"], ROLLS)])
 def test_vertical_thrusters_roll_and_pitch_as_ardusub_tells(name: str, axis: str) -> None:
     thrusters = load_vehicle(SHIPPED[name]).layout.thrusters[4:]

@@ -2,23 +2,24 @@
 
 import re
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import product
-from math import e, inf, isclose
+from math import e, isclose
 from pathlib import Path
 
-import fmpy
 import pytest
 from scipy.optimize import brentq
 
 from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.vehicle.published import STEP_TESTS, Cell, ResponseTable, load_tables
+from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
+from tests.fmi import OK
+from tests.fmi2 import Fmu
 
 DATA = VIDEORAY.parent / "tables"
 
@@ -82,88 +83,22 @@ ROWS = [*CELLS, *(("surge", command) for command in SURGE)]
 # ---- The step tests of the paper, with the FMU -----------------------------------------------------------------------
 
 
-class Tank:
-    """A simulated test tank. It moves the FMU only by fmi2DoStep and does not use the closed form."""
+def simulated(fmu: Fmu, vehicle: Vehicle, axis: str, command: int, model: str) -> tuple[float, float]:
+    """Simulate V_ss and Tau of an axis from rest at a command in % with one of the models, without the closed form."""
+    own = vehicle.layout.kinds[axis].axis
+    values = {name: sign * command / 100.0 for name, sign in vehicle.layout.signs(own).items()}
+    if model == "non_linear":
+        values |= dict.fromkeys(vehicle.layout.tuning, 1.0)
 
-    def __init__(self, folder: Path) -> None:
-        description = fmpy.read_model_description(str(folder))
-        self._references = {v.name: v.valueReference for v in description.modelVariables}
-        self._fmu = fmpy.instantiate_fmu(str(folder), description, fmi_type="CoSimulation")
-        self._time = 0.0
+    def velocity(time: float) -> float:
+        with fmu.instance() as instance:
+            instance.start(values)
+            assert time == 0.0 or instance.step(0.0, time) == OK
+            return instance.get([own.velocity])[0]
 
-    def close(self) -> None:
-        self._fmu.freeInstance()
-
-    def start_from_rest(self, values: Mapping[str, float]) -> None:
-        self._fmu.reset()
-        self._fmu.setupExperiment(startTime=0.0)
-        self._fmu.setReal([self._references[name] for name in values], list(values.values()))
-        self._fmu.enterInitializationMode()
-        self._fmu.exitInitializationMode()
-        self._time = 0.0
-
-    def value(self, name: str) -> float:
-        return float(self._fmu.getReal([self._references[name]])[0])
-
-    def step(self, h: float) -> None:
-        self._fmu.doStep(currentCommunicationPoint=self._time, communicationStepSize=h)
-        self._time += h
-
-    def steady_velocity(self, velocity: str) -> float:
-        """Simulate until the velocity no longer changes, and return it."""
-        before = inf
-        for _ in range(1000):
-            self.step(1.0)
-            now = self.value(velocity)
-            if isclose(now, before, rel_tol=1e-15):
-                return now
-            before = now
-        raise AssertionError(f"{velocity} still changes after {self._time:g} s")
-
-    def time_to_reach(self, velocity: str, target: float) -> float:
-        """Return the time at which the velocity reaches the target: a root search in a step of 10 ms."""
-        h = 0.01
-        for _ in range(10_000):
-            before, start = self._fmu.getFMUstate(), self._time
-            self.step(h)
-            if self.value(velocity) >= target:
-                break
-            self._fmu.freeFMUstate(before)
-        else:
-            raise AssertionError(f"{velocity} does not reach {target} in {self._time:g} s")
-
-        def lacking(time: float) -> float:
-            self._fmu.setFMUstate(before)
-            self._time = start
-            if time > 0.0:
-                self.step(time)
-            return self.value(velocity) - target
-
-        time = start + brentq(lacking, 0.0, h, xtol=1e-15)
-        self._fmu.freeFMUstate(before)
-        return float(time)
-
-
-Responses = Callable[[str, int, str], tuple[float, float]]
-
-
-@pytest.fixture(scope="module")
-def simulated(videoray_dir: Path, vehicle: Vehicle) -> Iterator[Responses]:
-    """Return a function that simulates V_ss and Tau of an axis at a command in % with one of the models."""
-    tank = Tank(videoray_dir)
-
-    def responses(axis: str, command: int, model: str) -> tuple[float, float]:
-        experiment = next(x for x in STEP_TESTS if x.axis.name == axis)
-        values = {name: sign * command / 100.0 for name, sign in vehicle.layout.signs(experiment.axis).items()}
-        if model == "non_linear":
-            values |= {f"{tuning}_{velocity}": 1.0 for tuning in ("alpha", "beta") for velocity in "uwr"}
-        tank.start_from_rest(values)
-        V_ss = tank.steady_velocity(experiment.axis.velocity)
-        tank.start_from_rest(values)
-        return V_ss, tank.time_to_reach(experiment.axis.velocity, (1.0 - 1.0 / e) * V_ss)
-
-    yield responses
-    tank.close()
+    V_ss = velocity(1000.0)
+    assert isclose(V_ss, velocity(999.0), rel_tol=1e-15)
+    return V_ss, float(brentq(lambda time: velocity(time) - (1.0 - 1.0 / e) * V_ss, 0.0, 100.0, xtol=1e-15))
 
 
 @pytest.fixture(scope="module")
@@ -180,9 +115,9 @@ def cells_of(tables: Mapping[str, ResponseTable], axis: str, command: int, model
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize(("axis", "command"), ROWS)
 def test_trajectory_gives_the_closed_form_and_the_printed_cells(
-    axis: str, command: int, model: str, simulated: Responses, tables: Mapping[str, ResponseTable]
+    axis: str, command: int, model: str, fmu: Fmu, vehicle: Vehicle, tables: Mapping[str, ResponseTable]
 ) -> None:
-    found = simulated(axis, command, model)
+    found = simulated(fmu, vehicle, axis, command, model)
     closed_form = [cell.computed for cell in cells_of(tables, axis, command, model)]
     assert found == pytest.approx(closed_form, rel=1e-9, abs=0.0)
     number = MODELS.index(model)
@@ -260,22 +195,11 @@ HEAVE, YAW, SURGE_STEADY = "table6_heave_response.csv", "table7_yaw_response.csv
 # The file, the text to replace, its replacement, and what the one line must contain.
 BAD_TABLES: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
     "text for a number": (HEAVE, "1.76", "slow", ("line 2", "'non-linear Tau [s]'", "'slow'", "number")),
-    "decimal comma": (HEAVE, "1.33", '"1,33"', ("line 3", "'non-linear Tau [s]'", "'1,33'", "number")),
-    "NaN": (HEAVE, "\n50,", "\nnan,", ("line 4", "'command [%]'", "'nan'", "number")),
-    "larger than a double": (HEAVE, "0.30", "1e400", ("line 4", "'scaled V_ss [m/s]'", "'1e400'", "number")),
-    "far larger": (HEAVE, "0.30", "1e99999999999999999999", ("line 4", "'scaled V_ss [m/s]'", "number")),
-    "underscore": (HEAVE, "0.30", "0.3_0", ("line 4", "'scaled V_ss [m/s]'", "'0.3_0'", "number")),
     "negative velocity": (SURGE_STEADY, "0.31", "-0.31", ("line 2", "'forward [m/s]'", "= -0.31", "negative")),
     "negative command": (HEAVE, "\n20,", "\n-20,", ("line 2", "'command [%]'", "= -20", "above 0")),
-    "command above full thrust": (HEAVE, "\n70,", "\n170,", ("line 5", "'command [%]'", "= 170", "at most 100")),
-    "no command": (HEAVE, "\n30,", "\n,", ("line 3", "'command [%]'", "missing")),
     "command twice": (HEAVE, "\n30,", "\n20.0,", ("line 3", "'command [%]'", "= 20.0", "above")),
-    "cell missing": (YAW, ",4.06,", ",4.06", ("line 5", "'experiment Tau [s]'", "missing")),
-    "cell too many": (YAW, "3.05", "3.05,1", ("line 2", "column 8", "'1'", "no such column")),
     "other unit": (SURGE_STEADY, "m/s", "knot", ("line 1", "column 2", "'forward [knot]'", "'forward [m/s]'")),
-    "column missing": (HEAVE, ",experiment Tau [s]", "", ("line 1", "column 7", "'experiment Tau [s]'")),
     "column too many": (SURGE_STEADY, "[m/s]", "[m/s],backward [m/s]", ("line 1", "column 3", "'backward [m/s]'")),
-    "quote left open": (SURGE_STEADY, "0.31", '"0.31', ("line 7",)),
 }
 
 

@@ -19,7 +19,6 @@ from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
-ROW = "b_d_u = { error = 1.30987, correlation = { a_d_u = -0.883478 } }"
 
 
 @pytest.fixture(scope="module")
@@ -93,30 +92,6 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         lambda text: text.replace("-0.883478", "-1.5"),
         "estimates.b_d_u.correlation.a_d_u = -1.5: must be greater than or equal to -1",
     ),
-    "not a number": (
-        lambda text: text.replace("-0.883478", "nan"),
-        "estimates.b_d_u.correlation.a_d_u = nan: must be a finite number",
-    ),
-    "in quotes": (
-        lambda text: text.replace("-0.883478", "'strong'"),
-        "estimates.b_d_u.correlation.a_d_u = 'strong': must be a number",
-    ),
-    "no error": (
-        lambda text: text.replace(ROW, "b_d_u = {}"),
-        "estimates.b_d_u.error: this key is missing",
-    ),
-    "below 0": (
-        lambda text: text.replace(ROW, "b_d_u = { error = -1 }"),
-        "estimates.b_d_u.error = -1: must be greater than or equal to 0",
-    ),
-    "no table": (
-        lambda text: text.replace(ROW, "b_d_u = 0.5"),
-        "estimates.b_d_u = 0.5: must be a table: write [estimates.b_d_u]",
-    ),
-    "of another key": (
-        lambda text: text.replace(ROW, "b_d_u = { error = 2.0, degrees = 4 }"),
-        "estimates.b_d_u.degrees: there is no such key, only error, correlation",
-    ),
     "that contradicts others": (
         lambda text: text.replace("a_d_w = -0.652272", "a_d_w = 0.9"),
         "estimates: these correlations contradict each other: the least eigenvalue is -0.441, not 0",
@@ -180,15 +155,6 @@ def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path
     drawn = found.drawn(qmc.Sobol(1, scramble=False).random(1024))
     assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002
     assert np.isfinite(drawn).all(), "the first number of Sobol's sequence is 0"
-
-
-def test_a_value_set_by_hand_within_its_interval_keeps_the_error(refit: Vehicle, tmp_path: Path) -> None:
-    path = tmp_path / "set.toml"
-    path.write_text(TEXT.replace("value = 8.88145", "value = 11.0"), encoding="utf-8")
-    found = load_vehicle(path).uncertainty
-    assert found.values[found.names.index("a_d_u")] == 11.0
-    assert found.errors == pytest.approx(refit.uncertainty.errors)
-    assert (found.correlation == refit.uncertainty.correlation).all()
 
 
 def test_an_interval_cut_on_one_side_gives_the_error_by_the_other(refit: Vehicle) -> None:

@@ -16,7 +16,6 @@ from rov_fmu.equation.catalogue import (
     SURGE,
     SWAY,
     YAW,
-    cited,
     cross_declaration,
     cross_name,
     cross_of,
@@ -26,40 +25,6 @@ from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import SIX, VIDEORAY, fin, thruster
-
-WORDS = {
-    "videoray": {
-        "u_l": "Command u_l: left thruster, positive forward; saturates at ±1",
-        "Z_ext": "Load from outside in heave (tether, ballast), positive down",
-        "u": "Surge velocity u through the water, positive forward",
-        "r": "Yaw velocity r, positive bow to starboard",
-        "F_l": "Thrust F_l: left thruster, half of the pair's, positive forward, "
-        "equation (9) of Enevoldsen et al. 2018",
-        "m_rov": "Mass m_rov",
-        "a_d_u": "Quadratic drag coefficient a_d of surge",
-        "a_t_rear": "Quadratic thrust coefficient a_t of the rear pair, equation (9) of Enevoldsen et al. 2018",
-        "alpha_r": "Tuning α_r: scales torque in yaw",
-        "beta_u": "Tuning β_u: scales acceleration in surge; at 0 the velocity never changes",
-        "tau_rear": "Torque τ_rear of the thrusters with the curve of the rear pair, positive bow to starboard",
-    },
-    "bluerov2_heavy": {
-        "u_1": "Command u_1: thruster 1 (front starboard), positive astern and to starboard; saturates at ±1",
-        "Y_ext": "Load from outside in sway (tether, contact), positive to starboard",
-        "V_E": "Velocity of a steady horizontal current, eastward",
-        "beta_u": "Tuning β_u: scales acceleration in surge",
-        "m_a_w": "Added mass m_a of heave",
-        "m_a_r": "Added moment of inertia m_a of yaw",
-        "T_t200": "Time constant T of the lag of the T200 at 16 V, T dF/dt = F(c) - F",
-        "tau_t200": "Torque τ_t200 of the thrusters with the curve of the T200 at 16 V, positive bow to starboard",
-    },
-}
-
-
-@pytest.mark.parametrize("name", WORDS)
-def test_variables_are_described_in_the_terms_of_the_vehicle(name: str) -> None:
-    layout = rov_fmu.load(SHIPPED[name]).layout
-    declared = layout.inputs | layout.state | layout.calculated | layout.coefficients
-    assert {key: declared[key].description for key in WORDS[name]} == WORDS[name]
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -87,27 +52,6 @@ def _with_dead_time() -> Vehicle:
     return Vehicle(replace(SIX.layout, has_dead_time=True), {**SIX.coefficients, "T_d": 0.1})
 
 
-def test_another_source_of_a_curve_is_kept() -> None:
-    assert [cited("(9)"), cited("(18a)"), cited("the maker's table"), cited("")] == [
-        ", equation (9) of Enevoldsen et al. 2018",
-        ", equation (18a) of Enevoldsen et al. 2018",
-        ", the maker's table",
-        "",
-    ]
-
-
-def test_loads_and_velocities_have_the_units_and_sizes_of_their_axes() -> None:
-    layout = rov_fmu.load("bluerov2_heavy").layout
-    assert {n: (d.unit, d.nominal) for n, d in layout.inputs.items() if n.endswith("_ext")} == {
-        "X_ext": ("N", 10.0),
-        "Y_ext": ("N", 10.0),
-        "Z_ext": ("N", 10.0),
-        **dict.fromkeys(("K_ext", "M_ext", "N_ext"), ("N.m", 1.0)),
-    }
-    units = dict.fromkeys("uvw", "m/s") | dict.fromkeys("pqr", "rad/s")
-    assert {n: d.unit for n, d in layout.velocities.items()} == units
-
-
 CROSS = {
     "m_a_uv": ("kg", "Added mass m_a of surge and sway"),
     "m_a_uq": ("kg.m", "Added mass m_a of surge and pitch"),
@@ -129,11 +73,6 @@ def test_a_coefficient_of_several_axes_is_declared_by_its_name(name: str) -> Non
     assert (declared.unit, declared.description) == CROSS[name]
     assert (declared.minimum, declared.maximum) == (-1e6, 1e6)
     assert cross_name(*row) == name
-
-
-@pytest.mark.parametrize("name", ["m_a_ux", "F_0_uv", "Y_u", "A_ur", "m_a_uqr"])
-def test_other_names_are_of_no_coefficient_of_several_axes(name: str) -> None:
-    assert cross_of(name) is None
 
 
 # ---- Effects and commands ----
@@ -213,19 +152,3 @@ def test_a_layout_is_extended_by_the_names_of_its_further_coefficients() -> None
     assert [curve.keys for curve in extended.curves] == [("a_t", "b_t", "T"), ("a_t", "b_t", "c_0")]
     assert (extended.has_arm, _layout(*PAIR).has_arm) == (True, False)
     assert [curve.name for curve in VIDEORAY.layout.turning_curves] == ["rear"]
-
-
-def test_the_rates_stand_between_the_states_and_the_thrust() -> None:
-    layout = SIX.layout
-    places = [*layout.places.values()]
-    n = len(layout.inputs) + len(layout.state)
-    assert places[:n] == [*range(n)]
-    assert places[n:] == [*range(n + len(layout.state), n + len(layout.state) + len(places) - n)]
-    assert [*layout.pose] == ["x", "y", "z", "eta", "epsilon_1", "epsilon_2", "epsilon_3"]
-    assert [declaration.nominal for declaration in layout.pose.values()] == [10.0] * 3 + [1.0] * 4
-    assert {name: (declaration.minimum, declaration.maximum) for name, declaration in layout.angles.items()} == {
-        "phi": pytest.approx((-3.141592653589793, 3.141592653589793)),
-        "theta": pytest.approx((-1.5707963267948966, 1.5707963267948966)),
-        "psi": (-inf, inf),
-    }
-    assert {name for name, value in layout.at_rest.items() if value} == {"eta"}

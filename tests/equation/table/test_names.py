@@ -228,14 +228,6 @@ def check_renamed(rng: random.Random, data: Toml, names: Names, folder: Path, ch
     return other
 
 
-def check_random_names(seed: int, vehicles: int, folder: Path, checks: Iterable[Check]) -> None:
-    """Rename random vehicles."""
-    rng = random.Random(seed)
-    for _ in range(vehicles):
-        data = random_file(rng)
-        check_renamed(rng, data, random_names(rng, data, load(data, folder).layout), folder, checks)
-
-
 SHOWN: dict[str, tuple[Names, tuple[str, ...]]] = {
     "a table of one curve and the second table of another": ({"curves": {"bow": "main_1"}}, ()),
     "a loss of thrust and the change of a velocity": ({"curves": {"bow": "v"}}, ()),
@@ -266,18 +258,20 @@ def test_equal_names_get_a_number(name: str, tmp_path: Path) -> None:
     assert [line.rpartition(";")[0].rpartition(" ")[2] for line in lines] == [*numbered]
 
 
-def test_random_names_change_nothing(tmp_path: Path) -> None:
-    check_random_names(8, 1, tmp_path, IN_TEXT)
-
-
-@pytest.mark.long
-def test_many_random_names_change_nothing(tmp_path: Path) -> None:
-    check_random_names(2, 12, tmp_path, (*IN_TEXT, check_engine))
-
-
-@pytest.mark.weekly
-def test_very_many_random_names_change_nothing(tmp_path: Path) -> None:
-    check_random_names(3, 300, tmp_path, IN_TEXT)
+@pytest.mark.parametrize(
+    ("seed", "vehicles", "checks"),
+    [
+        (8, 1, IN_TEXT),
+        pytest.param(2, 12, (*IN_TEXT, check_engine), marks=pytest.mark.long),
+        pytest.param(3, 300, IN_TEXT, marks=pytest.mark.weekly),
+    ],
+    ids=["one vehicle", "some vehicles", "many vehicles"],
+)
+def test_random_names_change_nothing(seed: int, vehicles: int, checks: Iterable[Check], tmp_path: Path) -> None:
+    rng = random.Random(seed)
+    for _ in range(vehicles):
+        data = random_file(rng)
+        check_renamed(rng, data, random_names(rng, data, load(data, tmp_path).layout), tmp_path, checks)
 
 
 def test_two_thrust_tables_must_not_have_the_same_name(tmp_path: Path) -> None:

@@ -52,11 +52,6 @@ def test_the_new_rows_give_the_same_rates(seed: int) -> None:
         assert _rate(found[name], both) == at[a] * rates[b] + at[b] * rates[a]
 
 
-def test_rows_of_products_of_two_states_stay() -> None:
-    rows = {"u": (Term(of(2.0)), Term(of(-1.0), ("u", "v"))), "v": (Term(of(3.0), ("u", "u")),)}
-    assert quadratic(rows, Names(rows)) == (rows, {})
-
-
 @pytest.mark.parametrize("start", [-0.7, 0.0, 1.3])
 def test_a_step_follows_a_cubic_force(start: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """The state of the product begins at the square of the velocity."""
