@@ -1,8 +1,6 @@
 """`rov-fmu prove`: whether an FMU, ours or any other, gives the results that it carries."""
 
 import re
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,7 +17,8 @@ from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ALONE, start
+from tests.cli.test_interrupts import LINE, Command
+from tests.commands import ALONE
 
 Capsys = pytest.CaptureFixture[str]
 Files = Mapping[str, str | None]
@@ -243,28 +242,13 @@ _HANGS = """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals and mutexes are POSIX")
-def test_an_fmu_that_hangs_is_ended_by_an_interrupt(foreign: Path, tmp_path: Path) -> None:
+def test_an_fmu_that_hangs_is_ended_by_ctrl_c(foreign: Path, tmp_path: Path) -> None:
     """It hangs in compiled code, which Python cannot interrupt."""
-    fmu, folder, begun = tmp_path / "hangs.fmu", tmp_path / "tmp", tmp_path / "begun"
+    fmu, begun = tmp_path / "hangs.fmu", tmp_path / "begun"
     _changed(foreign, "resources/counter.py", lambda old: old + _HANGS.encode(), fmu)
-    folder.mkdir()
-    process = start(
-        ["prove", str(fmu)],
-        stdout=subprocess.DEVNULL,
-        environment={"TMPDIR": str(folder), "HANGS": str(begun)},
-        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    try:
-        deadline = time.monotonic() + 300.0
-        while not begun.exists() and process.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.02)
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=300)
-    finally:
-        process.kill()
-    assert (process.returncode, err) == (130, "rov-fmu: interrupted, no file is half-written\n")
-    assert list(folder.iterdir()) == []
+    with Command(["-m", "rov_fmu", "prove", str(fmu)], tmp_path, environment={"HANGS": str(begun)}) as proof:
+        proof.wait_until(begun.exists)
+        assert proof.press_ctrl_c() == LINE
 
 
 # ---- Bad input -------------------------------------------------------------------------------------------------------

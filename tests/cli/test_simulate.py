@@ -78,28 +78,6 @@ def test_the_commands_of_a_log_are_read_as_identify_reads_them(name: str, here: 
     assert found["u_r"].tolist() == pytest.approx([0.3, right, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("logs", "header", "u"),
-    [("", "[us]", 0.25), ("neutral = 1520\nspan = 320", "[us]", 0.25), ("neutral = 1400", "[us 1500 400]", 0.25)],
-)
-def test_rov_toml_tells_the_pulses_of_the_columns(logs: str, header: str, u: float, here: Path) -> None:
-    (here / "rov.toml").write_text(f"[vehicle]\n[logs]\n{logs}\n", encoding="utf-8")
-    log = here / "log.csv"
-    log.write_text(f"time [s],u_t {header},voltage [V]\n0,1600,16\n5,1600,16\n", encoding="utf-8")
-    assert read_inputs(log, VIDEORAY.layout)["u_t"].tolist() == pytest.approx([u, u])
-
-
-@pytest.mark.parametrize("named", ["commands.csv", "depth.csv"])
-def test_a_dive_in_several_files_gives_its_commands(named: str, here: Path) -> None:
-    (here / "commands.csv").write_text("time [s],u_t [1]\n10,0.5\n12,-0.25\n", encoding="utf-8")
-    (here / "depth.csv").write_text("time [s],depth [m]\n10,1\n11,2\n12,3\n", encoding="utf-8")
-    files = '[dives.may]\nfiles = ["commands.csv", "depth.csv"]\n'
-    (here / "rov.toml").write_text(f"[vehicle]\n{files}", encoding="utf-8")
-    found = read_inputs(here / named, VIDEORAY.layout)
-    assert found["time"].tolist() == [0.0, 2.0]
-    assert found["u_t"].tolist() == [0.5, -0.25]
-
-
 @pytest.mark.parametrize(("name", "begins"), [("plot.png", b"\x89PNG"), ("plot.svg", b"<?xml"), ("plot.pdf", b"%PDF")])
 def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys) -> None:
     assert main(["simulate", str(BARE), "--plot", name]) == 0

@@ -2,10 +2,8 @@
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -15,7 +13,9 @@ from rov_fmu.c.compile import PLATFORMS
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import BARE, ROOT, endless_compiler, without_progress
+from tests.commands import BARE, ROOT, without_progress
+
+Capsys = pytest.CaptureFixture[str]
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
 
@@ -24,7 +24,7 @@ _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2
 
 @pytest.mark.parametrize("name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED])
 def test_a_vehicle_that_ships_is_built_by_its_name(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
@@ -35,7 +35,7 @@ def test_a_vehicle_that_ships_is_built_by_its_name(
 
 
 def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_terminal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
@@ -102,7 +102,7 @@ COMMANDS = ["build", "fly", "identify", "prove", "schema", "sdf", "simulate", "s
     ],
 )
 def test_the_shell_completes_commands_vehicles_platforms_and_axes(
-    words: str, completions: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: str, completions: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.setenv("_ROV_FMU_COMPLETE", "bash_complete")
     monkeypatch.setenv("COMP_WORDS", f"rov-fmu {words}")
@@ -170,50 +170,4 @@ def test_a_dependency_that_is_not_there_is_named(missing: str, tmp_path: Path) -
     assert ran.returncode == 1
     assert ran.stdout == ""
     assert ran.stderr == f"rov-fmu: the package {missing} is not installed: pip install -e . (in a checkout)\n"
-    assert not (tmp_path / "x.fmu").exists()
-
-
-# ---- In a notebook ---------------------------------------------------------------------------------------------------
-
-
-_CELL = """
-import asyncio, sys
-from pathlib import Path
-from rov_fmu.build import build
-from rov_fmu.vehicle.vehicle import load_vehicle
-
-async def cell():
-    try:
-        build(load_vehicle(Path(sys.argv[2])), Path(sys.argv[1]), platforms=["host"])
-    except KeyboardInterrupt:
-        print("interrupted")
-
-asyncio.new_event_loop().run_until_complete(cell())
-"""
-
-
-@pytest.mark.long
-@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
-def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_path: Path) -> None:
-    """The compiler never ends by itself; the time limits only end a test that hangs."""
-    (tmp_path / "tmp").mkdir()
-    environment = os.environ | endless_compiler(tmp_path) | {"TMPDIR": str(tmp_path / "tmp")}
-    process = subprocess.Popen(
-        [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu"), str(BARE)],
-        env=environment,
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-        # a shell that starts a process in the background makes it ignore interrupts, and children inherit that
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
-    )
-    deadline = time.monotonic() + 300.0
-    while not (tmp_path / "number").exists():
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=300)
-    assert (process.returncode, out) == (0, "interrupted\n")
-    assert list((tmp_path / "tmp").iterdir()) == []
     assert not (tmp_path / "x.fmu").exists()

@@ -5,7 +5,6 @@ import re
 import struct
 import subprocess
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -163,11 +162,3 @@ def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Pat
     running = [moment[-1] for moment in progress]
     assert any(re.search(r" \d+% 0:0\d:\d\d \d:\d\d:\d\d$", line) for line in running), running
     assert len(shown.lines) <= 30
-
-
-def test_a_narrow_terminal_gets_several_tables_that_lose_no_digit(folder: Path) -> None:
-    shown = on_a_terminal(["tables"], 40, folder)
-    assert max(map(len, shown.lines)) <= 40
-    digits = Counter(re.findall(r"\d", " ".join(shown.lines)))
-    assert digits >= Counter(re.findall(r"\d", " ".join(on_a_terminal(["tables"], 100, folder).lines)))
-    assert "…" not in "".join(shown.lines)

@@ -20,6 +20,8 @@ from tests.tank.readers.motion import TIME
 from tests.tank.readers.test_bags import Ros, dive
 from tests.tank.test_several_files import table
 
+Capsys = pytest.CaptureFixture[str]
+
 DEPTH: Array = motion.DEPTH
 
 
@@ -66,7 +68,7 @@ Inspect = Callable[..., tuple[str, str]]
 
 
 @pytest.fixture
-def inspect(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Inspect:
+def inspect(tmp_path: Path, capsys: Capsys) -> Inspect:
     """A function that inspects logs, and returns what is printed and the draft of rov.toml."""
 
     def inspected(path: Path = tmp_path, option: str = "--inspect") -> tuple[str, str]:
@@ -136,7 +138,7 @@ def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(tmp_path: Path, ins
 
 
 def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
-    tmp_path: Path, inspect: Inspect, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, inspect: Inspect, capsys: Capsys
 ) -> None:
     """Columns have the names that their user chose, and the name of the file is no name of a test."""
     titles = "time [s],bow [%],stern [%],vertical speed [cm/s],sonar range [m/s],turn rate [deg/s],set heading [deg]"
@@ -228,7 +230,7 @@ def pool_run(folder: Path, tables: Mapping[str, str | bytes]) -> list[str]:
     return (folder / "rov.toml").read_text(encoding="utf-8").splitlines()
 
 
-def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, capsys: Capsys) -> None:
     lines = pool_run(tmp_path, OWN)
     document = parsed("\n".join(lines))
     assert [*document["curves"]] == ["main", "side", "vert"]
@@ -318,9 +320,7 @@ def test_headers_with_control_characters(tmp_path: Path, inspect: Inspect) -> No
 # ---- Folders without rov.toml ----------------------------------------------------------------------------------------
 
 
-def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: Path, capsys: Capsys) -> None:
     folder = tmp_path / "My ROV (2)"
     folder.mkdir()
     one_file(folder)
@@ -357,7 +357,7 @@ UNREADABLE: dict[str, bytes] = {
 
 @pytest.mark.parametrize("name", UNREADABLE)
 def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: Capsys
 ) -> None:
     log = one_file(tmp_path)
     (tmp_path / name).write_bytes(UNREADABLE[name])
