@@ -17,7 +17,6 @@ from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.cli.test_interrupts import LINE, Command
 from tests.commands import ALONE
 
 Capsys = pytest.CaptureFixture[str]
@@ -244,6 +243,8 @@ _HANGS = """
 @pytest.mark.skipif(sys.platform != "linux", reason="signals and mutexes are POSIX")
 def test_an_fmu_that_hangs_is_ended_by_ctrl_c(foreign: Path, tmp_path: Path) -> None:
     """It hangs in compiled code, which Python cannot interrupt."""
+    from tests.cli.test_interrupts import LINE, Command  # which needs a terminal of POSIX
+
     fmu, begun = tmp_path / "hangs.fmu", tmp_path / "begun"
     _changed(foreign, "resources/counter.py", lambda old: old + _HANGS.encode(), fmu)
     with Command(["-m", "rov_fmu", "prove", str(fmu)], tmp_path, environment={"HANGS": str(begun)}) as proof:
@@ -255,7 +256,6 @@ def test_an_fmu_that_hangs_is_ended_by_ctrl_c(foreign: Path, tmp_path: Path) -> 
 
 _EXP = f"{FOLDER}/my tests/all.exp"
 _Y = f"{FOLDER}/my tests/y.csv"
-_U = f"{FOLDER}/my tests/u.csv"
 
 
 def _exp(inner: str) -> str:
