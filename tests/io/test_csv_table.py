@@ -33,9 +33,10 @@ def _values(table: Columns) -> dict[str, list[float]]:
 )
 def test_bounds_are_printed_in_the_unit_of_the_file(cell: str, reason: str, tmp_path: Path) -> None:
     path = _file(tmp_path, f"angle [deg]\n360\n\n{cell}")
-    bounds = {"least": 0.25} if "or" in reason else {"minimum": 0.5, "maximum": 2.0}
+    turns = {"turn": 1.0, "deg": 360.0}
+    column = Column(turns, least=0.25) if "or" in reason else Column(turns, minimum=0.5, maximum=2.0)
     with pytest.raises(DataFileError) as error:
-        read_columns(path, {"angle": Column({"turn": 1.0, "deg": 360.0}, **bounds)})
+        read_columns(path, {"angle": column})
     assert str(error.value).startswith(f"{path}, line 4, column 'angle [deg]' = {cell!r}: {reason}")
 
 
