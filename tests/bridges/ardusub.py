@@ -7,6 +7,7 @@ packet without a reply, and the clock. The law of depth and heading is that of
 
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import atan, cos, radians, sin
 from socket import AF_INET, SOCK_DGRAM, socket
@@ -73,14 +74,10 @@ class ArduSub:
     timeout: float = 1.0
     """The time after which a packet without a reply is sent again, s."""
     channels: int = 16
-    loses: Callable[[], bool] = lambda: False
-    repeats: Callable[[], bool] = lambda: False
-    """Whether the network loses or doubles the next packet, in either direction."""
     count: int = 0
     time: float = 0.0
     """The time that has passed by the time stamps of the replies, s."""
     last: float = 0.0
-    resent: int = 0
     history: list[dict[str, list[float]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -106,27 +103,17 @@ class ArduSub:
 
     def exchange(self, sent: bytes) -> None:
         """Send a packet until a reply comes, and take over the motion and the time of the reply."""
-        self._send(sent)
-        while True:
-            try:
+        text = b""
+        while not text:
+            self.socket.send(sent)
+            with suppress(TimeoutError):
                 text = self.socket.recv(65000)
-            except TimeoutError:
-                self.resent += 1
-                self._send(sent)
-                continue
-            if not self.loses():
-                break
         self.at = parsed(text)
         (stamp,) = self.at["timestamp"]
         self.time += max(stamp - self.last, 0.0)
         self.last = stamp
         self.count += 1
         self.history.append(self.at)
-
-    def _send(self, data: bytes) -> None:
-        for _ in range(2 if self.repeats() else 1):
-            if not self.loses():
-                self.socket.send(data)
 
     def pulses(self) -> list[int]:
         """The outputs of the motors, µs."""

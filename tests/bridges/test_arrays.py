@@ -12,7 +12,6 @@ import pytest
 
 import rov_fmu
 from rov_fmu.bridges import arrays
-from rov_fmu.bridges.arrays import force_names
 from rov_fmu.c.simulation import simulate
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -105,16 +104,6 @@ def test_the_coefficients_may_be_symbols() -> None:
     function = casadi.Function("rates", [drag], [arrays.rates(rov, x, forces, {"a_d_u": drag})])
     expected = arrays.rates(rov.replaced({"a_d_u": 77.0}), x, forces, {})
     assert np.allclose(np.asarray(function(77.0))[:, 0], expected, rtol=1e-14, atol=1e-14)
-
-
-def test_the_thrust_has_the_voltage_and_the_angles() -> None:
-    rov = LOADED["thrust_effects"]
-    inputs, _ = cases(rov, "thrust")
-    found = dict(zip(force_names(rov.layout), arrays.forces(rov, inputs, {}), strict=True))
-    thrust = [rov.commanded({name: float(values[n]) for name, values in inputs.items()}) for n in range(CASES)]
-    for name, curve in rov.layout.curve_of.items():
-        expected = [row[name] for row in thrust]
-        assert np.allclose(found[f"steady_{name}" if curve.has_lag else f"F_{name}"], expected, rtol=1e-14, atol=1e-12)
 
 
 def test_wrong_arguments_give_one_line() -> None:

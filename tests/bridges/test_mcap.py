@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import rov_fmu
 from rov_fmu.bridges.mcap_logs import identification_mcap
@@ -74,43 +76,39 @@ def test_numbers_and_units(heavy: VehicleModel) -> None:
     assert summary
     schemas = {c.topic: summary.schemas[c.schema_id] for c in summary.channels.values()}
     for topic in ("/inputs", "/outputs"):
-        properties = json.loads(schemas[topic].data)["properties"]
-        assert {name: of["unit"] for name, of in properties.items()} == {
-            name: result.units[name] for name in properties
-        }
-    assert {t: s.name for t, s in schemas.items() if t not in ("/inputs", "/outputs")} == {
+        properties = json.loads(schemas.pop(topic).data)["properties"]
+        assert {name: of["unit"] for name, of in properties.items()} == {n: result.units[n] for n in properties}
+    assert {topic: schema.name for topic, schema in schemas.items()} == {
         "/tf": "foxglove.FrameTransforms",
         "/pose": "foxglove.PoseInFrame",
         "/scene": "foxglove.SceneUpdate",
     }
 
 
-@pytest.mark.parametrize(
-    ("phi", "theta", "psi"), [(0.0, 0.0, 0.0), (0.0, 0.0, pi / 2), (0.3, -0.4, 2.5), (3.0, 1.2, -1)]
-)
-def test_frames(heavy: VehicleModel, phi: float, theta: float, psi: float) -> None:
-    """In `map`, x is east, y north and z up; the vehicle's x points forward, y to port and z up."""
-    result = recorded(heavy, 0.0 + 0.1, {}, x=1.0, y=2.0, z=3.0, phi_0=phi, theta_0=theta, psi_0=psi)
-    first = messages(heavy.to_mcap(result))["/pose"][0][1]
-    assert first.frame_id == "map"
-    at, q = first.pose.position, first.pose.orientation
-    assert (at.x, at.y, at.z) == (2.0, 1.0, -3.0)
-    # The unit vectors of the body in north-east-down (Fossen 2021, (2.31)), written with east, north, up.
-    forward = (cos(theta) * sin(psi), cos(theta) * cos(psi), sin(theta))
+def turned(pose: Any) -> NDArray[np.float64]:
+    """The axes of the vehicle (forward, to port, up) in the frame `map`: east, north and up."""
+    q = pose.orientation
+    return np.asarray(Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix())
+
+
+def by_hand(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
+    """The same from Euler's angles, by the unit vectors of the body (Fossen 2021, (2.31)) with east, north, up."""
+    forward = np.array([cos(theta) * sin(psi), cos(theta) * cos(psi), sin(theta)])
     down_n = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
     down_e = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
-    up = (-down_e, -down_n, cos(phi) * cos(theta))
-    x, y, z, w = q.x, q.y, q.z, q.w
-    matrix = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    np.testing.assert_allclose(matrix[:, 0], forward, atol=1e-12)
-    np.testing.assert_allclose(matrix[:, 2], up, atol=1e-12)
-    np.testing.assert_allclose(matrix[:, 1], np.cross(up, forward), atol=1e-12)
+    up = np.array([-down_e, -down_n, cos(phi) * cos(theta)])
+    return np.stack([forward, np.cross(up, forward), up], axis=1)
+
+
+@pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.0, 0.0, pi / 2), (0.3, -0.4, 2.5), (3.0, 1.2, -1.0)])
+def test_frames(heavy: VehicleModel, angles: tuple[float, float, float]) -> None:
+    """In `map`, x is east, y north and z up; the vehicle's x points forward, y to port and z up."""
+    start = dict(zip(("phi_0", "theta_0", "psi_0"), angles, strict=True))
+    first = messages(heavy.to_mcap(recorded(heavy, 0.1, {}, x=1.0, y=2.0, z=3.0, **start)))["/pose"][0][1]
+    assert first.frame_id == "map"
+    at = first.pose.position
+    assert (at.x, at.y, at.z) == (2.0, 1.0, -3.0)
+    np.testing.assert_allclose(turned(first.pose), by_hand(*angles), atol=1e-12)
 
 
 def test_transform_is_the_pose(heavy: VehicleModel) -> None:
@@ -131,21 +129,16 @@ def test_jets_leave_against_the_force() -> None:
     (entity,) = scene.entities
     assert entity.frame_id == "base_link"
     assert entity.frame_locked
-    forces = {t.name: result[f"F_{t.name}"][-1] for t in vehicle.layout.thrusters}
-    pushing = [t for t in vehicle.layout.thrusters if forces[t.name]]
-    assert {t.name for t in pushing} == {"l", "t"}
-    longest = max(map(abs, forces.values()))
+    pushing = [t for t in vehicle.layout.thrusters if t.name in ("l", "t")]
     lengths = []
     for thruster, arrow in zip(pushing, entity.arrows, strict=True):
-        q = arrow.pose.orientation
-        x_axis = np.array([1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y + q.z * q.w), 2 * (q.x * q.z - q.y * q.w)])
+        force = result[f"F_{thruster.name}"][-1]
         forward, starboard, down = thruster.direction.value
-        against = -np.sign(forces[thruster.name]) * np.array([forward, -starboard, -down])
-        np.testing.assert_allclose(x_axis, against, atol=1e-12)
-        lengths.append((arrow.shaft_length + arrow.head_length) / abs(forces[thruster.name]) * longest)
+        against = -np.sign(force) * np.array([forward, -starboard, -down])
+        np.testing.assert_allclose(turned(arrow.pose)[:, 0], against, atol=1e-12)
+        lengths.append((arrow.shaft_length + arrow.head_length) / abs(force))
     assert lengths[0] == pytest.approx(lengths[1])
-    left = next(a for t, a in zip(pushing, entity.arrows, strict=True) if t.name == "l")
-    assert left.pose.position.y > 0.0  # port
+    assert entity.arrows[0].pose.position.y > 0.0, "port"
 
 
 def test_without_the_library(heavy: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,13 +168,9 @@ def test_identification() -> None:
     found = messages(content)
     log = "/" + prediction.file.replace(".", "_")
     assert {topic.split("/")[1] for topic in found} == {one.file.replace(".", "_") for one in result.folder.logs}
-    assert found[f"{log}/unknown_force/surge"] == [
-        (1_000_000_000, {"force": 0.5, "low": pytest.approx(0.304, rel=1e-4), "high": pytest.approx(0.696, rel=1e-4)}),
-        (
-            2_500_000_000,
-            {"force": -1.0, "low": pytest.approx(-1.392, rel=1e-4), "high": pytest.approx(-0.608, rel=1e-4)},
-        ),
-    ]
+    shown = [(stamp, *values.values()) for stamp, values in found[f"{log}/unknown_force/surge"]]
+    expected = [(1e9, 0.5, 0.304, 0.696), (2.5e9, -1.0, -1.392, -0.608)]
+    np.testing.assert_allclose(shown, expected, rtol=1e-4)
     written = found[f"{log}/{prediction.quantity.replace(' ', '_')}"]
     assert [values["measured"] for _, values in written] == prediction.measured.tolist()
     assert [values["predicted"] for _, values in written] == prediction.predicted.tolist()
@@ -201,14 +190,11 @@ def test_measured_poses_of_a_log() -> None:
     channels = tuple(Channel(QUANTITIES[q], Source(q), time, np.full(len(time), x)) for q, x in angles.items())
     log = replace(result.folder.logs[0], channels=channels)
     found = messages(identification_mcap(replace(result, folder=replace(result.folder, logs=[log]))))
-    poses_of_log = found[f"/{log.file.replace('.', '_')}/pose"]
-    assert len(poses_of_log) == len(time)
-    pose = poses_of_log[0][1]
-    assert pose.frame_id == "map"
-    assert (pose.pose.position.x, pose.pose.position.y, pose.pose.position.z) == (0.0, 0.0, -1.5)
-    q = pose.pose.orientation
-    bow = [1.0 - 2.0 * (q.y**2 + q.z**2), 2.0 * (q.x * q.y + q.w * q.z), 2.0 * (q.x * q.z - q.w * q.y)]
-    assert bow == pytest.approx([cos(theta) * sin(psi), cos(theta) * cos(psi), sin(theta)])
+    poses = found[f"/{log.file.replace('.', '_')}/pose"]
+    assert len(poses) == len(time)
+    pose = poses[0][1].pose
+    assert (pose.position.x, pose.position.y, pose.position.z) == (0.0, 0.0, -1.5)
+    np.testing.assert_allclose(turned(pose), by_hand(phi, theta, psi), atol=1e-12)
 
 
 def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -234,8 +220,6 @@ def test_a_flight_with_ardusub_is_a_motion(heavy: VehicleModel, tmp_path: Path) 
     assert found["/inputs"][0][1]["u_2"] == pytest.approx(-0.5)
     times = np.array([stamp for stamp, _ in found["/outputs"]]) * 1e-9
     assert np.diff(times) == pytest.approx(0.1)
-    pushed = {"u_1": 0.5, "u_2": -0.5}
-    expected = heavy.simulate([0.0, *times], pushed)
+    expected = heavy.simulate([0.0, *times], {"u_1": 0.5, "u_2": -0.5})
     for name in ("u", "r", "F_1"):
-        values = [row[name] for _, row in found["/outputs"]]
-        assert values == pytest.approx(expected[name][1:], abs=1e-9)
+        assert [row[name] for _, row in found["/outputs"]] == pytest.approx(expected[name][1:], abs=1e-9)

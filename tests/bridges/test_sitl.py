@@ -3,19 +3,19 @@
 import json
 import random
 import re
-import struct
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from math import atan2, cos, pi, sin
+from math import atan2, pi
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, socket
 from threading import Thread
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
@@ -102,34 +102,18 @@ def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
 
     The file has every third point. Without a current and a voltage, ArduPilot uses its own battery.
     """
-    connection, sums = Connection(setup_of()), []
+    connection, found = Connection(setup_of()), []
     for count, pulses in enumerate(([1500] * 8, [0] * 8, [1896, 1700, 1300, *[1500] * 5])):
-        reply = json.loads(connection.answer(packet(400, count, [*pulses, *[0] * 8]), HERE))
-        assert reply["battery"]["voltage"] == 16.0
-        sums.append(reply["battery"]["current"])
-    assert sums == pytest.approx([0.0, 0.0, 23.9 + 4.58 + 4.4], abs=0.1)
+        battery = json.loads(connection.answer(packet(400, count, [*pulses, *[0] * 8]), HERE))["battery"]
+        found += [battery["voltage"], battery["current"]]
+    assert found == pytest.approx([16.0, 0.0, 16.0, 0.0, 16.0, 23.9 + 4.58 + 4.4], abs=0.1)
     curves = tuple(replace(curve, electric_current=None) for curve in HEAVY.layout.curves)
     without = Connection(setup_of(replace(HEAVY, layout=replace(HEAVY.layout, curves=curves))))
-    assert "battery" not in json.loads(without.answer(packet(400, 0, NEUTRAL), HERE))
+    assert b"battery" not in without.answer(packet(400, 0, NEUTRAL), HERE)
     effects = load_vehicle(THRUST_EFFECTS)
     table = {n: name.removeprefix("u_") for n, name in enumerate(effects.layout.commands, 1)}
     powered = Connection(Setup(effects, servos_of(effects.layout, None, table), {"voltage": 13.0}))
-    assert json.loads(powered.answer(packet(400, 0, NEUTRAL), HERE))["battery"] == {"voltage": 13.0}
-
-
-def test_replies_are_json_and_as_ardupilot_parses_them() -> None:
-    connection = Connection(setup_of(V_N=0.3, z=1.0, psi_0=3.1))
-    for count in range(100):
-        answer = connection.answer(packet(400, count, [1700, *NEUTRAL[1:]]), HERE)
-        flat = json.loads(answer)
-        assert parsed(answer) == {
-            "timestamp": [flat["timestamp"]],
-            **{key: flat["imu"][key] for key in ("gyro", "accel_body")},
-            **{key: flat[key] for key in ("position", "attitude", "velocity")},
-            "rng_1": [flat["rng_1"]],
-            **{key: [flat["battery"][key]] for key in ("voltage", "current")},
-        }
-    assert abs(flat["attitude"][2]) <= pi
+    assert b'"battery":{"voltage":13.0}' in powered.answer(packet(400, 0, NEUTRAL), HERE)
 
 
 def test_a_repeated_frame_gets_the_same_bytes_without_a_step() -> None:
@@ -170,31 +154,18 @@ def test_random_and_damaged_packets() -> None:
     connection = Connection(setup_of(z=1.0))
     for n in range(10_000):
         whole = bytearray(packet(chance.randrange(2**16), chance.randrange(2**32), [chance.randrange(2**16)] * 32))
-        kind = n % 5
-        if kind == 0:
-            data = chance.randbytes(chance.randrange(100))
-        elif kind == 1:
-            data = bytes(whole)[: chance.randrange(73)]
-        elif kind == 2:
-            data = bytes(whole)
-        elif kind == 3:
-            data = struct.pack("<HHI", 18458, *struct.unpack("<HI", chance.randbytes(6))) + chance.randbytes(32)
-        else:
-            whole[chance.randrange(8)] ^= 1 << chance.randrange(8)
-            data = bytes(whole)
-        answer = connection.answer(data, HERE)
+        flipped = bytearray(whole)
+        flipped[chance.randrange(8)] ^= 1 << chance.randrange(8)
+        kinds = [chance.randbytes(chance.randrange(100)), whole[: chance.randrange(73)], whole, flipped]
+        answer = connection.answer(bytes(kinds[n % 4]), HERE)
         assert not answer or all(np.isfinite(value).all() for value in parsed(answer).values())
     assert connection.traffic.ignored > 9000
     before = connection.flight.time
-    answer = connection.answer(packet(400, 123, NEUTRAL), HERE)
-    assert stamp(answer) == pytest.approx(before + 0.0025)
-    # Damaged copies of the next packet, of which some come twice.
-    assert connection.answer(packet(400, 124, NEUTRAL), HERE)
-    for n in range(300):
-        bit = chance.randrange(32)
+    assert stamp(connection.answer(packet(400, 123, NEUTRAL), HERE)) == pytest.approx(before + 0.0025)
+    for n in range(300):  # damaged copies of the next packet, of which some come twice
         for _ in range(1 + n % 2):
-            connection.answer(packet(400, 125 ^ 1 << bit, NEUTRAL), HERE)
-    assert connection.answer(packet(400, 125, NEUTRAL), HERE)
+            connection.answer(packet(400, 124 ^ 1 << chance.randrange(32), NEUTRAL), HERE)
+    assert connection.answer(packet(400, 124, NEUTRAL), HERE)
 
 
 def test_two_senders_and_old_files(tmp_path: Path) -> None:
@@ -221,12 +192,7 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
 
 def rotation(phi: float, theta: float, psi: float) -> Array:
     """The matrix from the body to north, east, down."""
-    c, s = cos, sin
-    about_x = np.array([[1, 0, 0], [0, c(phi), -s(phi)], [0, s(phi), c(phi)]])
-    about_y = np.array([[c(theta), 0, s(theta)], [0, 1, 0], [-s(theta), 0, c(theta)]])
-    about_z = np.array([[c(psi), -s(psi), 0], [s(psi), c(psi), 0], [0, 0, 1]])
-    found: Array = about_z @ about_y @ about_x
-    return found
+    return np.asarray(Rotation.from_euler("ZYX", [psi, theta, phi]).as_matrix())
 
 
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "videoray"])
@@ -252,22 +218,6 @@ def test_the_sensors_agree_with_each_other(name: str) -> None:
         assert now["gyro"] == pytest.approx([turning[2, 1], turning[0, 2], turning[1, 0]], abs=1e-5)
         assert now["rng_1"][0] * R[2, 2] == pytest.approx(20.0 - now["position"][2])
     assert max(map(abs, at[-1]["velocity"])) > 0.05
-
-
-def test_holds_depth_and_heading_in_a_current() -> None:
-    """The pilot faces a current of 0.22 m/s and pushes against it; ArduSub's gains hold depth and heading."""
-    against = atan2(-0.1, -0.2)
-    with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=against + 0.05)) as (connection, port):
-        autopilot = ArduSub(port, depth=1.0, heading=against, sticks=lambda _: (0.2, 0.0))
-        autopilot.fly(12.0)
-        autopilot.close()
-    held = [at for at in autopilot.history if at["timestamp"][0] > 5.0]
-    assert len(held) == pytest.approx(7.0 * 400, abs=2)
-    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
-    turned = [(at["attitude"][2] - against + pi) % (2.0 * pi) - pi for at in held]
-    assert np.degrees(np.max(np.abs(turned))) < 2.0
-    assert max(abs(at["attitude"][0]) + abs(at["attitude"][1]) for at in held) < 0.1
-    assert connection.traffic.frames == len(autopilot.history) == 12 * 400
 
 
 @pytest.mark.parametrize("offset", [pytest.param(0.0, marks=pytest.mark.long), 1.05])
@@ -345,34 +295,34 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
     assert said.startswith("6.000 s of flight; 1200 frames")
     (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
     (one,) = load_tests(folder).folder.logs
-    depth, surge = used(one, "depth"), used(one, "surge velocity")
     at = [autopilot.history[n] for n in range(0, 1180, 20)]
-    assert depth.values[: len(at)] == pytest.approx([a["position"][2] for a in at], abs=1e-8)
-    bodies = [rotation(*a["attitude"]).T @ a["velocity"] for a in at]
-    assert surge.values[: len(at)] == pytest.approx([body[0] for body in bodies], abs=1e-8)
-    assert np.diff(surge.time) == pytest.approx(0.1, abs=1e-9)
+    surges = [(rotation(*a["attitude"]).T @ a["velocity"])[0] for a in at]
+    for name, expected in (("depth", [a["position"][2] for a in at]), ("surge velocity", surges)):
+        channel = used(one, name)
+        assert channel.values[: len(at)] == pytest.approx(expected, abs=1e-8)
+        assert np.diff(channel.time) == pytest.approx(0.1, abs=1e-9)
     assert np.ptp(commanded(one, "3")) > 0.4
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["videoray", "--frame", "vectord"], "--frame 'vectord': must be one of vectored,"),
-        (["videoray", "--frame", "vectored"], "--frame vectored: the motors of this frame do not push"),
-        (["videoray", "--servo", "17=t"], "--servo 17=t: must be N=NAME with N from 1 to 16"),
-        (["videoray", "--servo", "1=x"], "--servo 1=x: there is no such input, only l, r, t"),
-        (["videoray", "--servo", "1=t", "--servo", "2=-t"], "--servo 2=-t: another servo drives this input"),
-        (["videoray", "--servo", "1=t", "--servo", "1=l"], "--servo 1=l: servo 1 is given before"),
-        (["videoray", "--set", "u_l=0.5"], "--set u_l: servo 2 drives this input"),
-        (["videoray", "--set", "V_X=0.5"], "--set V_X=0.5: the vehicle has no such"),
-        (["videoray", "--log", "a.txt"], "--log a.txt: the name must end with .csv or .mcap"),
-        (["videoray", "--host", "192.0.2.1"], "--host 192.0.2.1, --port 9002: cannot listen there"),
-        (["videoray", "--bottom", "x"], "Invalid value for '--bottom': 'x' must be a number"),
-        ([str(ROOT / "verification" / "fuzzing" / "bare.toml")], "VEHICLE: none of ArduSub's frames"),
+        ("videoray --frame vectord", "--frame 'vectord': must be one of vectored,"),
+        ("videoray --frame vectored", "--frame vectored: the motors of this frame do not push"),
+        ("videoray --servo 17=t", "--servo 17=t: must be N=NAME with N from 1 to 16"),
+        ("videoray --servo 1=x", "--servo 1=x: there is no such input, only l, r, t"),
+        ("videoray --servo 1=t --servo 2=-t", "--servo 2=-t: another servo drives this input"),
+        ("videoray --servo 1=t --servo 1=l", "--servo 1=l: servo 1 is given before"),
+        ("videoray --set u_l=0.5", "--set u_l: servo 2 drives this input"),
+        ("videoray --set V_X=0.5", "--set V_X=0.5: the vehicle has no such"),
+        ("videoray --log a.txt", "--log a.txt: the name must end with .csv or .mcap"),
+        ("videoray --host 192.0.2.1", "--host 192.0.2.1, --port 9002: cannot listen there"),
+        ("videoray --bottom x", "Invalid value for '--bottom': 'x' must be a number"),
+        (f"{ROOT / 'verification' / 'fuzzing' / 'bare.toml'}", "VEHICLE: none of ArduSub's frames"),
     ],
 )
-def test_bad_options_are_one_line(options: Sequence[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sitl", *options]) == 2
+def test_bad_options_are_one_line(options: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sitl", *options.split()]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"rov-fmu: {said}")
 
@@ -404,7 +354,12 @@ def test_intervals_from_flights_cover_the_truth(tmp_path: Path) -> None:
                 autopilot.fly(3.0)
             autopilot.close()
         connection.write_log()
-        _add_noise(path, chance)
+        header, *rows = path.read_text(encoding="utf-8").splitlines()
+        noise = {"m/s": 0.01, "m": 0.005, "rad": 0.005}  # 1 cm/s, 5 mm and 0.3 degrees
+        scales = [noise.get(title.partition("[")[2][:-1], 0.0) for title in header.split(",")]
+        values = np.array([row.split(",") for row in rows], float)
+        values += scales * chance.standard_normal(values.shape)
+        np.savetxt(path, values, "%.6g", ",", header=header, comments="")
         (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
         found = identify(load_tests(folder))
         intervals = found.vehicle.intervals.items()
@@ -412,12 +367,3 @@ def test_intervals_from_flights_cover_the_truth(tmp_path: Path) -> None:
         hits += [low <= true <= high for true, low, high in known]
     assert len(hits) >= 20 * 12
     assert 0.85 <= np.mean(hits) <= 0.99
-
-
-def _add_noise(path: Path, chance: np.random.Generator) -> None:
-    """Add the noise of sensors to a log: 1 cm/s, 5 mm and 0.3 degrees."""
-    header, *rows = path.read_text(encoding="utf-8").splitlines()
-    noise = {"m/s": 0.01, "m": 0.005, "rad": 0.005}
-    scales = [noise.get(title.partition("[")[2][:-1], 0.0) for title in header.split(",")]
-    values = np.array([row.split(",") for row in rows], float)
-    np.savetxt(path, values + scales * chance.standard_normal(values.shape), "%.6g", ",", header=header, comments="")

@@ -58,15 +58,6 @@ def test_each_axis_accelerates_as_the_vehicle_does(name: str) -> None:
             assert 0.5 * (rate(3.0, 0.7) - rate(3.0, -0.7)) == pytest.approx(drag / M[n], rel=1e-9)
 
 
-def test_weight_and_buoyancy_are_those_of_the_file() -> None:
-    rov, element = LOADED["bluerov2_heavy"], parsed("bluerov2_heavy").find("hydrodynamics")
-    assert float(element.find("weight").text) == pytest.approx(rov["W"])
-    assert float(element.find("buoyancy").text) == pytest.approx(rov["B"])
-    centre = element.find("center_of_buoyancy")
-    assert [float(centre.get(axis)) for axis in "xyz"] == [rov.coefficients.get(f"{axis}_B", 0.0) for axis in "xyz"]
-    assert parsed("videoray").find("hydrodynamics/weight") is not None
-
-
 @pytest.mark.parametrize("name", LOADED)
 def test_the_plugin_has_the_numbers_of_the_model_for_gazebo(name: str) -> None:
     sdf = etree.fromstring(gazebo_model(LOADED[name], explicit=True).text.encode())

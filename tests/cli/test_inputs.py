@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -16,35 +17,33 @@ from tests.commands import TESTS, Command, run_elsewhere, without_progress
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
 
-# A file of the folder that `copied` makes, and a command that reads it.
-READING: dict[str, tuple[str, Callable[[Path], list[str]]]] = {
-    "the vehicle of a build": ("videoray.toml", lambda f: _build(f / "videoray.toml")),
-    "the vehicle of the tables": ("videoray.toml", lambda f: ["tables", str(f / "videoray.toml")]),
-    "the vehicle to tune": ("videoray.toml", lambda f: _tune(f, "--command=0.3", "--v-ss=0.2")),
-    "the points": ("points.csv", lambda f: _tune(f, f"--points={f / 'points.csv'}")),
-    "a published table": ("tables/table6_heave_response.csv", lambda f: ["tables", str(f / "videoray.toml")]),
-    "a table of a build": ("tables/table3_heave_steady.csv", lambda f: _build(f / "videoray.toml")),
-    "a drawing": ("pictures/from_above.svg", lambda f: _build(f / "videoray.toml")),
+# A file of the folder that `copied` makes, {f}, and a command that reads it.
+READING: dict[str, tuple[str, str]] = {
+    "the vehicle of a build": ("videoray.toml", "build {f}/videoray.toml"),
+    "the vehicle of the tables": ("videoray.toml", "tables {f}/videoray.toml"),
+    "the vehicle to tune": ("videoray.toml", "tune {f}/videoray.toml --axis=heave --command=0.3 --v-ss=0.2"),
+    "the points": ("points.csv", "tune {f}/videoray.toml --axis=heave --points {f}/points.csv"),
+    "a published table": ("tables/table6_heave_response.csv", "tables {f}/videoray.toml"),
+    "a table of a build": ("tables/table3_heave_steady.csv", "build {f}/videoray.toml"),
+    "a drawing": ("pictures/from_above.svg", "build {f}/videoray.toml"),
     "a drawing of the FMU in Python": (
         "pictures/from_starboard.svg",
-        lambda f: _build(f / "videoray.toml", "--backend=pythonfmu"),
+        "build {f}/videoray.toml --backend=pythonfmu",
     ),
-    "the icon": ("pictures/model.png", lambda f: _build(f / "videoray.toml")),
-    "the report": ("report.html", lambda f: _build(f / "refit.toml")),
-    "rov.toml": ("tests/rov.toml", lambda f: ["identify", str(f / "tests")]),
-    "a tank test": ("tests/steady_surge.csv", lambda f: ["identify", str(f / "tests")]),
-    "the vehicle to compare with": ("tests/beside.toml", lambda f: ["identify", str(f / "tests")]),
+    "the icon": ("pictures/model.png", "build {f}/videoray.toml"),
+    "the report": ("report.html", "build {f}/refit.toml"),
+    "rov.toml": ("tests/rov.toml", "identify {f}/tests"),
+    "a tank test": ("tests/steady_surge.csv", "identify {f}/tests"),
+    "the vehicle to compare with": ("tests/beside.toml", "identify {f}/tests"),
 }
 PICTURES = {"a drawing", "a drawing of the FMU in Python", "the icon"}
 """The cases whose file may be missing, because a neutral picture replaces it."""
 
 
-def _tune(folder: Path, *options: str) -> list[str]:
-    return ["tune", str(folder / "videoray.toml"), "--axis=heave", *options]
-
-
-def _build(vehicle: Path, *options: str) -> list[str]:
-    return ["build", str(vehicle), "-o", str(Path.cwd() / "rov.fmu"), *options]
+def _words(case: str, folder: Path) -> list[str]:
+    """Return the arguments of a command that reads this folder, and may build an FMU in the current one."""
+    words = [word.format(f=folder) for word in READING[case][1].split()]
+    return [*words, "-o", str(Path.cwd() / "rov.fmu")] if words[0] == "build" else words
 
 
 @pytest.fixture
@@ -97,19 +96,13 @@ def _gone_as_it_is_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Path, "read_bytes", gone)
 
 
-WRONG = [
-    *((case, _folder) for case in READING.keys() - PICTURES),
-    # without rov.toml, a folder of tests is inspected and a draft is offered
-    *((case, _gone) for case in READING.keys() - PICTURES - {"a tank test", "rov.toml"}),
-    *((case, _gone_as_it_is_read) for case in READING),
-]
-
-
-_SLOW = {"the icon", "the report", "a drawing", "a drawing of the FMU in Python"}
-"""The cases that read their file in the middle of a build. Only one of them runs by default."""
+_SLOW = {"the icon", "the report", "a drawing of the FMU in Python"}
+"""The cases that read their file in the middle of a build, except one that runs by default."""
 _CASES = [
-    pytest.param(case, what, marks=[pytest.mark.long] * (what is _gone_as_it_is_read and case in _SLOW - {"a drawing"}))
-    for case, what in sorted(WRONG, key=str)
+    *((case, _folder) for case in READING if case not in PICTURES),
+    # without rov.toml, a folder of tests is inspected and a draft is offered
+    *((case, _gone) for case in READING if case not in {*PICTURES, "a tank test", "rov.toml"}),
+    *(pytest.param(case, _gone_as_it_is_read, marks=pytest.mark.long if case in _SLOW else ()) for case in READING),
 ]
 
 
@@ -121,35 +114,34 @@ def test_what_is_no_file_is_one_line_that_names_it(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    name, arguments = READING[case]
+    name, _ = READING[case]
     what(copied / name, monkeypatch)
-    assert main(arguments(copied)) == 2
+    assert main(_words(case, copied)) == 2
     _check(capsys.readouterr().err, Path(name).name)
 
 
-FOLDERS: list[tuple[str, int, str]] = [("tests", 0o600, "rov.toml"), ("tables", 0o000, "a published table")]
-MORE_FOLDERS = [*FOLDERS, ("tests", 0o000, "rov.toml"), ("tests", 0o300, "rov.toml")]
-MORE_FOLDERS += [("tables", 0o600, "a published table")]
-"""Folders that may not be read, their modes, and the case of READING with the command that needs them."""
-SOME = ("the vehicle of the tables", "the points", "a published table", "rov.toml", "a tank test")
+SOME = ["the vehicle of the tables", "the points", "rov.toml", "a tank test"]
 """The quick cases; the long tests try all."""
 
 
 @pytest.mark.parametrize(
-    ("cases", "folders"),
-    [(SOME, FOLDERS), pytest.param(tuple(READING), MORE_FOLDERS, marks=pytest.mark.long)],
+    ("cases", "modes"),
+    [(SOME, [0o600]), pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.long)],
     ids=["some", "all"],
 )
 def test_what_may_not_be_read_is_one_line_that_names_it(
-    cases: tuple[str, ...], folders: list[tuple[str, int, str]], copied: Path, tmp_path: Path
+    cases: list[str], modes: list[int], copied: Path, tmp_path: Path
 ) -> None:
+    """The modes are those of folders."""
     (tmp_path / "temporary").mkdir()
     commands, locked = [], []
-    for n, (name, mode, case) in enumerate([*((READING[case][0], 0, case) for case in cases), *folders]):
+    files = [(READING[case][0], 0, case) for case in cases]
+    folders = [("tests", mode, "rov.toml") for mode in modes] + [("tables", 0o000, "a published table")]
+    for n, (name, mode, case) in enumerate([*files, *folders]):
         folder = Path(shutil.copytree(copied, tmp_path / str(n)))
         locked.append(folder / name)
         locked[-1].chmod(mode)
-        commands.append((Command(name, READING[case][1]), folder))
+        commands.append((Command(name, partial(_words, case)), folder))
     ends = run_elsewhere(commands, tmp_path / "temporary", bound_by_permissions())
     for path, (code, err) in zip(locked, ends, strict=True):
         path.chmod(0o755)

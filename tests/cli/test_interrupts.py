@@ -6,9 +6,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from itertools import product
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -86,13 +85,18 @@ class Command:
     def workers(self) -> list[psutil.Process]:
         with suppress(psutil.Error):
             children = psutil.Process(self.process.pid).children(recursive=True)
-            kinds = ("spawn_main", "child_process")  # of a study, of a proof
-            return [child for child in children if any(kind in " ".join(child.cmdline()) for kind in kinds)]
+            return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
         return []
 
     def press_ctrl_c(self) -> str:
         """Press Ctrl-C and return what the command prints until all its processes have ended."""
         return self._ended_by(lambda: os.write(self._terminal, b"\x03"))
+
+    def __enter__(self) -> "Command":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
 
     def terminate(self) -> str:
         return self._ended_by(self.process.terminate)
@@ -109,24 +113,21 @@ class Command:
         return without_progress(err or "")
 
 
-@contextmanager
-def command(
-    arguments: list[str],
-    folder: Path,
-    is_controlled: bool = True,
-    environment: Mapping[str, str] | None = None,
-    stderr: int | None = subprocess.PIPE,
-) -> Iterator[Command]:
-    begun = Command(arguments, folder, is_controlled, environment, stderr)
-    try:
-        yield begun
-    finally:
-        begun.process.kill()
+_MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
+"""Seconds after the first worker of a study has started; None is when the first runs are written."""
+_OFTEN = (None, 0.0, 0.6)
+"""Those that are tried on every change."""
 
 
-def _plan(folder: Path, fmu: Path) -> Path:
-    path = folder / "plan.toml"
-    path.write_text(f"""fmu = "{Path(shutil.copy(fmu, folder)).name}"
+@pytest.mark.parametrize(
+    "later", [pytest.param(m, marks=pytest.mark.long if m in _OFTEN else pytest.mark.weekly) for m in _MOMENTS]
+)
+@pytest.mark.parametrize("end", [Command.press_ctrl_c, Command.terminate])
+def test_a_study_ends_with_one_line(
+    end: Callable[[Command], str], later: float | None, videoray_fmu: Path, tmp_path: Path
+) -> None:
+    plan, results = tmp_path / "plan.toml", tmp_path / "results"
+    plan.write_text(f"""fmu = "{Path(shutil.copy(videoray_fmu, tmp_path)).name}"
 stop_time = 20.0
 step = 0.01
 runs = 100000
@@ -134,34 +135,8 @@ seed = 1
 vary = {{ m_rov.normal = {{ mean = 6.57, sd = 0.05 }} }}
 figures = {{ V = "u[-1]" }}
 """)
-    return path
-
-
-_MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
-"""Seconds after the first worker of a study has started; None is when the first runs are written."""
-_LONG = [
-    (Command.press_ctrl_c, 0.0),
-    (Command.press_ctrl_c, None),
-    (Command.press_ctrl_c, 0.3),
-    (Command.press_ctrl_c, 1.0),
-]
-_LONG += [(Command.terminate, None), (Command.terminate, 0.0), (Command.terminate, 0.6)]
-
-
-def _marks(case: tuple[Any, float | None]) -> Any:
-    return pytest.mark.long if case in _LONG else pytest.mark.weekly
-
-
-@pytest.mark.parametrize(
-    ("end", "later"),
-    [pytest.param(*case, marks=_marks(case)) for case in product((Command.press_ctrl_c, Command.terminate), _MOMENTS)],
-)
-def test_a_study_ends_with_one_line(
-    end: Callable[[Command], str], later: float | None, videoray_fmu: Path, tmp_path: Path
-) -> None:
-    plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
     arguments = ["-m", "rov_fmu", "study", str(plan), "-o", str(results), "--workers", "2"]
-    with command(arguments, tmp_path, is_controlled=end is Command.press_ctrl_c) as study:
+    with Command(arguments, tmp_path, is_controlled=end is Command.press_ctrl_c) as study:
         if later is None:
             study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
         else:
@@ -179,21 +154,10 @@ def test_a_compiler_ends_with_its_command(name: str, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     output = tmp_path / "out" / ("x.fmu" if name == "build" else "x.html")
     arguments = ["-m", "rov_fmu", name, str(BARE), "-o", str(output)]
-    with command(arguments, tmp_path, environment=endless_compiler(tmp_path)) as begun:
+    with Command(arguments, tmp_path, environment=endless_compiler(tmp_path)) as begun:
         begun.wait_until((tmp_path / "number").exists)
         assert begun.press_ctrl_c() == LINE
     assert not [*(tmp_path / "out").iterdir()]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("later", [0.0, 0.2])
-def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videoray_fmu: Path, tmp_path: Path) -> None:
-    with command(["-m", "rov_fmu", "prove", str(videoray_fmu)], tmp_path) as proof:
-        proof.wait_until(proof.workers)
-        for worker in proof.workers():  # it stands still, for a proof takes a second only
-            worker.suspend()
-        time.sleep(later)
-        assert proof.press_ctrl_c() == LINE
 
 
 @pytest.mark.parametrize(
@@ -209,7 +173,7 @@ def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_pat
     output.write_bytes(b"the old one")
     report = str(output.with_name("report.html"))
     arguments = ["-m", "rov_fmu", "identify", str(folder), "--force", "-o", str(output), "--report", report]
-    with command(arguments, tmp_path, environment={"NO_COLOR": "1"}, stderr=None) as identification:
+    with Command(arguments, tmp_path, environment={"NO_COLOR": "1"}, stderr=None) as identification:
         identification.wait_until(lambda: moment in identification.shown)
         identification.press_ctrl_c()
         shown = identification.shown.decode().replace("\r\n", "\n")
@@ -231,6 +195,7 @@ class Slow:
 slow = Slow()
 sys.exit(run_process("rov-fmu", lambda: 1))
 """
+"""A command whose modules take time to free after it is done."""
 
 
 def test_a_signal_after_the_end_of_a_command_keeps_its_exit_code() -> None:
@@ -242,12 +207,9 @@ def test_a_signal_after_the_end_of_a_command_keeps_its_exit_code() -> None:
             assert process.wait(PATIENCE) == 1
 
 
-"""A command whose modules take time to free after it is done."""
-
-
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(f"import pathlib, time\npathlib.Path({str(begun)!r}).touch()\ntime.sleep(600)\n")
-    with command(["-m", "rov_fmu", "tables"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as tables:
+    with Command(["-m", "rov_fmu", "tables"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as tables:
         tables.wait_until(begun.exists)
         assert tables.press_ctrl_c() == LINE

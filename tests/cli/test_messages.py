@@ -1,10 +1,8 @@
 """Mistakes of a user: one line that says what is wrong, what is allowed, and what was probably meant."""
 
-import re
+import shlex
 import shutil
 import sys
-import webbrowser
-from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -41,127 +39,140 @@ def test_a_single_name_is_said_once() -> None:
 _SHIPS = "there is no such file, and no vehicle of this name ships, only " + ", ".join(SHIPPED)
 _PLATFORMS = "host, linux64, linux32, aarch64-linux, win64, win32, darwin64, aarch64-darwin"
 _COMMAND = "must be a number within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
-_HEAVE = ["tune", "videoray", "--axis", "heave"]
 # What is typed in a folder with the files of `FILES`, and the expected part of the line.
-TYPED: dict[str, tuple[list[str], str]] = {
-    "a vehicle misspelt": (["build", "videorey"], f"videorey: {_SHIPS}; did you mean videoray?"),
-    "a vehicle in capital letters": (["fly", "BlueROV2"], f"BlueROV2: {_SHIPS}; did you mean bluerov2?"),
+TYPED: dict[str, tuple[str, str]] = {
+    "a vehicle misspelt": ("build videorey", f"videorey: {_SHIPS}; did you mean videoray?"),
+    "a vehicle in capital letters": ("fly BlueROV2", f"BlueROV2: {_SHIPS}; did you mean bluerov2?"),
     "a vehicle with a hyphen": (
-        ["tables", "bluerov2-heavy"],
+        "tables bluerov2-heavy",
         f"bluerov2-heavy: {_SHIPS}; did you mean bluerov2_heavy?",
     ),
-    "a ghost misspelt": (["fly", "--against", "videorey"], f"videorey: {_SHIPS}; did you mean videoray?"),
-    "a file misspelt": (["build", "mime.toml"], "mime.toml: there is no such file; did you mean mine.toml?"),
-    "a file without suffix": (["build", "mine"], f"mine: {_SHIPS}; did you mean mine.toml?"),
-    "no vehicle at all": (["build", ""], "VEHICLE is empty: it must be the path of a vehicle file, or the name of"),
-    "a folder for a vehicle": (["build", "."], ".: cannot be read: is a folder, and must be a vehicle file (TOML)"),
+    "a ghost misspelt": ("fly --against videorey", f"videorey: {_SHIPS}; did you mean videoray?"),
+    "a file misspelt": ("build mime.toml", "mime.toml: there is no such file; did you mean mine.toml?"),
+    "a file without suffix": ("build mine", f"mine: {_SHIPS}; did you mean mine.toml?"),
+    "no vehicle at all": ("build ''", "VEHICLE is empty: it must be the path of a vehicle file, or the name of"),
+    "a folder for a vehicle": ("build .", ".: cannot be read: is a folder, and must be a vehicle file (TOML)"),
     "macos": (
-        ["build", "--platform", "macos"],
+        "build --platform macos",
         f"'--platform': 'macos' must be one of {_PLATFORMS}; did you mean darwin64 or aarch64-darwin?",
     ),
     "windows": (
-        ["build", "--platform", "Windows"],
+        "build --platform Windows",
         f"'--platform': 'Windows' must be one of {_PLATFORMS}; did you mean win64?",
     ),
     "a platform by its name in FMI 3.0": (
-        ["build", "--platform", "x86_64-windows"],
+        "build --platform x86_64-windows",
         f"'x86_64-windows' must be one of {_PLATFORMS}; did you mean win64?",
     ),
     "a backend in capital letters": (
-        ["build", "--backend", "PythonFMU"],
+        "build --backend PythonFMU",
         "'--backend': 'PythonFMU' must be one of native, pythonfmu; did you mean pythonfmu?",
     ),
-    "FMI 3.0": (["build", "--fmi", "3.0"], "'--fmi': '3.0' must be one of 2, 3; did you mean 3?"),
+    "FMI 3.0": ("build --fmi 3.0", "'--fmi': '3.0' must be one of 2, 3; did you mean 3?"),
     "an interface in short": (
-        ["prove", "x.fmu", "--interface", "cs"],
+        "prove x.fmu --interface cs",
         "'cs' must be one of co-simulation, model-exchange; did you mean co-simulation?",
     ),
     "an axis in capital letters": (
-        ["tune", "videoray", "--axis", "Heave"],
+        "tune videoray --axis Heave",
         "'--axis': 'Heave' must be one of surge, sway, heave, roll, pitch, yaw; did you mean heave?",
     ),
-    "an axis by its velocity": (["tune", "videoray", "--axis", "w"], "did you mean heave?"),
-    "no axis": (["tune", "videoray"], "Missing option '--axis'. Choose one of surge, sway, heave, roll, pitch, yaw."),
+    "an axis by its velocity": ("tune videoray --axis w", "did you mean heave?"),
+    "no axis": ("tune videoray", "Missing option '--axis'. Choose one of surge, sway, heave, roll, pitch, yaw."),
     "workers in words": (
-        ["study", "plan.toml", "-o", "r", "--workers", "x"],
+        "study plan.toml -o r --workers x",
         "Invalid value for '--workers': 'x' must be a whole number from 1 to 1024",
     ),
-    "half a worker": (["study", "plan.toml", "-o", "r", "--workers", "2.5"], "'2.5' must be a whole number from 1"),
-    "no workers": (["study", "plan.toml", "-o", "r", "--workers", "0"], "'0' must be a whole number from 1 to 1024"),
-    "very many workers": (["study", "plan.toml", "-o", "r", "--workers", "9" * 400], "must be a whole number from 1"),
-    "a tolerance in words": (["prove", "x.fmu", "--tolerance", "x"], "'--tolerance': 'x' must be a number above 0"),
-    "no tolerance": (["prove", "x.fmu", "--tolerance", "0"], "'--tolerance': '0' must be a number above 0"),
-    "percent": ([*_HEAVE, "--command", "30%", "--v-ss", "0.2"], f"'--command': '30%' {_COMMAND}"),
-    "a decimal comma": ([*_HEAVE, "--command", "0,3", "--v-ss", "0.2"], f"'--command': '0,3' {_COMMAND}"),
+    "half a worker": ("study plan.toml -o r --workers 2.5", "'2.5' must be a whole number from 1"),
+    "no workers": ("study plan.toml -o r --workers 0", "'0' must be a whole number from 1 to 1024"),
+    "very many workers": (f"study plan.toml -o r --workers {10**400}", "must be a whole number from 1"),
+    "a tolerance in words": ("prove x.fmu --tolerance x", "'--tolerance': 'x' must be a number above 0"),
+    "no tolerance": ("prove x.fmu --tolerance 0", "'--tolerance': '0' must be a number above 0"),
+    "percent": ("tune videoray --axis heave --command 30% --v-ss 0.2", f"'--command': '30%' {_COMMAND}"),
+    "a decimal comma": ("tune videoray --axis heave --command 0,3 --v-ss 0.2", f"'--command': '0,3' {_COMMAND}"),
     "percent without a sign": (
-        [*_HEAVE, "--command", "30", "--v-ss", "0.2"],
+        "tune videoray --axis heave --command 30 --v-ss 0.2",
         "heave: a command of 30 must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3",
     ),
     "no number": (
-        [*_HEAVE, "--command", "0.3", "--v-ss", "nan"],
+        "tune videoray --axis heave --command 0.3 --v-ss nan",
         "'--v-ss': 'nan' must be a number (V_ss in m/s or rad/s)",
     ),
     "a velocity against the command": (
-        ["tune", "videoray", "--axis", "surge", "--command", "-0.5", "--v-ss", "0.6"],
+        "tune videoray --axis surge --command -0.5 --v-ss 0.6",
         "tune: surge: V_ss = 0.6 m/s must be negative, for a command of -0.5 gives a thrust of -12.0805 N",
     ),
     "a velocity astern ahead": (
-        ["tune", "videoray", "--axis", "surge", "--command", "0.5", "--v-ss", "-0.6"],
+        "tune videoray --axis surge --command 0.5 --v-ss -0.6",
         "tune: surge: V_ss = -0.6 m/s must be positive, for a command of 0.5 gives a thrust of 12.0805 N",
     ),
     "points without a velocity": (
-        [*_HEAVE, "--points", "taus.csv"],
+        "tune videoray --axis heave --points taus.csv",
         "taus.csv: no row has a velocity, and alpha is tuned to velocities",
     ),
-    "a vehicle for the points": ([*_HEAVE, "--points", "mine.toml"], "mine.toml, line 1 = '# VideoRay Pro 4 as "),
-    "a recording for a vehicle": (["fly", "log.csv"], "log.csv: must be a vehicle file (TOML), and not a recording"),
+    "a vehicle for the points": (
+        "tune videoray --axis heave --points mine.toml",
+        "mine.toml, line 1 = '# VideoRay ",
+    ),
+    "a recording for a vehicle": ("fly log.csv", "log.csv: must be a vehicle file (TOML), and not a recording"),
     "a recording for a ghost": (
-        ["fly", "--against", "log.csv"],
+        "fly --against log.csv",
         "log.csv: must be a vehicle file (TOML), and not a recording or a table (CSV); to see a recording beside a "
         "vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
     ),
     "an autopilot's log for a ghost": (
-        ["fly", "--against", "d.tlog"],
+        "fly --against d.tlog",
         "and not the log of an autopilot, of ROS or of MATLAB; `rov-fmu identify` reads it in a folder of tank tests",
     ),
-    "an FMU for a vehicle": (["build", "x.fmu"], "x.fmu: must be a vehicle file (TOML), and not an FMU"),
+    "an FMU for a vehicle": ("build x.fmu", "x.fmu: must be a vehicle file (TOML), and not an FMU"),
     "a plan for a vehicle": (
-        ["build", "plan.toml"],
+        "build plan.toml",
         "plan.toml: must be a vehicle file (TOML), and not the plan of a study (TOML); `rov-fmu study` carries it out",
     ),
     "rov.toml for a vehicle": (
-        ["build", "rov.toml"],
+        "build rov.toml",
         "rov.toml: must be a vehicle file (TOML), and not the rov.toml of "
         "a folder of tank tests; `rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file",
     ),
     "a vehicle for a plan": (
-        ["study", "mine.toml", "-o", "r"],
+        "study mine.toml -o r",
         "mine.toml: must be the plan of a study (TOML), and not "
         "a vehicle file (TOML); `rov-fmu build` makes an FMU of it, and a plan names it",
     ),
-    "an FMU for a plan": (["study", "x.fmu", "-o", "r"], "x.fmu: must be the plan of a study (TOML), and not an FMU"),
+    "an FMU for a plan": ("study x.fmu -o r", "x.fmu: must be the plan of a study (TOML), and not an FMU"),
     "a vehicle for an FMU": (
-        ["prove", "mine.toml"],
+        "prove mine.toml",
         "mine.toml: must be an FMU, and not a TOML file; `rov-fmu build` makes an FMU of a vehicle file",
     ),
-    "a file for a folder": (["identify", "mine.toml"], "mine.toml: is a file, and must be a folder with rov.toml"),
+    "a file for a folder": ("identify mine.toml", "mine.toml: is a file, and must be a folder with rov.toml"),
     "an FMU written to a vehicle file": (
-        ["build", "-o", "mine.toml"],
+        "build -o mine.toml",
         "mine.toml: would be an FMU, but .toml is the suffix of a TOML file",
     ),
-    "an FMU with the name of an archive": (["build", "-o", "x.zip"], "x.zip: the name must end with .fmu"),
-    "an FMU without a suffix": (["build", "-o", "x"], "x: the name must end with .fmu"),
+    "an FMU with the name of an archive": ("build -o x.zip", "x.zip: the name must end with .fmu"),
+    "an FMU without a suffix": ("build -o x", "x: the name must end with .fmu"),
     "a vehicle written to an FMU": (
-        ["identify", str(TESTS), "-o", "x.fmu"],
+        f"identify {TESTS} -o x.fmu",
         "x.fmu: would be a vehicle file (TOML), but .fmu is the suffix of an FMU",
     ),
     "a report written to a recording": (
-        ["identify", str(TESTS), "--report", "log.csv"],
+        f"identify {TESTS} --report log.csv",
         "log.csv: would be a page (HTML), but",
     ),
-    "a page written to a vehicle file": (["fly", "-o", "mine.toml"], "mine.toml: would be a page (HTML), but .toml"),
+    "a page written to a vehicle file": ("fly -o mine.toml", "mine.toml: would be a page (HTML), but .toml"),
+    "Python and a platform": (
+        "build --platform host --backend pythonfmu",
+        "--platform: the PythonFMU flavour is the same for all platforms",
+    ),
+    "Python and FMI 3.0": ("build --fmi 3 --backend=pythonfmu", "--fmi 3: PythonFMU makes FMI 2.0 alone"),
+    "OSP and FMI 3.0": ("build --fmi 3 --osp", "--fmi 3: libcosim and the OSP tools, "),
+    "no name for the file": ("build -o ''", ".: cannot be written: is a folder"),
+    "an axis that the vehicle lacks": (
+        "tune videoray --axis sway --command 1 --v-ss 1",
+        "--axis sway: the vehicle has only surge, heave, yaw",
+    ),
     "a tuned vehicle written to a table": (
-        [*_HEAVE, "--command", "0.3", "--v-ss", "0.2", "-o", "log.csv"],
+        "tune videoray --axis heave --command 0.3 --v-ss 0.2 -o log.csv",
         "log.csv: would be a vehicle file (TOML), but .csv",
     ),
 }
@@ -188,7 +199,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("case", TYPED)
 def test_a_mistake_on_the_command_line_is_one_line(case: str, here: Path, capsys: Capsys) -> None:
     arguments, expected = TYPED[case]
-    assert expected in refusal(arguments, capsys)
+    assert expected in refusal(shlex.split(arguments), capsys)
     assert {path.name: path.read_text(encoding="utf-8") for path in here.iterdir()} == FILES
 
 
@@ -198,105 +209,79 @@ def test_platforms_of_a_program_are_guessed_too() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc is of Linux")
-@pytest.mark.parametrize("arguments", [["build", str(BARE), "-o"], ["fly", str(BARE), "-o"]])
-def test_a_folder_that_takes_no_files_is_refused_before_the_work(arguments: list[str], capsys: Capsys) -> None:
-    line = refusal([*arguments, "/proc/x"], capsys)
+@pytest.mark.parametrize("command", ["build", "fly"])
+def test_a_folder_that_takes_no_files_is_refused_before_the_work(command: str, capsys: Capsys) -> None:
+    line = refusal([command, str(BARE), "-o", "/proc/x"], capsys)
     assert line == "rov-fmu: /proc/x: cannot be written: no new file can be made in the folder /proc"
-
-
-def test_without_a_browser_the_page_is_named(monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
-    opened: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", opened.append)
-    assert main(["fly", str(BARE)]) == 0
-    out, err = capsys.readouterr()
-    (page,) = map(Path, out.splitlines())
-    assert opened == [page.as_uri()]
-    assert page.is_file()
-    shutil.rmtree(page.parent)
-    assert err.startswith("rov-fmu: no browser could be opened. Open this file in a browser, ")
-    assert err.count("\n") == 1
-    assert "-o PAGE.html" in err
 
 
 # ---- Vehicle files, rov.toml, plans ----------------------------------------------------------------------------------
 
-# What is replaced in the file, by what, and what the one line says.
-KEYS: dict[str, tuple[str, str, str]] = {
-    "a_tt": (
-        "a_t = ",
-        "a_tt = ",
-        "curves.rear.a_tt: there is no such key; did you mean a_t?",
-    ),
+# A command, what is replaced in the file that it reads, by what, and what the one line says.
+BUILD, IDENTIFY, STUDY = "build mine.toml -o new.fmu", "identify tests", "study plan.toml -o r"
+KEYS: dict[str, tuple[str, str, str, str]] = {
+    "a_tt": (BUILD, "a_t = ", "a_tt = ", "curves.rear.a_tt: there is no such key; did you mean a_t?"),
     "capital letters": (
+        BUILD,
         "a_d = ",
         "A_D = ",
         "axes.surge.A_D: there is no such key, only m_a, a_d, b_d, a_d_reverse, "
         "b_d_reverse, F_0, alpha, beta; did you mean a_d?",
     ),
     "a curve": (
+        BUILD,
         'curve = "rear"',
         'curve = "Rear"',
         "thruster.l.curve = 'Rear': there is no such curve, only rear, top; did you mean rear?",
     ),
-    "an arm": (
-        'arm = "port"',
-        'arm = "prot"',
-        "thruster.l.arm = 'prot': must be 'port' or 'starboard'; did you mean po",
+    "an arm": (BUILD, '"port"', '"prot"', "thruster.l.arm = 'prot': must be 'port' or 'starboard'; did you mean port?"),
+    "a vehicle in capital letters": (
+        IDENTIFY,
+        'against = "videoray"',
+        'against = "VideoRay"',
+        "against = 'VideoRay': must be a vehicle file in this ",
+    ),
+    "a key of rov.toml": (
+        IDENTIFY,
+        "name = ",
+        "nmae = ",
+        "vehicle.nmae: there is no such key, only name, identifier, version, description, source; did you mean name?",
+    ),
+    "a window": (
+        IDENTIFY,
+        "heave = [0.2",
+        "haeve = [0.2",
+        "windows.haeve: there is no such key, only thrust_rear, thrust_top, surge, heave, yaw; did you mean heave?",
+    ),
+    "a vehicle of a plan": (
+        STUDY,
+        '"videoray"',
+        '"BlueROV2"',
+        "vehicle = 'BlueROV2': there is no such file beside the plan, ",
+    ),
+    "a sampler": (STUDY, "runs = 2", 'runs = 2\nsampler = "Sobol"', "sampler = 'Sobol': must be 'grid', 'sobol', "),
+    "a distribution": (
+        STUDY,
+        "[figures]",
+        "[vary]\na_d_u = { unifrom = [1.0, 2.0] }\n[figures]",
+        "vary.a_d_u.unifrom: there is no such key",
     ),
 }
 
 
 @pytest.mark.parametrize("case", KEYS)
-def test_keys_of_a_vehicle_file_are_guessed(case: str, here: Path, capsys: Capsys) -> None:
-    old, new, expected = KEYS[case]
-    text = ALONE.replace(old, new, 1)
-    assert text != ALONE
-    (here / "mine.toml").write_text(text, encoding="utf-8")
-    assert expected in refusal(["build", "mine.toml", "-o", "new.fmu"], capsys)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ('against = "videoray"', 'against = "VideoRay"', "against = 'VideoRay': must be a vehicle file in this "),
-        ('against = "videoray"', 'against = "videorey"', "; did you mean videoray?"),
-        (
-            "name = ",
-            "nmae = ",
-            "vehicle.nmae: there is no such key, only name, identifier, version, description, source; "
-            "did you mean name?",
-        ),
-        (
-            "heave = [0.2",
-            "haeve = [0.2",
-            "windows.haeve: there is no such key, only thrust_rear, thrust_top, surge, heave, yaw; did you mean heave?",
-        ),
-    ],
-)
-def test_keys_of_rov_toml_are_guessed(old: str, new: str, expected: str, tmp_path: Path, capsys: Capsys) -> None:
-    line = _identified(tmp_path, {"rov.toml": FILES["rov.toml"].replace(old, new, 1)}, capsys)
+def test_keys_and_words_of_a_file_are_guessed(case: str, here: Path, capsys: Capsys) -> None:
+    command, old, new, expected = KEYS[case]
+    if command is STUDY:
+        pytest.importorskip("dask")
+    shutil.copytree(TESTS, here / "tests")
+    file = here / {BUILD: "mine.toml", IDENTIFY: "tests/rov.toml", STUDY: "plan.toml"}[command]
+    text = FILES[file.name].replace(old, new, 1)
+    assert text != FILES[file.name]
+    file.write_text(text, encoding="utf-8")
+    line = refusal(shlex.split(command), capsys)
     assert expected in line
-    assert "did you mean" in line
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ('"videoray"', '"BlueROV2"', "vehicle = 'BlueROV2': there is no such file beside the plan, "),
-        ("runs = 2", 'runs = 2\nsampler = "Sobol"', "sampler = 'Sobol': must be 'grid', 'sobol', "),
-        (
-            "[figures]",
-            "[vary]\na_d_u = { unifrom = [1.0, 2.0] }\n[figures]",
-            "vary.a_d_u.unifrom: there is no such key",
-        ),
-    ],
-)
-def test_keys_and_words_of_a_plan_are_guessed(old: str, new: str, expected: str, here: Path, capsys: Capsys) -> None:
-    pytest.importorskip("dask")
-    (here / "plan.toml").write_text(FILES["plan.toml"].replace(old, new, 1), encoding="utf-8")
-    line = refusal(["study", "plan.toml", "-o", "r"], capsys)
-    assert expected in line
-    assert re.search(r"; did you mean (bluerov2|sobol|uniform)\?$", line)
+    assert "; did you mean " in line
 
 
 # ---- Tables and logs -------------------------------------------------------------------------------------------------
@@ -384,18 +369,12 @@ TABLES: dict[str, tuple[str, str, str]] = {
 }
 
 
-def _identified(folder: Path, files: Mapping[str, str], capsys: Capsys) -> str:
-    """Return the line about the VideoRay's tank tests when other files are among them."""
-    tests = Path(shutil.copytree(TESTS, folder / "tests"))
-    for name, text in files.items():
-        (tests / name).write_text(text, encoding="utf-8")
-    return refusal(["identify", str(tests)], capsys)
-
-
 @pytest.mark.parametrize("case", TABLES)
 def test_a_wrong_table_is_one_line(case: str, tmp_path: Path, capsys: Capsys) -> None:
     name, text, expected = TABLES[case]
-    assert expected in _identified(tmp_path, {name: text}, capsys)
+    tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
+    (tests / name).write_text(text, encoding="utf-8")
+    assert expected in refusal(["identify", str(tests)], capsys)
 
 
 # ---- Tuning ----------------------------------------------------------------------------------------------------------
@@ -405,23 +384,23 @@ def test_a_wrong_table_is_one_line(case: str, tmp_path: Path, capsys: Capsys) ->
     ("arguments", "expected"),
     [
         (
-            ["bluerov2", "--axis", "sway", "--command", "0.15", "--v-ss", "5"],
+            "bluerov2 --axis sway --command 0.15 --v-ss 5",
             ["alpha_v = 107 is not within the usual 0.5 ... 2: the thrust would be 107 times that of the"],
         ),
-        (["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.05"], ["alpha_u = 0.102"]),
+        ("videoray --axis surge --command 0.3 --v-ss 0.05", ["alpha_u = 0.102"]),
         (
-            ["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "500"],
+            "videoray --axis surge --command 0.3 --v-ss 0.5 --tau 500",
             ["beta_u = 0.00114 is not within the usual 0.05 ... 1.2. The vehicle would move as if its inertia were"],
         ),
-        (["videoray", "--axis", "heave", "--command", "0.3", "--v-ss", "2", "--tau", "9000"], ["alpha_w", "beta_w"]),
-        (["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "0.6"], []),
-        (["videoray", "--axis", "yaw", "--command", "0.3", "--v-ss", "1.5", "--tau", "2"], []),
+        ("videoray --axis heave --command 0.3 --v-ss 2 --tau 9000", ["alpha_w", "beta_w"]),
+        ("videoray --axis surge --command 0.3 --v-ss 0.5 --tau 0.6", []),
+        ("videoray --axis yaw --command 0.3 --v-ss 1.5 --tau 2", []),
     ],
 )
 def test_an_implausible_tuning_is_a_warning_with_the_reason(
-    arguments: list[str], expected: list[str], capsys: Capsys
+    arguments: str, expected: list[str], capsys: Capsys
 ) -> None:
-    assert main(["tune", *arguments]) == 0
+    assert main(["tune", *shlex.split(arguments)]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == len(expected)
     for line, words in zip(lines, expected, strict=True):

@@ -10,7 +10,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify import identify as identification
 from rov_fmu.io.output import WriteError, check_replaced, sealed
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import REFIT, TESTS, without_progress
+from tests.commands import REFIT, without_progress
 from tests.folders import small_folder
 
 Capsys = pytest.CaptureFixture[str]
@@ -108,14 +108,6 @@ def test_force_replaces_the_work_of_others_and_reports_it(
         "made by hand",
     ]
     assert [path.read_bytes() for path in sorted(folder.iterdir())] == [p.read_bytes() for p in sorted(made.iterdir())]
-
-
-def test_force_is_no_leave_to_overwrite_an_input(tmp_path: Path, capsys: Capsys) -> None:
-    tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
-    before = (tests / "rov.toml").read_bytes()
-    assert main(["identify", str(tests), "--force", "-o", str(tests / "rov.toml")]) == 2
-    assert "would overwrite" in capsys.readouterr().err
-    assert (tests / "rov.toml").read_bytes() == before
 
 
 def _check(paths: Sequence[Path]) -> list[str]:

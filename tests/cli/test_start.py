@@ -2,11 +2,8 @@
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,7 +13,9 @@ from rov_fmu.c.compile import PLATFORMS
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress
+from tests.commands import BARE, ROOT, without_progress
+
+Capsys = pytest.CaptureFixture[str]
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
 
@@ -25,7 +24,7 @@ _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2
 
 @pytest.mark.parametrize("name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED])
 def test_a_vehicle_that_ships_is_built_by_its_name(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
@@ -36,7 +35,7 @@ def test_a_vehicle_that_ships_is_built_by_its_name(
 
 
 def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_terminal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
@@ -48,19 +47,6 @@ def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_term
     (path,) = tmp_path.iterdir()
     assert path.name == "bare.fmi3.fmu"
     assert read_model_description(str(path)).fmiVersion == "3.0"
-
-
-def test_fly_opens_the_page_that_it_wrote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)  # type: ignore[func-returns-value]
-    assert main(["fly", str(BARE), "--against", str(BARE)]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    path = Path(out.strip())
-    assert opened == [path.as_uri()]
-    text = path.read_text(encoding="utf-8")
-    assert "The ghost is Bare, under the same commands." in text
-    shutil.rmtree(path.parent)
 
 
 # ---- Quickly ---------------------------------------------------------------------------------------------------------
@@ -88,14 +74,10 @@ for arguments in {!r}:
 """
 
 
-@pytest.mark.parametrize(
-    "commands",
-    [_NEEDED, pytest.param([(["identify", str(TESTS)], {*_NEEDED[-1][1], "jinja2"})], marks=pytest.mark.long)],
-)
-def test_a_command_imports_what_it_uses(commands: list[tuple[list[str], set[str]]]) -> None:
-    script = _IMPORTED.format([arguments for arguments, _ in commands])
+def test_a_command_imports_what_it_uses() -> None:
+    script = _IMPORTED.format([arguments for arguments, _ in _NEEDED])
     ran = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    for (arguments, allowed), line in zip(commands, without_progress(ran.stderr).splitlines(), strict=True):
+    for (arguments, allowed), line in zip(_NEEDED, without_progress(ran.stderr).splitlines(), strict=True):
         code, *imported = line.split()
         assert code == "0", arguments
         assert "click" in imported
@@ -105,36 +87,31 @@ def test_a_command_imports_what_it_uses(commands: list[tuple[list[str], set[str]
 # ---- Completion ------------------------------------------------------------------------------------------------------
 
 
-Complete = Callable[..., list[str]]
-"""A function that returns what a shell completes after the words of a command."""
+COMMANDS = ["build", "fly", "identify", "prove", "schema", "sdf", "simulate", "sitl", "study", "tables", "tune"]
 
 
-@pytest.fixture
-def complete(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Complete:
-    def run(*words: str) -> list[str]:
-        monkeypatch.setenv("_ROV_FMU_COMPLETE", "bash_complete")
-        monkeypatch.setenv("COMP_WORDS", " ".join(["rov-fmu", *words]))
-        monkeypatch.setenv("COMP_CWORD", str(len(words)))
-        with pytest.raises(SystemExit, match=r"^0$"):
-            main([])
-        out, err = capsys.readouterr()
-        assert err == ""
-        return out.splitlines()
-
-    return run
-
-
-def test_the_shell_completes_commands_vehicles_platforms_and_axes(complete: Complete) -> None:
-    commands = ["build", "fly", "identify", "prove", "schema", "sdf", "simulate", "sitl"]
-    commands += ["study", "tables", "tune"]
-    assert complete("") == [f"plain,{name}" for name in commands]
-    assert complete("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
-    assert complete("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
-    assert complete("tune", "./my") == ["file,./my"]
-    assert complete("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
-    assert complete("build", "--backend", "p") == ["plain,pythonfmu"]
-    assert complete("build", "--fmi", "") == ["plain,2", "plain,3"]
-    assert complete("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
+@pytest.mark.parametrize(
+    ("words", "completions"),
+    [
+        ("", COMMANDS),
+        ("build video", ["file,video", "videoray", "videoray_refit"]),
+        ("tune ./my", ["file,./my"]),
+        ("build --platform ", ["host", *PLATFORMS]),
+        ("build --fmi ", ["2", "3"]),
+        ("tune videoray --axis ", [*AXES]),
+    ],
+)
+def test_the_shell_completes_commands_vehicles_platforms_and_axes(
+    words: str, completions: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+) -> None:
+    monkeypatch.setenv("_ROV_FMU_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", f"rov-fmu {words}")
+    monkeypatch.setenv("COMP_CWORD", str(words.count(" ") + 1))
+    with pytest.raises(SystemExit, match=r"^0$"):
+        main([])
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert out.replace("plain,", "").splitlines() == completions
 
 
 # ---- Not installed ---------------------------------------------------------------------------------------------------
@@ -193,50 +170,4 @@ def test_a_dependency_that_is_not_there_is_named(missing: str, tmp_path: Path) -
     assert ran.returncode == 1
     assert ran.stdout == ""
     assert ran.stderr == f"rov-fmu: the package {missing} is not installed: pip install -e . (in a checkout)\n"
-    assert not (tmp_path / "x.fmu").exists()
-
-
-# ---- In a notebook ---------------------------------------------------------------------------------------------------
-
-
-_CELL = """
-import asyncio, sys
-from pathlib import Path
-from rov_fmu.build import build
-from rov_fmu.vehicle.vehicle import load_vehicle
-
-async def cell():
-    try:
-        build(load_vehicle(Path(sys.argv[2])), Path(sys.argv[1]), platforms=["host"])
-    except KeyboardInterrupt:
-        print("interrupted")
-
-asyncio.new_event_loop().run_until_complete(cell())
-"""
-
-
-@pytest.mark.long
-@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
-def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_path: Path) -> None:
-    """The compiler never ends by itself; the time limits only end a test that hangs."""
-    (tmp_path / "tmp").mkdir()
-    environment = os.environ | endless_compiler(tmp_path) | {"TMPDIR": str(tmp_path / "tmp")}
-    process = subprocess.Popen(
-        [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu"), str(BARE)],
-        env=environment,
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-        # a shell that starts a process in the background makes it ignore interrupts, and children inherit that
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
-    )
-    deadline = time.monotonic() + 300.0
-    while not (tmp_path / "number").exists():
-        assert time.monotonic() < deadline
-        assert process.poll() is None
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=300)
-    assert (process.returncode, out) == (0, "interrupted\n")
-    assert list((tmp_path / "tmp").iterdir()) == []
     assert not (tmp_path / "x.fmu").exists()

@@ -3,19 +3,16 @@
 import errno
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import BARE, COMMANDS, FEW_TESTS, REFIT, TESTS, Command, run_elsewhere, without_progress
-from tests.folders import small_folder
+from tests.commands import ALONE, COMMANDS, FEW_TESTS, REFIT, TESTS, Command, run_elsewhere, without_progress
 from tests.vehicles import THRUST_EFFECTS
 
 Capsys = pytest.CaptureFixture[str]
@@ -67,29 +64,6 @@ def test_an_impossible_target_is_refused_before_the_work(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def check_refusals(ends: list[tuple[int, str]], reason: str, target: Path, temporary: Path) -> None:
-    """Check that every command printed one line about its own file, and that only the old files are there."""
-    assert len(ends) == len(COMMANDS)
-    for code, printed in ends:
-        err = without_progress(printed)
-        assert code == (1 if ": cannot compile: " in err else 2)
-        assert err.endswith("\n")
-        assert err[:-1].isprintable()
-        assert reason in err
-    assert {path.name: path.read_bytes() for path in target.iterdir()} == {c.name: OLD for c in COMMANDS.values()}
-    assert list(temporary.iterdir()) == []
-
-
-def full_folder(folder: Path) -> tuple[Path, Path]:
-    """Return a folder with an old file of every command, and a folder for temporary files."""
-    target, temporary = folder / "target", folder / "temporary"
-    temporary.mkdir()
-    target.mkdir(exist_ok=True)
-    for command in COMMANDS.values():
-        (target / command.name).write_bytes(OLD)
-    return target, temporary
-
-
 def bound_by_permissions() -> list[str]:
     """Return the words before a command that make permissions bind it, even if the administrator runs it."""
     if os.geteuid() != 0:
@@ -100,52 +74,47 @@ def bound_by_permissions() -> list[str]:
 
 
 @_posix
-@pytest.mark.parametrize("what", ["folder", pytest.param("files", marks=pytest.mark.long)])
-def test_what_is_read_only_stays(what: str, tmp_path: Path) -> None:
-    target, temporary = full_folder(tmp_path)
-    for path in target.iterdir():
-        path.chmod(0o644 if what == "folder" else 0o444)
-    target.chmod(0o555 if what == "folder" else 0o755)
-    ends = run_elsewhere([(c, target / c.name) for c in COMMANDS.values()], temporary, bound_by_permissions())
-    check_refusals(
-        ends, "its folder is read-only" if what == "folder" else "cannot be written: is read-only", target, temporary
-    )
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform != "linux", reason="a disk of a given size is mounted as on Linux")
-def test_a_full_disk_leaves_the_old_files(tmp_path: Path) -> None:
-    (tmp_path / "target").mkdir()
-    disk = [str(tmp_path / "target")]
-    if subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "full", *disk], check=False, capture_output=True
-    ).returncode:
-        pytest.skip("only the administrator can mount a small disk")
-    try:
-        target, temporary = full_folder(tmp_path)
-        filler = target / "filler"
-        with pytest.raises(OSError, match="No space left"):
-            filler.write_bytes(bytes(10**6))
-        check = [(command, target / command.name) for command in COMMANDS.values()]
-        ends = run_elsewhere(check, temporary)
-        filler.unlink()
-        check_refusals(ends, "No space left on device", target, temporary)
-    finally:
-        subprocess.run(["umount", *disk], check=True)
+@pytest.mark.parametrize(
+    ("file_mode", "folder_mode", "reason"),
+    [
+        (0o644, 0o555, "its folder is read-only"),
+        pytest.param(0o444, 0o755, "cannot be written: is read-only", marks=pytest.mark.long),
+    ],
+)
+def test_what_is_read_only_stays(file_mode: int, folder_mode: int, reason: str, tmp_path: Path) -> None:
+    target, temporary = tmp_path / "target", tmp_path / "temporary"
+    temporary.mkdir()
+    target.mkdir()
+    files = {command.name: OLD for command in COMMANDS.values()}
+    for name in files:
+        (target / name).write_bytes(OLD)
+        (target / name).chmod(file_mode)
+    target.chmod(folder_mode)
+    for code, printed in run_elsewhere(
+        [(command, target / command.name) for command in COMMANDS.values()], temporary, bound_by_permissions()
+    ):
+        assert code == 2
+        (line,) = without_progress(printed).splitlines()
+        assert line.isprintable()
+        assert reason in line
+    assert {path.name: path.read_bytes() for path in target.iterdir()} == files
+    assert list(temporary.iterdir()) == []
 
 
 # ---- Several files ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["build", pytest.param("identify", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("the FMU", "its OSP description"), pytest.param("the vehicle", "the report", marks=pytest.mark.long)],
+)
 def test_two_files_are_written_both_or_neither(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+    first: str, second: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    first, second = (
-        tmp_path / ("rov.fmu" if command == "build" else "rov.toml"),
-        tmp_path / "bare_OspModelDescription.xml",
-    )
-    second.write_bytes(OLD)
+    commands = [COMMANDS[first], COMMANDS[second]]
+    words = [*dict.fromkeys(word for command in commands for word in command.arguments(tmp_path / command.name))]
+    old = tmp_path / commands[1].name
+    old.write_bytes(OLD)
     calls = 0
 
     def full(_: int) -> None:
@@ -154,100 +123,86 @@ def test_two_files_are_written_both_or_neither(
         if calls == 2:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    def run() -> int:
-        if command == "identify":
-            return main(["identify", str(FEW_TESTS), "--force", "-o", str(first), "--report", str(second)])
-        return main(["build", str(BARE), "--platform", "host", "-o", str(first), "--osp"])
-
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)
-        assert run() == 2
+        assert main(words) == 2
     assert "No space left" in one_line(capsys)
-    assert list(tmp_path.iterdir()) == [second]
-    assert second.read_bytes() == OLD
-    assert run() == 0
-    assert sorted(tmp_path.iterdir()) == [second, first]
-    if command == "identify":
-        provenance = load_vehicle(first).provenance
-        assert provenance
-        assert provenance.report == second
+    assert list(tmp_path.iterdir()) == [old]
+    assert old.read_bytes() == OLD
+    assert main(words) == 0
+    assert {*tmp_path.iterdir()} == {tmp_path / command.name for command in commands}
+    assert old.read_bytes() != OLD
 
 
-def _refused(arguments: list[str], folder: Path, capsys: Capsys) -> None:
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert main(arguments) == 2
-    assert "would overwrite" in one_line(capsys)
-    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+# Vehicles that are built, and where.
+BUILT = [
+    ("videoray.toml", "videoray.toml"),
+    ("videoray.toml", "linked.toml"),
+    ("linked.toml", "videoray.toml"),
+    ("videoray.toml", "hard.toml"),
+    ("refit.toml", "report.html"),
+    ("videoray_OspModelDescription.xml", "x"),
+    ("videoray", "videoray_OspModelDescription.xml"),
+    ("videoray.toml", "tables/table3_heave_steady.csv"),
+    ("effects.toml", "thrust_16_v.csv"),
+]
+OVERWRITING = [
+    *(f"build {vehicle} --osp -o {output}" for vehicle, output in BUILT),
+    "fly videoray.toml --against refit.toml -o videoray.toml",
+    "fly videoray.toml --against refit.toml -o refit.toml",
+    "identify tests --force -o tests/rov.toml",
+    "identify tests --force -o tests/other.toml",
+    "identify tests --force --report tests/steady_surge.csv",
+    "identify tests --force -o new --report tests/../new",
+    "tune videoray.toml --axis heave --points points.csv -o points.csv",
+    "tune effects.toml --axis surge --command 1 --v-ss 1 -o thrust_12_v.csv",
+    "simulate effects.toml -o thrust_12_v.csv",
+    "sitl effects.toml --log thrust_12_v.csv",
+]
+"""Commands in the folder `reading` whose output is one of their inputs, or another output."""
 
 
-def test_no_command_writes_over_what_it_reads_or_writes_itself(tmp_path: Path, capsys: Capsys) -> None:
-    shutil.copy(REFIT, tmp_path)
-    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
-    tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
-    given = (tests / "rov.toml").read_text(encoding="utf-8")
-    (tests / "rov.toml").write_text(given.replace('"videoray"\n', '"other.toml"\n', 1), encoding="utf-8")
-    write_vehicle(load_vehicle(VIDEORAY), tests / "other.toml")
-    rov, report, points = tmp_path / "videoray.toml", tmp_path / "report.html", tmp_path / "points.csv"
-    report.write_text("a report", encoding="utf-8")
-    points.write_text("command [%],velocity [m/s]\n20,0.1\n", encoding="utf-8")
-    refit = tmp_path / "videoray_refit.toml"
-    refit.write_text(
-        refit.read_text(encoding="utf-8").replace("\n[provenance]", '\n[provenance]\nreport = "report.html"'),
-        encoding="utf-8",
-    )
-    linked, hard = tmp_path / "linked.toml", tmp_path / "hard.toml"
-    linked.symlink_to(rov)
-    hard.hardlink_to(rov)
-    osp = Path(shutil.copy(rov, tmp_path / "videoray_OspModelDescription.xml"))
-    for vehicle, output in (
-        (rov, rov),
-        (rov, linked),
-        (linked, rov),
-        (rov, hard),
-        (refit, report),
-        (osp, tmp_path / "x"),
-        (rov, tmp_path / "tables" / "table3_heave_steady.csv"),
-    ):
-        _refused(["build", str(vehicle), "-o", str(output), "--osp"], tmp_path, capsys)
-    _refused(["build", "-o", str(tmp_path / osp.name), "--osp"], tmp_path, capsys)
-    for output in (rov, refit, tmp_path / "tables" / "table3_heave_steady.csv"):
-        _refused(["fly", str(rov), "--against", str(refit), "-o", str(output)], tmp_path, capsys)
-    for options in (
-        ["-o", str(tests / "rov.toml")],
-        ["-o", str(tests / "other.toml")],
-        ["--report", str(tests / "steady_surge.csv")],
-        ["-o", str(tmp_path / "new"), "--report", str(tests / ".." / "new")],
-    ):
-        _refused(["identify", str(tests), *options], tmp_path, capsys)
-    tune = ["tune", str(rov), "--axis", "heave", "--points", str(points), "-o"]
-    _refused([*tune, str(points)], tmp_path, capsys)
-    assert main([*tune, str(rov)]) == 0, "a vehicle may be tuned in its place"
-    assert load_vehicle(rov).sources["alpha_w"].startswith("Tuned to")
+@pytest.fixture(scope="module")
+def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with vehicles, links to one of them, tables and tank tests."""
+    folder = tmp_path_factory.mktemp("reading")
+    shutil.copytree(VIDEORAY.parent, folder, dirs_exist_ok=True)
+    shutil.copytree(TESTS, folder / "tests")
+    write_vehicle(load_vehicle(VIDEORAY), folder / "tests" / "other.toml")
+    for path, name in [(THRUST_EFFECTS, "effects.toml"), (VIDEORAY, "videoray_OspModelDescription.xml")]:
+        shutil.copy(path, folder / name)
+    for path in load_vehicle(THRUST_EFFECTS).files:
+        shutil.copy(path, folder)
+    (folder / "linked.toml").symlink_to("videoray.toml")
+    (folder / "hard.toml").hardlink_to(folder / "videoray.toml")
+    rov, refit = ((path).read_text(encoding="utf-8") for path in (TESTS / "rov.toml", REFIT))
+    texts = {
+        "tests/rov.toml": rov.replace('"videoray"\n', '"other.toml"\n', 1),
+        "refit.toml": refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"'),
+        "report.html": "a report",
+        "points.csv": "command [%],velocity [m/s]\n20,0.1\n",
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
 
 
-@pytest.mark.parametrize(
-    ("vehicle", "names"),
-    [
-        (THRUST_EFFECTS, {"thrust_12_v.csv", "thrust_16_v.csv"}),
-        (SHIPPED["bluerov2"], {"t200_current_16_v.csv"}),
-    ],
-    ids=["thrust", "electric current"],
-)
-def test_no_command_writes_over_a_table_of_the_vehicle(
-    vehicle: Path, names: set[str], tmp_path: Path, capsys: Capsys
+@pytest.mark.parametrize("command", OVERWRITING)
+def test_no_command_writes_over_what_it_reads_or_writes_itself(
+    command: str, reading: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    for path in (vehicle, *load_vehicle(vehicle).files):
-        copy = tmp_path / path.relative_to(vehicle.parent)
-        copy.parent.mkdir(exist_ok=True)
-        shutil.copy(path, copy)
-    rov = tmp_path / vehicle.name
-    tables = {path for path in load_vehicle(rov).files if path.suffix == ".csv"}
-    assert {path.name for path in tables} == names
-    for table in map(str, tables):
-        _refused(["simulate", str(rov), "-o", table], tmp_path, capsys)
-        _refused(["sitl", str(rov), "--log", table], tmp_path, capsys)
-        _refused(["tune", str(rov), "--axis", "surge", "--command", "1", "--v-ss", "1", "-o", table], tmp_path, capsys)
-        _refused(["build", str(rov), "-o", table], tmp_path, capsys)
+    monkeypatch.chdir(reading)
+    before = {path: path.read_bytes() for path in reading.rglob("*") if path.is_file()}
+    assert main(command.split()) == 2
+    assert "would overwrite" in one_line(capsys)
+    assert {path: path.read_bytes() for path in reading.rglob("*") if path.is_file()} == before
+
+
+def test_a_vehicle_may_be_tuned_in_its_place(tmp_path: Path) -> None:
+    rov = tmp_path / "rov.toml"
+    rov.write_text(ALONE, encoding="utf-8")
+    assert main(["tune", str(rov), "--axis", "heave", "--command", "0.3", "--v-ss", "0.2", "-o", str(rov)]) == 0
+    assert load_vehicle(rov).sources["alpha_w"].startswith("Tuned to")
 
 
 @pytest.mark.parametrize("there", [True, False])
@@ -270,15 +225,14 @@ def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys:
             folder.mkdir()
         except OSError:  # a file system that takes Unicode alone
             continue
-        assert COMMANDS["the tuned vehicle"].run(folder / name) == 0
-        assert load_vehicle(folder / name)
-        assert COMMANDS["the tuned vehicle"].run(folder / "no" / name) == 2
-        capsys.readouterr()
-        assert COMMANDS["the tuned vehicle"].run(folder) == 2
+        for target, code in ((folder / name, 0), (folder / "no" / name, 2), (folder, 2)):
+            capsys.readouterr()
+            assert COMMANDS["the tuned vehicle"].run(target) == code
         one_line(capsys)
-    tests = small_folder(tmp_path / "tests")
+        assert load_vehicle(folder / name)
     there = sorted(tmp_path.rglob("*"))
-    assert main(["identify", str(tests), "-o", str(tmp_path / "x"), "--report", str(tmp_path / "\udcff.html")]) == 2
+    report = ["--report", str(tmp_path / "\udcff.html")]
+    assert main(["identify", str(FEW_TESTS), "--force", "-o", str(tmp_path / "x"), *report]) == 2
     assert "not Unicode" in one_line(capsys)
     assert sorted(tmp_path.rglob("*")) == there
     assert COMMANDS["the FMU"].run(tmp_path / "Röv [bold] 4 [" / "] [bold] x.fmu") == 0

@@ -118,24 +118,23 @@ def test_the_installed_command_does_everything_outside_the_checkout(wheel: Path,
     made = environment(tmp_path / "venv", "-c", CONSTRAINTS, wheel)
     here = tmp_path / "here"
     here.mkdir()
-    printed = made.run("rov-fmu", "build", where=here)
-    assert "aarch64-darwin" in printed
-    assert "built in" in printed
-    made.run("fmpy", "simulate", "videoray.fmu", "--start-values", "u_l", "0.3", "u_r", "0.3", where=here)
-    made.run("rov-fmu", "build", "videoray_refit", "--platform", "host", where=here)
-    made.run("rov-fmu", "build", "--fmi", "3", where=here)
-    made.run("rov-fmu", "build", "--backend", "pythonfmu", "--osp", where=here)
-    assert "Table 8." in made.run("rov-fmu", "tables", "videoray", where=here)
-    assert "alpha_u" in made.run("rov-fmu", "tune", "videoray", "--axis=surge", "--command=0.3", "--v-ss=1", where=here)
-    tests = shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "tests")
-    made.run("rov-fmu", "identify", tests, "-o", "rov.toml", "--report", "rov.html", where=here)
-    made.run("rov-fmu", "build", "rov.toml", "--platform", "host", "-o", "rov.fmu", where=here)
+    shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", here / "tests")
+    for command, expected in (
+        ("rov-fmu build", "aarch64-darwin"),
+        ("fmpy simulate videoray.fmu --start-values u_l 0.3 u_r 0.3", ""),
+        ("rov-fmu build --fmi 3", ""),
+        ("rov-fmu build --backend pythonfmu --osp", ""),
+        ("rov-fmu tables videoray", "Table 8."),
+        ("rov-fmu tune videoray --axis=surge --command=0.3 --v-ss=1", "alpha_u"),
+        ("rov-fmu identify tests -o tests/found.toml --report tests/found.html", ""),
+        ("rov-fmu build tests/found.toml --platform host -o found.fmu", "found.fmu"),
+    ):
+        assert expected in made.run(*command.split(), where=here)
     # the same bytes as from the checkout
     same = tmp_path / "same"
     same.mkdir()
-    made.run("python", ROOT / "build_fmu.py", where=same)
-    made.run("python", ROOT / "build_fmu.py", "--fmi", "3", where=same)
-    made.run("python", ROOT / "build_fmu.py", "--backend", "pythonfmu", "--osp", where=same)
+    for options in ([], ["--fmi", "3"], ["--backend", "pythonfmu", "--osp"]):
+        made.run("python", ROOT / "build_fmu.py", *options, where=same)
     for path in same.iterdir():
         assert path.read_bytes() == (here / path.name).read_bytes(), path.name
     assert len(list(same.iterdir())) == 4

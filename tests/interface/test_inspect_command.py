@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import process_time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,14 +13,14 @@ import tomlkit
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
-from rov_fmu.interface.inspect_command import write_draft
-from rov_fmu.io.output import WriteError
 from rov_fmu.tank.arrays import Array
 from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion, test_mavlink, test_ulog
 from tests.tank.readers.motion import TIME
 from tests.tank.readers.test_bags import Ros, dive
 from tests.tank.test_several_files import table
+
+Capsys = pytest.CaptureFixture[str]
 
 DEPTH: Array = motion.DEPTH
 
@@ -63,16 +64,33 @@ LOGS: dict[str, tuple[Callable[[Path], Path], set[str]]] = {
 }
 
 
+Inspect = Callable[..., tuple[str, str]]
+
+
+@pytest.fixture
+def inspect(tmp_path: Path, capsys: Capsys) -> Inspect:
+    """A function that inspects logs, and returns what is printed and the draft of rov.toml."""
+
+    def inspected(path: Path = tmp_path, option: str = "--inspect") -> tuple[str, str]:
+        assert main(["identify", option, str(path)]) == 0
+        return capsys.readouterr().out, (tmp_path / "rov.toml").read_text(encoding="utf-8")
+
+    return inspected
+
+
+def parsed(draft: str) -> dict[str, Any]:
+    """Return the content of a draft."""
+    return tomlkit.parse(draft).unwrap()
+
+
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long if name in ("ROS 1", "MCAP") else ()) for name in LOGS]
 )
-def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, inspect: Inspect) -> None:
     write, axes = LOGS[name]
-    path = write(tmp_path)
-    assert main(["identify", "--inspect", str(path)]) == 0
-    end = f"Wrote {tmp_path / 'rov.toml'}. Next: edit this draft, then rov-fmu identify {tmp_path}\n"
-    assert capsys.readouterr().out.endswith(end)
-    assert 'base = "bluerov2"' in (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    out, draft = inspect(write(tmp_path))
+    assert out.endswith(f"Wrote {tmp_path / 'rov.toml'}. Next: edit this draft, then rov-fmu identify {tmp_path}\n")
+    assert 'base = "bluerov2"' in draft
     tests = load_tests(tmp_path)
     assert axes <= {*tests.tested.logs}
     (log,) = tests.folder.logs
@@ -84,68 +102,49 @@ def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, capsys
         assert measured(log, "voltage") == pytest.approx(motion.VOLTAGE, abs=1e-6)
 
 
-def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_samples_rates_ranges_gaps_and_what_is_not_recognised(tmp_path: Path, inspect: Inspect) -> None:
     there = (TIME < 3.95) | (TIME > 7.95)
     columns = [TIME, np.where(TIME > 1.0, 30.0, 0.0), DEPTH, TIME, 16.0 + TIME]
     table(tmp_path / "log_heave.csv", "time [s],command [%],depth [m],Lux,voltage [V]", *(c[there] for c in columns))
-    assert main(["identify", "--inspect", str(tmp_path / "log_heave.csv")]) == 0
-    rows = {line.split("  ")[0]: line.split() for line in capsys.readouterr().out.splitlines() if line}
+    out, draft = inspect(tmp_path / "log_heave.csv")
+    rows = {line.split("  ")[0]: line.split() for line in out.splitlines() if line}
     assert rows["command"][1:] == ["1", "60", "10", "0", "0.3", "4.1", "s", "at", "3.9", "s"]
     assert rows["depth"][1:6] == ["m", "60", "10", "1", "1.99"]
     assert rows["voltage"][1:6] == ["V", "60", "10", "16", "25.9"]
-    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
     assert "\n# voltage = true\n" in draft
     assert "attitude" not in draft, "there is no roll or pitch"
     assert "- Lux: 0 to 9.9" in rows
     assert '# "Lux" = "?"   # 0 to 9.9' in draft.splitlines(), "nothing suggests what it stands for"
 
 
-def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "rov.toml").write_text("# mine", encoding="utf-8")
-    assert main(["identify", "--inspect", str(one_file(tmp_path))]) == 0
-    found = capsys.readouterr()
-    assert "depth" in found.out
-    assert f"There is a {tmp_path / 'rov.toml'} already, so no draft was written." in found.out
-    assert found.err == ""
-    with pytest.raises(WriteError, match="the file there is not replaced by a draft"):
-        write_draft(tmp_path / "rov.toml", "a draft")
-    assert (tmp_path / "rov.toml").read_text(encoding="utf-8") == "# mine"
-
-
-def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    titles = ["time [s]", "fore [%]", "aft [%]", "sonde [m]", "battery [%]"]
-    table(tmp_path / "log_dive.csv", ",".join(titles), TIME, 100 * THRUSTERS[0], 100 * THRUSTERS[1], DEPTH, TIME)
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
-    draft = tmp_path / "rov.toml"
-    assert 'name = "fore"' in draft.read_text(encoding="utf-8"), "a column in percent is a command"
-    assert "- battery [%]: 0 to 9.9" not in capsys.readouterr().out.split("Not recognised")[0]
+def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(tmp_path: Path, inspect: Inspect) -> None:
+    titles = "time [s],fore [%],aft [%],sonde [m],battery [%]"
+    table(tmp_path / "log_dive.csv", titles, TIME, 100 * THRUSTERS[0], 100 * THRUSTERS[1], DEPTH, TIME)
+    out, draft = inspect()
+    assert 'name = "fore"' in draft, "a column in percent is a command"
+    assert "- battery [%]: 0 to 9.9" not in out.split("Not recognised")[0]
     thrusters = "".join(
         f'[[thruster]]\nname = "{name}"\ncurve = "t"\ndirection = {{ value = [0, 0, 1], source = "CAD" }}\n'
         for name in ("fore", "aft")
     )
-    draft.write_text(
-        f'[columns]\n"sonde [m]" = "depth [m]"\n[curves.t]\ntogether = 2\n{thrusters}[axes.heave]\n', encoding="utf-8"
-    )
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
-    rows = [line.split("  ")[0] for line in capsys.readouterr().out.splitlines()]
-    assert {"thruster fore", "thruster aft", "depth", "- battery [%]: 0 to 9.9"} <= {*rows}
+    own = f'[columns]\n"sonde [m]" = "depth [m]"\n[curves.t]\ntogether = 2\n{thrusters}[axes.heave]\n'
+    (tmp_path / "rov.toml").write_text(own, encoding="utf-8")
+    out, draft = inspect()
+    rows = {line.split("  ")[0] for line in out.splitlines()}
+    assert {"thruster fore", "thruster aft", "depth", "- battery [%]: 0 to 9.9"} <= rows
     assert "- sonde [m]" not in rows
+    assert draft == own
+    assert f"There is a {tmp_path / 'rov.toml'} already, so no draft was written." in out
 
 
 def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, inspect: Inspect, capsys: Capsys
 ) -> None:
     """Columns have the names that their user chose, and the name of the file is no name of a test."""
     titles = "time [s],bow [%],stern [%],vertical speed [cm/s],sonar range [m/s],turn rate [deg/s],set heading [deg]"
     log = tmp_path / "dive 7.csv"
     table(log, titles, TIME, 100 * THRUSTERS[0], 100 * THRUSTERS[1], 100 * DEPTH, DEPTH, TIME, TIME)
-    assert main(["identify", "--inspect", str(log)]) == 0
-    draft = tmp_path / "rov.toml"
-    text = draft.read_text(encoding="utf-8")
+    _, text = inspect(log)
     assert '"vertical speed [cm/s]" = "heave velocity [cm/s]"' in text
     assert '"turn rate [deg/s]" = "yaw velocity [deg/s]"' in text
     assert '# "sonar range [m/s]" = "?"' in text
@@ -159,30 +158,31 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace('["?", "?", "?"]', "[0, 0, 0]").replace('"?"', "9.0")
     text = text.replace("[axes.yaw]", "")  # its column may stay
     thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
-    draft.write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
+    (tmp_path / "rov.toml").write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
     assert [*load_tests(tmp_path).given.vehicle.layout.kinds] == ["heave"]
 
 
-def test_a_dive_with_the_headers_of_its_owner(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_dive_with_the_headers_of_its_owner(tmp_path: Path, inspect: Inspect) -> None:
     names = ["FS", "FP", "RS", "RP", "VP", "VS"]
     titles = ["t_ms", *(f"thr_{name}_pwm" for name in names), "Depth (m)", "DVL_vx (m/s)", "DVL_vy (m/s)"]
-    titles += ["Battery (V)", "motor_temp", "thr_rpm", "Gripper", "comment"]
+    titles += ["Battery (V)", "motor_temp", "thr_rpm", "Gripper"]
     pulses = [np.where(TIME < 2.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS]
     ones = np.ones_like(TIME)
     columns = [1000.0 * TIME, *pulses, DEPTH, 0.1 * TIME, 0.2 * TIME, 16.0 * ones, 30.0 * ones, TIME, 3.0 * ones]
-    rows = zip(*columns, strict=True)
-    text = "".join(f"{','.join(f'{value:.6g}' for value in row)},{'on' * (n % 9 == 0)}\n" for n, row in enumerate(rows))
-    (tmp_path / "dive.csv").write_text(f"{','.join(titles)}\n{text}", encoding="utf-8")
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    lines = (tmp_path / "rov.toml").read_text(encoding="utf-8").splitlines()
-    commands = {f'"thr_{name}_pwm" = "u_{name} [us]"' for name in names}
-    velocities = {f'"DVL_v{v} (m/s)" = "{axis} velocity [m/s]"' for v, axis in (("x", "surge"), ("y", "sway"))}
-    assert {*lines} >= commands | velocities
-    assert [line for line in lines if line.startswith("name = ")][1:] == [f'name = "{name}"' for name in names]
-    assert not any(line.startswith("base") for line in lines), "the BlueROV2 has six thrusters of other names"
-    unknown = {"Gripper": "always 3", "comment": "text", "motor_temp": "always 30", "thr_rpm": "0 to 9.9"}
-    assert lines[-4:] == [f'# "{title}" = "?"   # {what}' for title, what in unknown.items()]
+    table(tmp_path / "dive.csv", ",".join(titles), *columns)
+    out, draft = inspect()
+    document, lines = parsed(draft), draft.splitlines()
+    assert (
+        document["columns"].items()
+        >= {
+            **{f"thr_{name}_pwm": f"u_{name} [us]" for name in names},
+            **{f"DVL_v{v} (m/s)": f"{axis} velocity [m/s]" for v, axis in (("x", "surge"), ("y", "sway"))},
+        }.items()
+    )
+    assert [one["name"] for one in document["thruster"]] == names
+    assert "base" not in document, "the BlueROV2 has six thrusters of other names"
+    unknown = {"Gripper": "always 3", "motor_temp": "always 30", "thr_rpm": "0 to 9.9"}
+    assert lines[-3:] == [f'# "{title}" = "?"   # {what}' for title, what in unknown.items()]
     assert all(f"- {title}: {what}\n" in out for title, what in unknown.items())
 
 
@@ -197,12 +197,11 @@ def test_a_dive_with_the_headers_of_its_owner(tmp_path: Path, capsys: pytest.Cap
         ([f"RC{n}" for n in range(1, 7)], "?"),
     ],
 )
-def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp_path: Path) -> None:
+def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp_path: Path, inspect: Inspect) -> None:
     """A vehicle that ships is the base where the names are numbers; each number is that of its thruster."""
     pulses = [np.where(TIME < 6.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS]
     table(tmp_path / "dive.csv", ",".join(["time [s]", *titles, "depth [m]"]), TIME, *pulses, DEPTH)
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
-    text = (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    _, text = inspect()
     assert [*re.findall(r'^base = "(.*)"', text, re.M)] == [base] * bool(base)
     assert ("These logs do not tell which thrusters" in text) == (base == "?")
     if base == "bluerov2":
@@ -231,28 +230,23 @@ def pool_run(folder: Path, tables: Mapping[str, str | bytes]) -> list[str]:
     return (folder / "rov.toml").read_text(encoding="utf-8").splitlines()
 
 
-def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, capsys: Capsys) -> None:
     lines = pool_run(tmp_path, OWN)
-    assert [line.split("   ")[0] for line in lines if line.startswith("[curves")] == [
-        "[curves.main]",
-        "[curves.side]",
-        "[curves.vert]",
-    ]
+    document = parsed("\n".join(lines))
+    assert [*document["curves"]] == ["main", "side", "vert"]
     assert lines.count('curve = "?"   # main or side or vert') == 2
-    columns = lines[lines.index("[columns]  # what headers of the CSV files stand for: check their units and signs") :]
-    assert [line for line in columns if line.startswith('"')] == [
-        '"turning speed (deg/s)" = "velocity [deg/s]"',
-        '"Command (%)" = "command [%]"',
-        '"Pull (N)" = "force [N]"',
-        '"Throttle (1)" = "command [1]"',
-        '"Tau (s)" = "time constant [s]"',
-        '"thr_FS_pwm" = "u_FS [us]"',
-        '"thr_FP_pwm" = "u_FP [us]"',
-        '"Compass (deg)" = "heading [deg]"',
-        '"Gyro_Z (deg/s)" = "yaw velocity [deg/s]"',
-    ]
-    assert [line for line in columns if '= "?"' in line] == ['# "Battery" = "?"', '# "Pull (kg)" = "?"']
-    assert "[axes.yaw]" in lines
+    assert document["columns"] == {
+        "turning speed (deg/s)": "velocity [deg/s]",
+        "Command (%)": "command [%]",
+        "Pull (N)": "force [N]",
+        "Throttle (1)": "command [1]",
+        "Tau (s)": "time constant [s]",
+        "thr_FS_pwm": "u_FS [us]",
+        "thr_FP_pwm": "u_FP [us]",
+        "Compass (deg)": "heading [deg]",
+        "Gyro_Z (deg/s)": "yaw velocity [deg/s]",
+    }
+    assert {'# "Battery" = "?"', '# "Pull (kg)" = "?"', "[axes.yaw]"} <= {*lines}
     for name in ("thrust_side.csv", "thrust_vert.csv", "time_constant_yaw.csv"):
         (tmp_path / name).unlink()
     assert main(["identify", str(tmp_path)]) == 2
@@ -275,25 +269,19 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("whole", [True, False])
 @pytest.mark.parametrize("name", TABLES)
-def test_tables_alone_are_listed_as_they_will_be_read(
-    name: str, whole: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_tables_alone_are_listed_as_they_will_be_read(name: str, tmp_path: Path, inspect: Inspect) -> None:
     text, row = TABLES[name]
     (tmp_path / name).write_text(text, encoding="utf-8")
-    path, draft = tmp_path if whole else tmp_path / name, tmp_path / "rov.toml"
-    for n in range(2):  # without rov.toml, and with its draft
-        assert main(["identify", "--inspect", str(path)]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        rows = [re.split(" {2,}", line.strip()) for line in lines]
+    for path in (tmp_path, tmp_path / name):  # without rov.toml, and with its draft
+        out, draft = inspect(path)
+        rows = [re.split(" {2,}", line.strip()) for line in out.splitlines()]
         assert ["command", "1", row[2], "-", "-1", "1"] in rows
         assert row in rows
-        assert any(line.startswith("Wrote ") for line in lines) == (n == 0)
-        if name == "thrust_t200.csv":
-            assert {"- RPM: 0 to 3000", "- PWM (µs) is taken as command [µs]"} <= {*lines}
-    columns = tomlkit.parse(draft.read_text(encoding="utf-8")).unwrap().get("columns", {})
-    assert columns == ({"PWM (µs)": "command [µs]", "Force (Kg f)": "force [Kgf]"} if text is MAKER else {})
+        if text is MAKER:
+            assert {"- RPM: 0 to 3000", "- PWM (µs) is taken as command [µs]"} <= {*out.splitlines()}
+    columns = {"PWM (µs)": "command [µs]", "Force (Kg f)": "force [Kgf]"} if text is MAKER else {}
+    assert parsed(draft).get("columns", {}) == columns
 
 
 @pytest.mark.parametrize(("tables", "curve"), [({"thrust_main.csv": OWN["thrust_main_1.csv"]}, "main"), ({}, "all")])
@@ -303,45 +291,36 @@ def test_thrusters_of_one_kind_have_its_curve(tables: Mapping[str, str | bytes],
     assert lines.count(f'curve = "{curve}"') == 2
 
 
-def test_thousands_of_columns_take_seconds_and_are_not_all_shown(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_thousands_of_columns_take_seconds_and_are_not_all_shown(tmp_path: Path, inspect: Inspect) -> None:
     """If each header were compared with all others, it would take minutes."""
     start = process_time()
     titles = ["time [s]", "depth [m]", *(f"x{n}" for n in range(4000))]
     table(tmp_path / "log.csv", ",".join(titles), *(DEPTH[:3] for _ in titles))
-    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    shown = inspect()
     assert process_time() - start < 20.0
-    shown = capsys.readouterr().out
-    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
-    assert "depth" in shown
-    for text in (shown, draft):
+    assert "depth" in shown[0]
+    for text in shown:
         assert "3900 more" in text
         assert len(text.splitlines()) < 200
 
 
-def test_headers_with_control_characters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_headers_with_control_characters(tmp_path: Path, inspect: Inspect) -> None:
     """The terminal shows them escaped, each on one line. The draft keeps them, so its keys are those headers."""
     odd = ["heading\t(deg)", "\x1b[31mred [V]", 'gyro\nbase = "x"', "\x9b2J\u202e\u2028b"]
     titles = ",".join('"{}"'.format(title.replace('"', '""')) for title in odd)
     header = f"time [s],{','.join(f'thr_{n}_pwm' for n in range(1, 7))},{titles}"
     rows = [",".join([f"{0.1 * n:g}", *["1600"] * 6, *[f"{n}"] * 4]) for n in range(50)]
     (tmp_path / "log.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
-    assert main(["identify", "--inspect", str(tmp_path / "log.csv")]) == 0
-    out = capsys.readouterr().out
+    out, draft = inspect()
     assert all(character.isprintable() for line in out.split("\n") for character in line)
     assert "\n- gyro\\nbase = " in out
-    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
-    columns = tomlkit.parse(draft.replace('# "', '"').partition("[columns]")[2]).unwrap()
-    assert {*odd} <= {*columns}
+    assert {*odd} <= {*parsed(draft.replace('# "', '"').partition("[columns]")[2])}
 
 
 # ---- Folders without rov.toml ----------------------------------------------------------------------------------------
 
 
-def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: Path, capsys: Capsys) -> None:
     folder = tmp_path / "My ROV (2)"
     folder.mkdir()
     one_file(folder)
@@ -357,7 +336,7 @@ def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(
     assert main(["identify", str(folder), "-o", str(tmp_path / "v.toml")]) == 2
     assert f"{draft}: there is no such file" in capsys.readouterr().err
     assert main(["identify", str(folder), "--draft"]) == 0
-    document = tomlkit.parse(draft.read_text(encoding="utf-8")).unwrap()
+    document = parsed(draft.read_text(encoding="utf-8"))
     assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("My ROV (2)", "my_rov_2")
     assert (document["base"], document["against"]) == ("bluerov2", "bluerov2")
     written = draft.read_bytes()
@@ -378,7 +357,7 @@ UNREADABLE: dict[str, bytes] = {
 
 @pytest.mark.parametrize("name", UNREADABLE)
 def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: Capsys
 ) -> None:
     log = one_file(tmp_path)
     (tmp_path / name).write_bytes(UNREADABLE[name])
@@ -395,17 +374,15 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
         assert error.startswith(f"rov-fmu: {tmp_path / name}")
 
 
-def test_headers_that_nothing_explains_are_listed_and_drafted(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_headers_that_nothing_explains_are_listed_and_drafted(tmp_path: Path, inspect: Inspect) -> None:
     """The clock counts ns since 1970; z points up, so y points to port; and forces are in N."""
     table(tmp_path / "wrench.csv", "%time,field.force.x,field.force.z", 1.7e18 + 1e9 * TIME, 52.0 * TIME, -TIME)
     titles = "%time,field.position.z,field.velocity.x,field.velocity.y,field.orientation.z,field.orientation.w"
     table(tmp_path / "state.csv", titles, 1.7e18 + 1e9 * TIME, -DEPTH, TIME, TIME, TIME, TIME)
     (tmp_path / "other.csv").write_text("a;b\n1;2\n3;4\n", encoding="utf-8")
-    assert main(["identify", "--draft", str(tmp_path)]) == 0
-    assert "\n- b: 2 to 4\n" in capsys.readouterr().out
-    document = tomlkit.parse((tmp_path / "rov.toml").read_text(encoding="utf-8")).unwrap()
+    out, draft = inspect(option="--draft")
+    assert "\n- b: 2 to 4\n" in out
+    document = parsed(draft)
     assert document["columns"] == {
         "%time": "time [ns]",
         "field.position.z": "-depth [m]",
@@ -417,24 +394,20 @@ def test_headers_that_nothing_explains_are_listed_and_drafted(
     assert document["dives"] == {"dive_1": {"files": ["wrench.csv", "state.csv"]}}
 
 
-def test_files_of_several_dives_are_paired_by_their_times(tmp_path: Path) -> None:
+def test_files_of_several_dives_are_paired_by_their_times(tmp_path: Path, inspect: Inspect) -> None:
     for n in (1, 2):
         table(tmp_path / f"out_{n}.csv", "time [s],u_1 [%],u_2 [%]", TIME + 99 * n, 9 * TIME, -9 * TIME)
         table(tmp_path / f"in_{n}.csv", "time [s],depth [m]", TIME + 99 * n + 2.0, DEPTH)
-    assert main(["identify", "--draft", str(tmp_path)]) == 0
-    document = tomlkit.parse((tmp_path / "rov.toml").read_text(encoding="utf-8")).unwrap()
-    assert document["dives"] == {f"dive_{n}": {"files": [f"out_{n}.csv", f"in_{n}.csv"]} for n in (1, 2)}
+    _, draft = inspect()
+    assert parsed(draft)["dives"] == {f"dive_{n}": {"files": [f"out_{n}.csv", f"in_{n}.csv"]} for n in (1, 2)}
 
 
-def test_the_sources_and_the_ranges_of_arrays_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_sources_and_the_ranges_of_arrays_are_told(tmp_path: Path, inspect: Inspect) -> None:
     ros = Ros(2)
     extra = [
         ("/state", t, ros.message("std_msgs/msg/Float64MultiArray", data=np.array([t, 2.0 * t - 1.0]))) for t in TIME
     ]
-    path = ros.write(tmp_path, [*dive(ros), *extra], ".mcap")
-    assert main(["identify", "--draft", str(path)]) == 0
-    out = capsys.readouterr().out
+    out, draft = inspect(ros.write(tmp_path, [*dive(ros), *extra], ".mcap"))
     assert re.search(r"\n- depth.* from /\S+, [0-9.]+ Hz", out)
     assert "\n- /state.data[1]: -1 to 18.8\n" in out
-    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
     assert '# "/state.data[1]" = "?"   # -1 to 18.8' in draft

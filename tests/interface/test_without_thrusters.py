@@ -67,18 +67,18 @@ def test_a_part_of_thrusters_needs_the_rest(path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["sitl"], "has no thrusters, so there is nothing that ArduSub could drive"),
-        (["simulate", "--set", "surge=0.3"], "no thruster drives this axis"),
+        ("sitl", "has no thrusters, so there is nothing that ArduSub could drive"),
+        ("simulate --set surge=0.3", "no thruster drives this axis"),
         (
-            ["tune", "--axis", "surge", "--command", "0.5", "--v-ss", "0.4"],
+            "tune --axis surge --command 0.5 --v-ss 0.4",
             "no thruster drives this axis, so it cannot",
         ),
     ],
 )
 def test_what_needs_thrusters_is_refused(
-    path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+    path: Path, capsys: pytest.CaptureFixture[str], arguments: str, words: str
 ) -> None:
-    command, *rest = arguments
+    command, *rest = arguments.split()
     assert main([command, str(path), *rest]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line

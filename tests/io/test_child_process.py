@@ -47,30 +47,28 @@ class Counter:
 
 
 def test_methods_return_and_raise_as_in_this_process_and_the_object_remembers() -> None:
-    child = ChildProcess(Counter, 2, limits=Limits(time=60.0))
-    try:
+    with closing(ChildProcess(Counter, 2, limits=Limits(time=60.0))) as child:
         assert child.call("pid") != os.getpid()
         assert (child.call("add", 3), child.call("add", 2, 10)) == (5, 25)
         with pytest.raises(LookupError, match="not here"):
             child.call("fail", "not here")
         assert child.call("add", 0) == 25
-    finally:
-        child.close()
-
-
-def test_what_the_object_raises_as_it_is_made_is_raised() -> None:
     with pytest.raises(ValueError, match="must not be negative"):
         ChildProcess(Counter, -1)
 
 
-@pytest.mark.parametrize(
-    ("method", "arguments", "cause"),
-    [("end", (3,), "exit code 3"), ("end", (0,), "exit code 0"), ("kill", (), "SIGKILL")],
-)
-def test_the_end_of_the_process_is_told_with_its_cause(method: str, arguments: tuple[int, ...], cause: str) -> None:
+@pytest.mark.skipif(sys.platform != "linux", reason="the process is killed with a signal of POSIX")
+@pytest.mark.parametrize(("method", "arguments", "cause"), [("end", (3,), "exit code 3"), ("kill", (), "SIGKILL")])
+def test_the_end_of_the_process_is_told_with_its_cause_and_its_files_are_removed(
+    method: str, arguments: tuple[int, ...], cause: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     child = ChildProcess(Counter, 0)
+    child.call("leave_a_file")
+    assert [*tmp_path.rglob("left")]
     with pytest.raises(ChildError, match=f"^ended its process: {cause}$"):
         child.call(method, *arguments)
+    assert not [*tmp_path.iterdir()]
 
 
 def test_a_call_beyond_its_time_limit_ends_the_process() -> None:
@@ -123,14 +121,3 @@ def test_a_call_beyond_its_memory_or_disk_is_ended_and_leaves_no_file(
         pytest.raises(RuntimeError, match=r"^OpaqueError: the reason$"),
     ):
         child.call("call", _opaque)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="the process is killed with a signal of POSIX")
-def test_temporary_files_of_a_killed_process_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    child = ChildProcess(Counter, 0)
-    child.call("leave_a_file")
-    assert [*tmp_path.rglob("left")]
-    with pytest.raises(ChildError, match="SIGKILL"):
-        child.call("kill")
-    assert not [*tmp_path.iterdir()]

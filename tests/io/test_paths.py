@@ -113,14 +113,6 @@ def test_a_link_that_stays_in_the_folder_is_followed(folder: Path) -> None:
     assert report.read_text(encoding="utf-8") == "the report"
 
 
-def test_a_vehicle_file_that_is_a_link_names_what_is_beside_the_link(folder: Path) -> None:
-    """The command line may contain any path; names in the file are relative to the folder of that path."""
-    elsewhere = folder.parent / "vehicle.toml"
-    elsewhere.write_text(ALONE.replace("[validity]", 'data = "tables"\n[validity]', 1), encoding="utf-8")
-    (folder / "vehicle.toml").symlink_to(elsewhere)
-    assert load_vehicle(folder / "vehicle.toml").data == folder / "tables"
-
-
 def test_tables_are_searched_in_the_folder_and_then_among_the_shipped_ones(folder: Path) -> None:
     vehicle, own = folder / "own.toml", folder / "videoray" / "tables"
     text = ALONE.replace("[validity]", 'data = "videoray/tables"\npictures = "videoray/pictures"\n[validity]', 1)
@@ -131,8 +123,3 @@ def test_tables_are_searched_in_the_folder_and_then_among_the_shipped_ones(folde
     assert load_vehicle(vehicle).data == own
     with pytest.raises(ValueError, match=OUTSIDE):
         inside_or_shipped(folder, "../models/videoray")
-
-
-def test_shipped_files_name_nothing_above_their_folder() -> None:
-    for path in MODELS.rglob("*.toml"):
-        assert "../" not in path.read_text(encoding="utf-8"), path

@@ -1,10 +1,19 @@
-"""Fixtures that open pages in headless browsers."""
+"""Fixtures that open pages in headless browsers, and the pages on which vehicles fly."""
 
 import shutil
 from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+
+from rov_fmu.fmu.archive import web_module
+from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import BARE, ROOT
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -73,3 +82,77 @@ def visit(browser: "Browser") -> Iterator[Callable[..., Visit]]:
     yield new
     for one in visits:
         one.page.close()
+
+
+# ---- Pages on which vehicles fly -------------------------------------------------------------------------------------
+
+_FILES = {
+    **SHIPPED,
+    "everything": EVERYTHING,
+    "bare": BARE,
+    "thrust effects": THRUST_EFFECTS,
+    "remus100": ROOT / "examples" / "remus100" / "remus100.toml",
+}
+
+
+@cache
+def flown_vehicle(kind: str) -> Vehicle:
+    """Return a vehicle by the name of its page. The `heavy` is the BlueROV2 Heavy without roll and pitch."""
+    if kind == "six":
+        return a_vehicle(SIX)
+    return four_axes(load_vehicle(SHIPPED["bluerov2_heavy"])) if kind == "heavy" else load_vehicle(_FILES[kind])
+
+
+def write_page(path: Path, *vehicles: Vehicle, compact: bool = False) -> str:
+    """Write the page on which a vehicle flies, perhaps beside another one, and return its address."""
+    flown = [Flown(vehicle, web_module(vehicle.layout)) for vehicle in vehicles]
+    path.write_text(fly_page(flown, compact=compact), encoding="utf-8")
+    return path.as_uri()
+
+
+@pytest.fixture(scope="session")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
+    """A function that returns the address of the page of a kind of vehicle, which is written once."""
+    folder = tmp_path_factory.mktemp("pages")
+    return cache(lambda kind: write_page(folder / f"{kind}.html", flown_vehicle(kind)))
+
+
+@pytest.fixture
+def fly(visit: Callable[..., Visit], address: Callable[[str], str]) -> Iterator[Callable[..., "Page"]]:
+    """A function that opens the page of a kind of vehicle, or of an address, and waits until the vehicle flies.
+
+    At the end, no page may have printed anything to the console or requested anything but itself.
+    """
+    opened: list[Visit] = []
+
+    def page(kind: str, **options: Any) -> "Page":
+        opened.append(visit(**options))
+        opened[-1].page.goto(kind if "://" in kind else address(kind))
+        opened[-1].page.wait_for_selector("#live-section:not([hidden])")
+        return opened[-1].page
+
+    yield page
+    for one in opened:
+        assert one.messages == []
+        assert len(one.requests) == 1
+
+
+@pytest.fixture
+def page(fly: Callable[..., "Page"]) -> "Page":
+    """The page of the VideoRay, in which its model flies."""
+    return fly("videoray")
+
+
+def until(page: Any, condition: str) -> None:
+    """Wait for a condition. Playwright's own waiting evaluates strings in the page, which the page forbids."""
+    for _ in range(2400):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(50)
+    pytest.fail(f"never: {condition}")
+
+
+def get(page: Any, *names: str) -> list[float]:
+    """Return values of the model that flies."""
+    found: list[float] = page.evaluate("names => names.map((name) => live.flight.pilot.model.get(name))", names)
+    return found

@@ -7,12 +7,10 @@ from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 import pytest
 from lxml import html
 from PIL import Image
 
-from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.page.fmu_page import documentation_page
@@ -93,28 +91,6 @@ def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path, monkeypa
         assert "script-src" not in policy, "without the live section no script at all"
 
 
-@pytest.mark.interop
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_shipped_pictures_are_seen_on_light_ground(
-    scheme: str, visit: Callable[..., Visit], tmp_path: Path
-) -> None:
-    path = tmp_path / "index.html"
-    path.write_text(documentation_page(load_vehicle(VIDEORAY)), encoding="utf-8")
-    seen = visit(scheme=scheme)
-    seen.page.goto(path.as_uri())
-    seen.page.evaluate(UNFOLD)
-    pictures = seen.page.locator(".frames img")
-    assert pictures.count() == 2
-    for picture in pictures.all():
-        box = picture.bounding_box()
-        assert box
-        assert box["width"] > 300
-        assert box["height"] > 200
-        brightness = np.asarray(Image.open(BytesIO(picture.screenshot())).convert("L"))
-        assert brightness[10, 10] > 240, "the ground"
-        assert brightness.min() < 60, "ink on it"
-
-
 # ---- What is refused -------------------------------------------------------------------------------------------------
 
 
@@ -144,19 +120,6 @@ def test_a_model_png_that_is_none_is_refused(case: str, tmp_path: Path) -> None:
     vehicle = load_vehicle(_picture("model.png", tmp_path, NO_PNG[case]))
     with pytest.raises(FileError, match=r"model\.png: not a PNG picture"):
         native_content(vehicle)
-
-
-def test_a_build_with_a_wrong_picture_ends_with_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
-) -> None:
-    monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots and the module for the page
-    monkeypatch.setattr("rov_fmu.build.web_module", lambda _: None)  # take most of the time
-    vehicle = _picture("model.png", tmp_path / "own", NO_PNG["text"])
-    assert main(["build", str(vehicle), "--platform", "host", "-o", str(tmp_path / "out.fmu")]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith(f"rov-fmu: {vehicle.parent / 'pictures' / 'model.png'}: not a PNG picture")
-    assert error.count("\n") == 1
-    assert not (tmp_path / "out.fmu").exists()
 
 
 @pytest.mark.parametrize("content", [b"a drawing", b"<svg/>", b"<html xmlns='http://www.w3.org/1999/xhtml'/>", b""])

@@ -6,11 +6,8 @@ from typing import Any
 
 import pytest
 
-from rov_fmu.fmu.archive import web_module
-from rov_fmu.report.page.live import Flown, fly_page
 from tests.fmu.results.test_ballast import BALLAST, INPUTS, ROV, expected
-from tests.report.conftest import Visit
-from tests.report.test_live import flying
+from tests.report.conftest import get, write_page
 from verification.references.rigid_vehicle import compared, places
 
 pytestmark = pytest.mark.interop
@@ -18,16 +15,14 @@ __all__ = ["expected"]
 
 
 @pytest.fixture
-def page(tmp_path: Path, visit: Callable[..., Visit]) -> Any:
+def page(tmp_path: Path, fly: Callable[..., Any]) -> Any:
     """The page of a vehicle with six axes, weight and buoyancy."""
-    target = tmp_path / "six.html"
-    target.write_text(fly_page([Flown(ROV, web_module(ROV.layout))]), encoding="utf-8")
-    return flying(visit, target.as_uri()).page
+    return fly(write_page(tmp_path / "six.html", ROV))
 
 
 def test_a_flight_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(page: Any, expected: list[float]) -> None:
-    values = page.evaluate(
-        """([inputs, ballast, names]) => {
+    done = page.evaluate(
+        """([inputs, ballast]) => {
             live.pause(true);
             const { flight } = live;
             Object.assign(flight, { isHeld: false, isBounded: false });
@@ -35,15 +30,13 @@ def test_a_flight_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(pa
             flight.advance(10);
             const done = flight.tune(ballast);
             flight.advance(10);
-            return [done, names.map((name) => flight.pilot.model.get(name))];
+            return done;
         }""",
-        [INPUTS, BALLAST, [*ROV.layout.state]],
+        [INPUTS, BALLAST],
     )
-    done, state = values
     assert done
-    assert compared(ROV, places(ROV, dict(zip(ROV.layout.state, state, strict=True)))) == pytest.approx(
-        expected, abs=1e-9
-    )
+    state = dict(zip(ROV.layout.state, get(page, *ROV.layout.state), strict=True))
+    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_slider_moves_the_ballast_and_the_ghost_keeps_that_of_the_file(page: Any) -> None:
@@ -55,9 +48,9 @@ def test_a_slider_moves_the_ballast_and_the_ghost_keeps_that_of_the_file(page: A
     assert page.evaluate("live.flight.pilot.model.get('der(w)') > live.flight.ghost.model.get('der(w)')")
     page.locator("summary", has_text="Tuning").click()
     page.click("#live-ones")
-    assert page.evaluate("['W', 'alpha_u'].map((name) => live.flight.pilot.model.get(name))") == [140.0, 1.0]
+    assert get(page, "W", "alpha_u") == [140.0, 1.0]
     page.click("#live-file")
-    assert page.evaluate("live.flight.pilot.model.get('W')") == ROV["W"]
+    assert get(page, "W") == [ROV["W"]]
 
 
 def test_a_mass_that_is_not_positive_definite_is_refused_in_one_line(page: Any) -> None:

@@ -2,46 +2,30 @@
 
 from collections.abc import Callable
 from math import cos, degrees, sin
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from rov_fmu.c.stepper import Stepper
-from rov_fmu.fmu.archive import web_module
-from rov_fmu.report.page.live import Flown, fly_page
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ROOT
-from tests.report.conftest import Visit
-from tests.report.test_live import flying, until
-from verification.references.autopilot.ardusub import STICK, VECTORED_6DOF, Hold, Motion
+from tests.report.conftest import flown_vehicle, get, until
+from verification.references.autopilot.ardusub import STICK, Hold, Motion
 
 pytestmark = pytest.mark.interop
 
-REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
 RATE = 400
 """The steps of ArduSub in a second."""
 NAMES = ("u", "v", "w", "p", "q", "r", "z", "phi", "theta", "psi", "x", "y", "der(u)", "der(v)", "der(w)")
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The address of the page of the BlueROV2 Heavy, which rolls and pitches."""
-    path = tmp_path_factory.mktemp("held") / "heavy.html"
-    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
-    path.write_text(fly_page([Flown(heavy, web_module(heavy.layout))]), encoding="utf-8")
-    return path.as_uri()
-
-
 @pytest.fixture
-def page(address: str, visit: Callable[..., Visit]) -> Any:
-    return flying(visit, address).page
+def page(fly: Callable[..., Any]) -> Any:
+    """The page of the BlueROV2 Heavy, which rolls and pitches."""
+    return fly("bluerov2_heavy")
 
 
 def by_the_law(seconds: float, ahead: float, aside: float) -> dict[str, float]:
     """Return the motion of the Heavy after a flight from a depth of 2 m, with the law in Python and exact steps."""
-    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
+    vehicle = flown_vehicle("bluerov2_heavy")
     stepper, hold = Stepper(vehicle, {"z": 2.0, "psi_0": 0.5}, NAMES), Hold(2.0, 0.5)
     motion = dict.fromkeys(NAMES, 0.0) | vehicle.calculated(vehicle.layout.usual_inputs, vehicle.layout.at_rest)
     motion |= {"z": 2.0, "psi": 0.5}
@@ -63,8 +47,8 @@ def by_the_law(seconds: float, ahead: float, aside: float) -> dict[str, float]:
 
 @pytest.mark.parametrize(("ahead", "aside"), [(1.0, 0.0), (-0.4, 0.6), (0.0, 0.0)])
 def test_the_law_of_the_page_is_that_of_the_stand_in(page: Any, ahead: float, aside: float) -> None:
-    values = page.evaluate(
-        """([ahead, aside, names]) => {
+    page.evaluate(
+        """([ahead, aside]) => {
             live.pause(true);
             const { flight } = live;
             const { model } = flight.pilot;
@@ -73,21 +57,11 @@ def test_the_law_of_the_page_is_that_of_the_stand_in(page: Any, ahead: float, as
             model.turn();
             flight.steer({ demands: new Map([["surge", ahead], ["sway", aside]]), added: {} });
             flight.advance(6);
-            return names.map((name) => model.get(name));
         }""",
-        [ahead, aside, NAMES],
+        [ahead, aside],
     )
     expected = by_the_law(6.0, ahead, aside)
-    assert dict(zip(NAMES, values, strict=True)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
-
-
-def test_the_motor_matrix_is_that_of_ardusub(page: Any) -> None:
-    """ArduSub's throttle is positive upward, and heave downward."""
-    columns = {"roll": (0, 1), "pitch": (1, 1), "yaw": (2, 1), "heave": (3, -1), "surge": (4, 1), "sway": (5, 1)}
-    held = page.evaluate("Object.fromEntries(live.vehicle.axes.map(({ name, held }) => [name, held]))")
-    for name, (column, sign) in columns.items():
-        factors = {f"u_{n}": sign * row[column] for n, row in enumerate(VECTORED_6DOF, 1) if row[column]}
-        assert held[name] == factors, name
+    assert dict(zip(NAMES, get(page, *NAMES), strict=True)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any) -> None:
@@ -103,11 +77,11 @@ def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any) ->
         "live.flight.times.map((_, n) => Math.hypot(live.flight.pilot.at(n, 'phi'), live.flight.pilot.at(n, 'theta')))"
     )
     assert degrees(max(tilts)) < 35.0
-    assert page.evaluate("live.flight.pilot.model.get('x')") > 15.0
+    assert get(page, "x")[0] > 15.0
     page.keyboard.up("KeyW")
     time = page.evaluate("live.flight.time")
     until(page, f"live.flight.time > {time + 20}")
-    assert abs(page.evaluate("live.flight.pilot.model.get('theta')")) < 0.05, "it levels when the key is released"
+    assert abs(get(page, "theta")[0]) < 0.05, "it levels when the key is released"
 
 
 def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None:
@@ -119,65 +93,25 @@ def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None
         page.keyboard.up(key)
         time = page.evaluate("live.flight.time")
         until(page, f"live.flight.time > {time + 15}")
-        before = page.evaluate(f"live.flight.pilot.model.get('{name}')")
+        (before,) = get(page, name)
         until(page, f"live.flight.time > {time + 30}")
-        after = page.evaluate(f"live.flight.pilot.model.get('{name}')")
+        (after,) = get(page, name)
         assert after == pytest.approx(before, abs=0.1), "the dead band of the thrusters lets the heading swing"
         assert after > 1.0
-    tilt = page.evaluate("['phi', 'theta'].map((name) => Math.abs(live.flight.pilot.model.get(name)))")
-    assert max(tilt) < 0.05
+    assert get(page, "phi", "theta") == pytest.approx([0.0, 0.0], abs=0.05)
 
 
-def test_a_frame_does_not_ask_for_the_layout_of_the_page(page: Any) -> None:
-    """To lay out the page for its sizes in each frame took ten times as long as to draw it."""
-    session = page.context.new_cdp_session(page)
-    session.send("Performance.enable")
-
-    def layouts() -> float:
-        metrics = session.send("Performance.getMetrics")["metrics"]
-        count: float = next(one["value"] for one in metrics if one["name"] == "LayoutCount")
-        return count
-
-    page.evaluate("""() => {
-        live.pause(true);
-        live.flight.steer({ demands: new Map([["surge", 1]]), added: {} });
-        live.flight.advance(20);
-    }""")
-    before = layouts()
-    page.evaluate("() => { for (let n = 0; n < 100; n++) { live.fly(1 / 60); live.draw(); } }")
-    assert layouts() - before < 5
-
-
-def test_without_the_hold_the_keys_drive_the_thrusters_alone(page: Any) -> None:
-    page.locator("#live-hold").uncheck()
-    assert "nothing is held" in page.inner_text("#live-message")
-    shares = page.evaluate("live.vehicle.axes[0].shares")
-    page.focus("#live-stage")
-    page.keyboard.down("KeyW")
-    until(page, "live.flight.time > 0.1")
-    commands = page.evaluate(
-        "Object.fromEntries(live.vehicle.commands.map((c) => [c, live.flight.pilot.model.get(c)]))"
-    )
-    assert commands == pytest.approx({name: 0.5 * shares.get(name, 0.0) for name in commands})
-    page.keyboard.up("KeyW")
-    until(page, "live.vehicle.commands.every((name) => live.flight.pilot.model.get(name) === 0)")
-
-
-def test_a_vehicle_that_cannot_tilt_has_no_switch(tmp_path: Path, visit: Callable[..., Visit]) -> None:
-    vehicle, target = load_vehicle(SHIPPED["videoray"]), tmp_path / "videoray.html"
-    target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
-    page = flying(visit, target.as_uri()).page
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("videoray", "Time starts"), ("remus100", "It is not held level, because no thruster rolls or pitches it.")],
+)
+def test_a_vehicle_that_no_thruster_rolls_or_pitches_is_not_held(
+    kind: str, words: str, fly: Callable[..., Any]
+) -> None:
+    """The VideoRay cannot tilt. The REMUS 100 tilts by its fins, which need speed."""
+    page = fly(kind)
     assert page.locator("#live-hold").count() == 0
-    assert not page.evaluate("live.flight.isHeld")
-
-
-def test_a_vehicle_that_no_thruster_rolls_or_pitches_is_not_held(tmp_path: Path, visit: Callable[..., Visit]) -> None:
-    """The REMUS 100 tilts by its fins, which need speed."""
-    vehicle, target = load_vehicle(REMUS), tmp_path / "remus.html"
-    target.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
-    page = flying(visit, target.as_uri()).page
-    assert page.locator("#live-hold").count() == 0
-    assert page.inner_text("#live-message").startswith("It is not held level, because no thruster rolls or pitches it.")
+    assert page.inner_text("#live-message").startswith(words)
     page.focus("#live-stage")
     page.keyboard.down("KeyW")
     until(page, "live.flight.pilot.model.get('u') > 0.1")

@@ -1,38 +1,16 @@
 """What the page that flies shows: surface and seabed, one screen, legible instruments, and the keys at first."""
 
+from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rov_fmu.fmu.archive import web_module
-from rov_fmu.report.page.live import Flown, fly_page
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.report.conftest import Visit
-from tests.report.test_live import BOX, flying, until
+from tests.report.conftest import get, until
+from tests.report.pages import UNFOLD
+from tests.report.test_live import BOX
 
 pytestmark = pytest.mark.interop
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
-    """A function that returns the address of the page of a vehicle."""
-    folder = tmp_path_factory.mktemp("screen")
-
-    def page(name: str) -> str:
-        path, vehicle = folder / f"{name}.html", load_vehicle(SHIPPED[name])
-        if not path.exists():
-            path.write_text(fly_page([Flown(vehicle, web_module(vehicle.layout))]), encoding="utf-8")
-        return path.as_uri()
-
-    return page
-
-
-@pytest.fixture
-def page(address: Callable[[str], str], visit: Callable[..., Visit]) -> Any:
-    return flying(visit, address("videoray")).page
 
 
 def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) -> None:
@@ -42,12 +20,11 @@ def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) ->
         live.flight.advance(5);
         live.draw();
     }""")
-    assert page.evaluate("['z', 'w'].map((name) => live.flight.pilot.model.get(name))")[0] == 0.0
+    assert get(page, "z") == [0.0]
     assert "depth 0.00 m (at the surface)" in page.inner_text("#live-readings")
     page.locator("input[name=bed]").fill("2")
     page.evaluate("() => { live.flight.set({ u_t: 0.8 }); live.flight.advance(60); live.draw(); }")
-    z, size = page.evaluate("[live.flight.pilot.model.get('z'), live.vehicle.size]")
-    assert z == pytest.approx(2.0 - 0.55 * size)
+    assert get(page, "z") == pytest.approx([2.0 - 0.55 * page.evaluate("live.vehicle.size")])
     assert "(on the seabed)" in page.inner_text("#live-readings")
     assert "bedded" in page.get_attribute("#live-picture", "class")
 
@@ -63,41 +40,50 @@ def test_the_keys_stand_on_the_picture_until_the_first_input(page: Any) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "height"), [(1366, 650), (390, 844)])
-@pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
-def test_picture_instruments_column_and_charts_are_on_one_screen(
-    name: str,
-    address: Callable[[str], str],
-    visit: Callable[..., Visit],
-    tmp_path: Path,
-    width: int,
-    height: int,
-    scheme: str,
+@pytest.mark.parametrize("kind", ["videoray", "heavy", "bluerov2_heavy"])
+def test_picture_instruments_column_and_an_even_grid_of_charts_are_on_one_screen(
+    kind: str, fly: Callable[..., Any], width: int, height: int, scheme: str
 ) -> None:
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
-    page = flying(visit, address(name), width=width, height=height, scheme=scheme).page
-    page.screenshot(path=tmp_path / f"{name}-{width}-{scheme}.png")
+    """Nothing moves when a message of one line comes or goes, and axe finds nothing, folded or not."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    page = fly(kind, width=width, height=height, scheme=scheme)
+    assert page.locator("#live-picture").evaluate(BOX)["height"] > 0.25 * height
     for element in page.locator("#live-picture, #live-charts svg, #live-column svg, .instruments > svg").all():
         if element.is_visible():
             box = element.evaluate(BOX)
             assert box["x"] >= 0
             assert box["x"] + box["width"] <= width
             assert box["y"] + box["height"] <= height
+    charts = [chart.evaluate(BOX) for chart in page.locator(".charts svg").all()]
+    assert len(charts) == page.evaluate("live.vehicle.axes.length")
+    assert len({(round(box["width"]), round(box["height"])) for box in charts}) == 1
+    assert len({*Counter(round(box["y"]) for box in charts).values()}) == 1, "each row has as many charts"
     texts = page.evaluate(
         "[...document.querySelectorAll('.instruments > svg')].filter((svg) => svg.clientWidth).map((svg) =>"
         " parseFloat(getComputedStyle(svg.querySelector('text')).fontSize) * svg.getScreenCTM().a)"
     )
     assert min(texts) >= 10.0
-    assert axe.Axe().run(page).response["violations"] == []
+    places = []
+    for words in ("", "short"):
+        page.evaluate("words => live.say(words)", words)
+        places.append([page.locator(f"#live-{part}").evaluate(BOX) for part in ("stage", "charts", "controls")])
+    assert places[0] == places[1]
+    assert axe.run(page).response["violations"] == []
+    page.evaluate(UNFOLD)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert axe.run(page).response["violations"] == []
 
 
-@pytest.mark.parametrize("choice", ["velocities", "positions", "thrust"])
-def test_the_charts_can_be_chosen(choice: str, page: Any) -> None:
+@pytest.mark.parametrize(
+    ("choice", "value", "words"),
+    [
+        ("velocities", "live.flight.pilot.model.get('u').toFixed(3)", "surge: u"),
+        ("positions", "live.flight.pilot.distances[0].toFixed(2)", "surge: distance"),
+        ("thrust", "live.flight.pilot.model.get('F_l').toFixed(2)", "left rear: F_l"),
+    ],
+)
+def test_the_charts_can_be_chosen(choice: str, value: str, words: str, page: Any) -> None:
     page.select_option("#live-view", choice)
-    value, words = {
-        "velocities": ("live.flight.pilot.model.get('u').toFixed(3)", "surge: u"),
-        "positions": ("live.flight.pilot.distances[0].toFixed(2)", "surge: distance"),
-        "thrust": ("live.flight.pilot.model.get('F_l').toFixed(2)", "left rear: F_l"),
-    }[choice]
     title, expected = page.evaluate(f"""() => {{
         live.pause(true);
         live.flight.set({{ u_l: 0.5 }});

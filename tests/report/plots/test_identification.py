@@ -54,14 +54,6 @@ def test_a_prediction_has_its_measured_and_predicted_values_and_the_band() -> No
     assert ax.get_title(loc="left") == "Depth (m)"
 
 
-def test_no_more_samples_are_drawn_than_can_be_seen() -> None:
-    p = prediction(SURGE, "distance")
-    many = (np.repeat(part, 20) for part in (p.time, p.measured, p.predicted, p.deviation))
-    time, measured, predicted, deviation = many
-    ax = drawn(replace(p, time=time, measured=measured, predicted=predicted, deviation=deviation))
-    assert 350 < len(lines(ax)["predicted, with 95 % band"][0]) < 450
-
-
 def test_a_prediction_has_the_compared_one_and_knots_beside_metres_per_second() -> None:
     p = prediction(SURGE, "surge velocity")
     ax = drawn(replace(p, compared=p.predicted + 1.0))
@@ -107,15 +99,3 @@ def test_answers_have_a_curve_and_a_band_for_each_direction_and_the_measured_poi
     assert lines(ax)["measured"] == ([30.0, 50.0], [0.29, 0.51])
     assert lines(ax)["compared"][1][0] == pytest.approx(other.response(SURGE, -1.0)[0])
     assert ax.get_title(loc="left") == "Steady velocity (m/s)"
-
-
-def test_tau_is_in_seconds_and_points_that_do_not_count_are_hollow() -> None:
-    yaw = example().axes[2]
-    figure = Figure()
-    plot_answers(figure, yaw, "Tau")
-    (ax,) = figure.axes
-    assert ax.get_title(loc="left") == "Time to 63 % (s)"
-    (point,) = [line for line in ax.lines if line.get_label() == "measured, not counted"]
-    assert point.get_markerfacecolor() == "none"
-    assert "measured" not in lines(ax)
-    assert "compared" not in lines(ax)
