@@ -21,6 +21,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import without_progress
 from tests.folders import ARM, BLUEROV2, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read, responses
+from tests.identify.conftest import Identified
 from tests.recordings import PLANS, Measured, clean, write_log
 from tests.vehicles import VIDEORAY
 
@@ -41,7 +42,7 @@ def with_logs(folder: Path, axis: Axis, count: int, rov: str = KNOWN, tables: Ma
 
 
 def of_axis(found: Identification, axis: Axis) -> AxisResult:
-    return next(result for result in found.axes if result.axis is axis)
+    return next(result for result in found.axes if result.axis == axis)
 
 
 def kinds(found: Identification) -> set[tuple[str, str]]:
@@ -75,9 +76,9 @@ def stop(result: AxisResult, V_ss: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def of_tables(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+def of_tables(identified: Identified) -> Identification:
     """Identify heave from forces, V_ss and Tau without errors."""
-    return identify(read(tmp_path_factory.mktemp("tables"), KNOWN, {**FORCES, **responses(TRUTH, HEAVE)}))
+    return identified("tables of heave", lambda folder: read(folder, KNOWN, {**FORCES, **responses(TRUTH, HEAVE)}))
 
 
 def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None:
@@ -202,9 +203,9 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def of_logs(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+def of_logs(identified: Identified) -> Identification:
     """Identify heave from forces and two logs."""
-    return identify(load_tests(with_logs(tmp_path_factory.mktemp("logs"), HEAVE, 2)))
+    return identified("logs of heave", lambda folder: load_tests(with_logs(folder, HEAVE, 2)))
 
 
 def test_logs_of_a_vehicle_give_the_vehicle(of_logs: Identification, tmp_path: Path) -> None:
@@ -225,7 +226,7 @@ def test_the_vehicle_of_the_file_moves_as_the_answers_say(of_logs: Identificatio
         assert Tau == pytest.approx(answer.rise[0], rel=0.02)
 
 
-def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
+def test_unseen_logs_are_predicted_and_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
     """Each log is predicted from the other one: over its length, and anew after each 10 s."""
     predictions = of_axis(of_logs, HEAVE).predictions
     assert {(p.file, p.span) for p in predictions} == {
@@ -239,9 +240,6 @@ def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
         assert p.error == pytest.approx(np.sqrt(np.mean(off**2)))
         assert p.coverage == pytest.approx(np.mean(np.abs(off) < 1.96 * p.deviation))
     assert of_axis(of_logs, HEAVE).coverage > 0.9
-
-
-def test_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
     (sensor,) = of_logs.sensors
     assert (sensor.axis, sensor.quantity, sensor.unit, sensor.samples) == (HEAVE, "depth", "m", 2 * 300)
     assert np.hypot(sensor.white, sensor.coloured) == pytest.approx(0.005, rel=0.15)
