@@ -59,8 +59,8 @@ def test_the_shipped_file_is_that_of_its_tests(refit: Identification, tmp_path: 
     path = tmp_path / "refit.toml"
     write_vehicle(refit.vehicle, path)
     ranges = r"^\[validity\.identified\]\n(.+\n)+\n|^tested = \[\n(    .+\n)+\]\n"
-    other = rf"{ranges}|^# rov-fmu identify .*$|\d[\d.]*|^tool = .*$"
-    made, shipped = (re.sub(other, "", p.read_text(encoding="utf-8"), flags=re.M) for p in (path, REFIT))
+    numbers = rf"{ranges}|^# rov-fmu identify .*$|\d[\d.]*|^tool = .*$"
+    made, shipped = (re.sub(numbers, "", p.read_text(encoding="utf-8"), flags=re.M) for p in (path, REFIT))
     assert made == shipped
     one, other = load_vehicle(path), load_vehicle(REFIT)
     for name in VIDEORAY.layout.coefficients:
