@@ -47,9 +47,13 @@ class TableHeaders:
 
 
 def header_parts(title: str) -> tuple[str, str]:
-    """Return the name and the unit in a header with brackets of any kind."""
+    """Return the name and the unit in a header with brackets of any kind.
+
+    A number in round brackets right behind the name is that of a column of a matrix, such as `pwm(1)`.
+    """
     match = _HEADER.fullmatch(title)
-    return (match["name"].rstrip(), match["unit"]) if match else (title, "")
+    has_unit = match and not re.fullmatch(r".*\S\(\d+\)", title)
+    return (match["name"].rstrip(), match["unit"]) if match and has_unit else (title, "")
 
 
 def axis_in_name(path: Path) -> Axis | None:

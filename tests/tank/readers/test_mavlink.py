@@ -214,21 +214,6 @@ def turn() -> list[bytes]:
     return messages
 
 
-def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
-    """At a heading of 90 deg, the vehicle moves to starboard at 0.01 n m/s; the second core differs."""
-    messages = []
-    for n in range(N):
-        time, c = 0.1 * n, 0.3 * (n >= 10)
-        messages += [rcou(time, *(pulse(s * c) for s in (1, -1, 1, -1)), 1500, 1500)]
-        for core, sign in ((0, 1.0), (1, -1.0)):
-            numbers = [-sign * 0.01 * n, 0.0, *[0.0] * 5, 0.0, 0.0, 0.0, 0.0]
-            messages += [packed("XKF1", round(time * 1e6), core, 0.0, 0.0, 90.0, *numbers)]
-    log = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).log
-    assert measured(log, "sway velocity") == pytest.approx(0.01 * np.arange(N), abs=1e-6)
-    assert measured(log, "surge velocity") == pytest.approx(np.zeros(N), abs=1e-6)
-    assert commanded(log, "3") == pytest.approx(0.3 * (np.arange(N) >= 10))
-
-
 @pytest.mark.parametrize("cut", [1, 40, 500])
 def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layout, tmp_path: Path) -> None:
     path = dataflash(tmp_path / "a.bin", turn())

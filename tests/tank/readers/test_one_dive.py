@@ -239,17 +239,9 @@ def check(log: Log, dive: Dive) -> None:
         assert np.abs(difference).max() < within, name
 
 
-@settings(max_examples=2, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(dive=dives())
-def test_one_dive_gives_the_same_log_in_every_format(dive: Dive) -> None:
-    read_all(dive)
-
-
-@pytest.mark.long
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(dive=dives())
-def test_any_dive_gives_the_same_log_in_every_format(dive: Dive) -> None:
-    read_all(dive)
+@pytest.mark.parametrize("examples", [2, pytest.param(25, marks=pytest.mark.long)])
+def test_one_dive_gives_the_same_log_in_every_format(examples: int) -> None:
+    settings(max_examples=examples, suppress_health_check=[HealthCheck.too_slow])(given(dive=dives())(read_all))()
 
 
 def read_all(dive: Dive) -> None:
