@@ -199,10 +199,6 @@ def att(time: float, yaw: float) -> bytes:
     return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
 
 
-def baro(time: float, instance: int, alt: float) -> bytes:
-    return packed("BARO", round(time * 1e6), instance, alt, 1e5, 20.0, 0.0, 0, 0.0, 0.0, 1)
-
-
 def turn() -> list[bytes]:
     """Return messages of a turn: from 1 s on, the heading passes north at 20 deg/s, by all horizontal thrusters."""
     messages = [packed("PARM", 1, f"MOT_{n}_DIRECTION".encode(), 1.0, 1.0) for n in range(1, 7)]
