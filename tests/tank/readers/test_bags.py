@@ -67,6 +67,19 @@ class Ros:
     def quaternion(self, R: Any) -> Any:
         return self.message("geometry_msgs/msg/Quaternion", **dict(zip("wxyz", motion.quaternion(R), strict=True)))
 
+    def odometry(self, header: Any, place: Iterable[float], R: Any, velocity: Iterable[float]) -> Any:
+        pose = self.message(
+            "geometry_msgs/msg/Pose", position=self.vector("Point", place), orientation=self.quaternion(R)
+        )
+        twist = self.message("geometry_msgs/msg/Twist", linear=self.vector("Vector3", velocity))
+        return self.message(
+            "nav_msgs/msg/Odometry",
+            header=header,
+            child_frame_id="rov/base_link",
+            pose=self.message("geometry_msgs/msg/PoseWithCovariance", pose=pose),
+            twist=self.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
+        )
+
     def write(self, folder: Path, messages: Messages, suffix: str = ".db3") -> Path:
         """Write a bag, and return the path of its file."""
         found = sorted(messages, key=lambda entry: entry[1])
@@ -97,21 +110,9 @@ def dive(ros: Ros, *, ned: bool = False, commands: Callable[[Ros, int], Any] | N
     earth, body = (np.eye(3), np.eye(3)) if ned else (ENU, FLU)
     for n, (time, R) in enumerate(zip(TIME, motion.rotations(), strict=True)):
         place = earth @ [motion.NORTH[n], motion.EAST[n], motion.DEPTH[n]]
-        attitude = ros.quaternion(earth @ R @ body)
-        pose = ros.message("geometry_msgs/msg/Pose", position=ros.vector("Point", place), orientation=attitude)
-        linear = ros.vector("Vector3", body @ [motion.U[n], motion.V[n], motion.W[n]])
-        twist = ros.message("geometry_msgs/msg/Twist", linear=linear)
-        yield (
-            "/odom",
-            time,
-            ros.message(
-                "nav_msgs/msg/Odometry",
-                header=ros.header(time, "world_ned" if ned else "world"),
-                child_frame_id="rov/base_link",
-                pose=ros.message("geometry_msgs/msg/PoseWithCovariance", pose=pose),
-                twist=ros.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
-            ),
-        )
+        velocity = body @ [motion.U[n], motion.V[n], motion.W[n]]
+        header = ros.header(time, "world_ned" if ned else "world")
+        yield "/odom", time, ros.odometry(header, place, earth @ R @ body, velocity)
         if commands:
             yield "/thrusters", time, commands(ros, n)
         if n % 10 == 0 or n == len(TIME) - 1:

@@ -173,16 +173,8 @@ def bag(version: int) -> Callable[[Path, Dive], Path]:
         ros, messages = Ros(version), []
         for n, time in enumerate(dive.time):
             header, R = ros.header(time, "map"), dive.rotation[n]
-            place, attitude = ros.vector("Point", ENU @ dive.position[n]), ros.quaternion(ENU @ R @ FLU)
-            pose = ros.message("geometry_msgs/msg/Pose", position=place, orientation=attitude)
-            twist = ros.message("geometry_msgs/msg/Twist", linear=ros.vector("Vector3", FLU @ dive.velocity[n]))
-            odometry = ros.message(
-                "nav_msgs/msg/Odometry",
-                header=header,
-                child_frame_id="base_link",
-                pose=ros.message("geometry_msgs/msg/PoseWithCovariance", pose=pose),
-                twist=ros.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
-            )
+            place, velocity = ENU @ dive.position[n], FLU @ dive.velocity[n]
+            odometry = ros.odometry(header, place, ENU @ R @ FLU, velocity)
             pulses = dive.pulses[n].astype(np.uint16)
             outputs = ros.message("mavros_msgs/msg/RCOut", header=header, channels=pulses)
             battery = ros.message("sensor_msgs/msg/BatteryState", header=header, voltage=dive.voltage[n])
