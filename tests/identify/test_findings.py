@@ -12,7 +12,6 @@ from rov_fmu.identify.findings import (
     SENTENCES,
     SEVERITY,
     by_heading,
-    facts,
     findings_of,
     heading,
     next_tests,
@@ -426,12 +425,6 @@ def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     result = without_findings()
     late = told(replace(result, folder=replace(result.folder, findings=[lost])))
     assert [finding.kind for finding in late.findings].index("missing column") == 1
-
-
-def test_findings_of_reading_are_told_too() -> None:
-    assert "log_1.csv: 3 rows out of order sorted" in facts(example().findings)
-    assert heading(Finding("unreadable file")) == "Warnings"
-    assert heading(Finding("time of arrival")) == "Doubts"
 
 
 def test_a_coefficient_of_an_axis_without_answers_has_no_substitute() -> None:

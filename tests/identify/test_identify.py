@@ -21,6 +21,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import without_progress
 from tests.folders import ARM, BLUEROV2, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read, responses
+from tests.identify.conftest import Identified
 from tests.recordings import PLANS, Measured, clean, write_log
 from tests.vehicles import VIDEORAY
 
@@ -29,7 +30,6 @@ TRUTH = VIDEORAY.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta
 KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
 FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("rear", "top")}
 COMMANDS = (0.3, -0.3, 0.5, -0.5)
-FLAT = f"{FORCE}\n0.3,0.6\n-0.3,-0.6\n"
 STILL = "time [s],command [%],depth [m]\n" + "".join(f"{n / 10},{30 * (n > 9)},1.5\n" for n in range(50))
 
 
@@ -42,7 +42,7 @@ def with_logs(folder: Path, axis: Axis, count: int, rov: str = KNOWN, tables: Ma
 
 
 def of_axis(found: Identification, axis: Axis) -> AxisResult:
-    return next(result for result in found.axes if result.axis is axis)
+    return next(result for result in found.axes if result.axis == axis)
 
 
 def kinds(found: Identification) -> set[tuple[str, str]]:
@@ -76,9 +76,9 @@ def stop(result: AxisResult, V_ss: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def of_tables(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+def of_tables(identified: Identified) -> Identification:
     """Identify heave from forces, V_ss and Tau without errors."""
-    return identify(read(tmp_path_factory.mktemp("tables"), KNOWN, {**FORCES, **responses(TRUTH, HEAVE)}))
+    return identified("tables of heave", lambda folder: read(folder, KNOWN, {**FORCES, **responses(TRUTH, HEAVE)}))
 
 
 def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None:
@@ -89,43 +89,13 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
         assert of_tables.vehicle[name] == pytest.approx(TRUTH[name], rel=2e-3)
         assert low <= TRUTH[name] <= high
     assert heave.verdict.word == "good"
-    assert kinds(of_tables) == {
-        ("nothing predicted", "heave"),
-        ("unused curve", "rear"),
-        ("axis left out", "surge"),
-    } | {("axis left out", "yaw")}
-
-
-def test_each_row_has_what_the_model_says_about_it(of_tables: Identification) -> None:
-    points = [*of_axis(of_tables, HEAVE).points, *of_tables.forces]
-    assert {p.quantity for p in points} == {"force", "V_ss", "Tau"}
-    for p in points:
+    left_out = {("axis left out", "surge"), ("axis left out", "yaw"), ("unused curve", "rear")}
+    assert kinds(of_tables) == {("nothing predicted", "heave"), *left_out}
+    for p in (*heave.points, *of_tables.forces):
         assert p.model == pytest.approx(p.measured, rel=1e-3)
         assert p.held_out == pytest.approx(p.measured, rel=0.01)
         assert p.counts
-
-
-def test_steady_velocities_alone_leave_the_inertia_to_its_prior(tmp_path: Path) -> None:
-    tables = {**FORCES, "steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]}
-    found = identify(read(tmp_path, KNOWN, tables))
-    (heave,) = found.axes
-    beta = next(known for known in heave.known if known.name == "beta_w")
-    assert beta.interval is None
-    assert beta.narrowed == pytest.approx(1.0, abs=0.01)
-    assert "beta_w" not in found.vehicle.intervals
-    (told,) = (f for f in found.findings if f.kind == "not identified" and f.axis == "heave")
-    assert told.names["coefficients"] == "beta_w"
-    assert heave.answers[0].steady[0] == pytest.approx(TRUTH.response(HEAVE, 0.3)[0], rel=1e-3)
-    low, high = heave.answers[0].rise[1]
-    assert high > 2.0 * low, "a time is hardly known without the inertia"
-
-
-@pytest.mark.long
-def test_forces_at_one_command_are_enough_where_motion_tells_the_shape(tmp_path: Path) -> None:
-    found = identify(read(tmp_path, KNOWN, {"thrust_top.csv": FLAT, **responses(TRUTH, HEAVE)}))
-    check_answers(found.axes[0], 0.06)
-    for p in found.forces:
-        assert p.model == pytest.approx(p.measured, rel=0.05)
+    assert {p.quantity for p in heave.points} == {"V_ss", "Tau"}
 
 
 def test_rows_outside_the_window_do_not_count(tmp_path: Path) -> None:
@@ -152,16 +122,8 @@ def check_file(found: Identification, path: Path) -> Vehicle:
         assert read_again.intervals[name] == pytest.approx(interval, rel=1e-5)
     assert read_again.uncertainty.errors == pytest.approx(made.uncertainty.errors, rel=1e-5)
     assert read_again.uncertainty.correlation == pytest.approx(made.uncertainty.correlation, abs=2e-6)
-    assert (
-        replace(
-            read_again,
-            layout=made.layout,
-            coefficients=made.coefficients,
-            intervals=made.intervals,
-            estimates=made.estimates,
-        )
-        == made
-    )
+    same = {key: getattr(made, key) for key in ("layout", "coefficients", "intervals", "estimates")}
+    assert replace(read_again, **same) == made
     return read_again
 
 
@@ -204,32 +166,13 @@ def spread(vehicle: Vehicle, told: Uncertainty, uniform: np.ndarray) -> float:
 
 def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> None:
     base = load_vehicle(Path(__file__).parents[2] / "models" / "videoray_refit" / "videoray_refit.toml")
-    by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand" }\n'
+    by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand", interval = [0.5, 0.7] }\n'
     tables = responses(TRUTH, YAW)
     found = identify(read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', tables)).vehicle
     assert found["a_d_u"] == base["a_d_u"]
-    assert found["beta_w"] == 0.6
-    assert found.sources["beta_w"] == "by hand"
+    assert (found["beta_w"], found.sources["beta_w"], found.intervals["beta_w"]) == (0.6, "by hand", (0.5, 0.7))
     assert found.intervals.get("b_d_u") == base.intervals.get("b_d_u")
-    assert "beta_w" not in found.intervals
     assert "a_d_r" in found.intervals
-
-
-@pytest.mark.long
-def test_noisy_forces_leave_the_curve_uncertain(tmp_path: Path) -> None:
-    """The intervals of a_t and b_t cover. Chance alone lets fewer than six of eight do so once in 3,000 times."""
-    lines = [line.split(",") for line in FORCES["thrust_rear.csv"].splitlines()[1:]]
-    covered = 0
-    for seed in range(4):
-        random = np.random.default_rng(seed)
-        noisy = "\n".join([FORCE, *(f"{c},{float(F) + random.standard_normal()}" for c, F in lines), ""])
-        tables = {**FORCES, "thrust_rear.csv": noisy, **responses(TRUTH, SURGE)}
-        (path := tmp_path / str(seed)).mkdir()
-        found = identify(read(path, KNOWN, tables)).vehicle
-        for name in ("a_t_rear", "b_t_rear"):
-            low, high = found.intervals[name]
-            covered += low <= TRUTH[name] <= high
-    assert covered >= 6
 
 
 @pytest.mark.long
@@ -260,9 +203,9 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def of_logs(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+def of_logs(identified: Identified) -> Identification:
     """Identify heave from forces and two logs."""
-    return identify(load_tests(with_logs(tmp_path_factory.mktemp("logs"), HEAVE, 2)))
+    return identified("logs of heave", lambda folder: load_tests(with_logs(folder, HEAVE, 2)))
 
 
 def test_logs_of_a_vehicle_give_the_vehicle(of_logs: Identification, tmp_path: Path) -> None:
@@ -283,7 +226,7 @@ def test_the_vehicle_of_the_file_moves_as_the_answers_say(of_logs: Identificatio
         assert Tau == pytest.approx(answer.rise[0], rel=0.02)
 
 
-def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
+def test_unseen_logs_are_predicted_and_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
     """Each log is predicted from the other one: over its length, and anew after each 10 s."""
     predictions = of_axis(of_logs, HEAVE).predictions
     assert {(p.file, p.span) for p in predictions} == {
@@ -297,9 +240,6 @@ def test_unseen_logs_are_predicted(of_logs: Identification) -> None:
         assert p.error == pytest.approx(np.sqrt(np.mean(off**2)))
         assert p.coverage == pytest.approx(np.mean(np.abs(off) < 1.96 * p.deviation))
     assert of_axis(of_logs, HEAVE).coverage > 0.9
-
-
-def test_the_noise_of_the_sensor_is_found(of_logs: Identification) -> None:
     (sensor,) = of_logs.sensors
     assert (sensor.axis, sensor.quantity, sensor.unit, sensor.samples) == (HEAVE, "depth", "m", 2 * 300)
     assert np.hypot(sensor.white, sensor.coloured) == pytest.approx(0.005, rel=0.15)
@@ -334,18 +274,6 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_pa
     write_log(path, "0", change(clean(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
     (heave,) = identify(load_tests(path)).axes
     check_answers(heave, near)
-
-
-@pytest.mark.long
-def test_a_command_that_never_rests_gives_the_vehicle(tmp_path: Path) -> None:
-    """A joystick gives another command in every row."""
-    path, at = folder_of(tmp_path / "tests", KNOWN, FORCES), np.arange(400) / 10.0
-    commands = 0.45 * np.sin(0.4 * at) + 0.25 * np.sin(1.3 * at)
-    write_log(
-        path, "0", clean(TRUTH, HEAVE, [(c, 0.1) for c in commands.tolist()], 10.0).noisy(np.random.default_rng(3))
-    )
-    (heave,) = identify(load_tests(path)).axes
-    check_answers(heave, 0.05)
 
 
 def test_a_table_joins_the_logs_and_contradictions_are_told(tmp_path: Path) -> None:
@@ -387,15 +315,6 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
 
 
-@pytest.mark.long
-def test_known_coefficients_are_kept(tmp_path: Path) -> None:
-    known = KNOWN + 'beta_w = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
-    tables = {**FORCES, "steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]}
-    vehicle = identify(read(tmp_path, known, tables)).vehicle
-    assert (vehicle["beta_w"], vehicle.sources["beta_w"]) == (0.8, "a guess")
-    assert vehicle.intervals["beta_w"] == (0.7, 0.9)
-
-
 def test_known_thrust_is_kept(tmp_path: Path) -> None:
     """Even where the motion would rather have other forces."""
     given = "".join(
@@ -433,15 +352,6 @@ def test_a_log_that_teaches_nothing_is_left_out(tmp_path: Path) -> None:
     assert {p.file for p in of_axis(found, HEAVE).predictions} == {"log_heave_0.csv"}
 
 
-@pytest.mark.long
-def test_an_axis_without_a_usable_test_goes(tmp_path: Path) -> None:
-    still = STILL.replace("depth [m]", "heading [deg]")
-    found = identify(read(tmp_path, KNOWN, {**FORCES, **responses(TRUTH, HEAVE), "log_yaw.csv": still}))
-    assert [result.axis for result in found.axes] == [HEAVE]
-    assert not found.vehicle.layout.has(YAW)
-    assert {("axis left out", "yaw"), ("unused curve", "rear")} <= kinds(found)
-
-
 BACKWARD = f"{FORCE}\n0.2,0.0\n0.5,-0.5\n0.8,-2.0\n"
 UP = f"{SPEED}\n0.3,-0.2\n0.5,-0.3\n0.8,-0.5\n"
 ALL = "".join(
@@ -449,8 +359,6 @@ ALL = "".join(
     for name in ("a_t_top", "b_t_top", "a_d_w", "b_d_w", "beta_w")
 )
 REFUSED: Mapping[str, tuple[str, Mapping[str, str], str]] = {
-    "nothing": (KNOWN, {}, "there are no tests"),
-    "forces alone": (KNOWN, FORCES, "no axis is tested"),
     "nothing that moves": (BLUEROV2, {"log_heave.csv": STILL}, "depth never changes"),
     "no force": (KNOWN, {"thrust_top.csv": f"{FORCE}\n0.2,0\n0.5,0\n"}, "thrust_top*.csv: must give a force above 0"),
     "forces and nothing that moves": (KNOWN, {**FORCES, "log_heave.csv": STILL}, "depth never changes"),
@@ -459,13 +367,6 @@ REFUSED: Mapping[str, tuple[str, Mapping[str, str], str]] = {
         {"steady_heave.csv": responses(TRUTH, HEAVE)["steady_heave.csv"]},
         "nothing is identifiable: rov.toml gives all that it tests",
     ),
-    "no thrust curve": (KNOWN, responses(TRUTH, HEAVE), "no thrust_top*.csv"),
-    "no drag": (
-        KNOWN,
-        {**FORCES, "time_constant_heave.csv": responses(TRUTH, HEAVE)["time_constant_heave.csv"]},
-        "does not give a_d_w, b_d_w",
-    ),
-    "no mass": (HEAD, {**FORCES, **responses(TRUTH, HEAVE)}, "m_rov"),
     "thrust that pulls": (KNOWN, {"thrust_top.csv": BACKWARD, **responses(TRUTH, HEAVE)}, "thrust_top"),
     "motion against thrust": (KNOWN, {**FORCES, "steady_heave.csv": UP}, "steady_heave"),
     "an unknown prior": (f"{KNOWN}[priors]\nthrst = 0.0\n", {**FORCES, **responses(TRUTH, HEAVE)}, "priors.thrst"),

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.pool import run, with_more
+from tests.pool import with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
 from verification.references import pool, rigid_pool
 from verification.references.pool import Array, Commands, Conditions, Tilt, swim
 
-STEP, PLAN = 0.25, ((0.0, 1.0), (0.6, 2.0), (-0.4, 2.0))
+STEP = 0.25
 
 
 @pytest.mark.parametrize("name", [name for name, k in VEHICLES.items() if not k.layout.mix])
@@ -37,16 +36,6 @@ def test_a_swim_is_that_of_the_exact_step(name: str) -> None:
             assert motion[symbol][n + 1] == pytest.approx(state[symbol], rel=1e-7, abs=1e-8), (symbol, n)
 
 
-def late(k: Vehicle, delay: float) -> Array:
-    return run(k, HEAVE, PLAN, 20.0, delay=delay).velocity
-
-
-def test_a_delay_moves_the_motion_in_time() -> None:
-    k = with_more(VIDEORAY, T_top=0.3, F_0_w=0.0)
-    assert late(k, 0.2)[4:] == pytest.approx(late(k, 0.0)[:-4], abs=1e-9)
-    assert np.abs(late(k, 0.2) - late(k, 0.0)).max() > 0.01
-
-
 # ---- Commands that switch at any time, and conditions ----------------------------------------------------------------
 
 HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
@@ -55,27 +44,34 @@ TIME: Array = np.array([0.0, 0.3, 0.7, 0.9, 1.0, 1.35, 1.4])
 Simulate = Callable[..., dict[str, Array]]
 
 
-def flown(k: Vehicle, *, most: float = 0.5) -> Commands:
-    """Return commands of every thruster."""
-    rng = np.random.default_rng(0)
-    return Commands(SWITCHES, {t.name: rng.uniform(-most, most, len(SWITCHES)) for t in k.layout.thrusters})
-
-
 @pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
 def test_conditions_of_thrust(simulate: Simulate, k: Vehicle) -> None:
     """Thrust at 70 % is that of a weaker curve; saturated commands are smaller ones; a delay moves the switches."""
-
-    def same(conditions: Conditions, other: Vehicle, commands: Commands) -> None:
-        motion, expected = simulate(k, flown(k), TIME, conditions), simulate(other, commands, TIME)
-        for name in (*k.layout.velocities, "x", "y", "z", "psi"):
-            assert motion[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-8), name
-
+    rng = np.random.default_rng(0)
+    levels = {t.name: rng.uniform(-0.5, 0.5, len(SWITCHES)) for t in k.layout.thrusters}
     weaker = k.replaced({name: 0.7 * value for name, value in k.coefficients.items() if name[:4] in ("a_t_", "b_t_")})
-    same(Conditions(thrust=lambda _: 0.7), weaker, flown(k))
-    commands = flown(k)
-    clipped = {name: np.clip(values, -0.3, 0.3) for name, values in commands.thrusters.items()}
-    same(Conditions(saturation=0.3), k, Commands(SWITCHES, clipped))
-    same(Conditions(delay=0.25), k, Commands(SWITCHES + 0.25, commands.thrusters))
+    clipped = {name: np.clip(values, -0.3, 0.3) for name, values in levels.items()}
+    for conditions, other, commands in (
+        (Conditions(thrust=lambda _: 0.7), weaker, Commands(SWITCHES, levels)),
+        (Conditions(saturation=0.3), k, Commands(SWITCHES, clipped)),
+        (Conditions(delay=0.25), k, Commands(SWITCHES + 0.25, levels)),
+    ):
+        motion = simulate(k, Commands(SWITCHES, levels), TIME, conditions)
+        expected = simulate(other, commands, TIME)
+        for name in (*k.layout.velocities, "x", "y", "z", "psi"):
+            assert motion[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-8), (conditions, name)
+
+
+def test_the_thrust_of_a_rotor_is_the_square_of_its_speed_which_lags() -> None:
+    """From rest, it is a thrust without lag times (1 - exp(-t/T))^2. The curve is twice that of the vehicle."""
+    force, T = VIDEORAY.curve_force(VIDEORAY.layout.curves[1], 0.6), 0.3
+    commands = Commands(np.zeros(1), {"t": np.array([0.6])})
+    risen = Conditions(thrust=lambda time: 2.0 * (1.0 - np.exp(-time / T)) ** 2)
+    rotors = Conditions(curves={"top": lambda command: 2.0 * force * command / 0.6}, has_rotors=True)
+    expected = pool.motion(VIDEORAY, commands, TIME, risen)["w"]
+    found = pool.motion(with_more(VIDEORAY, T_top=T, T_rear=T), commands, TIME, rotors)["w"]
+    assert found == pytest.approx(expected, rel=1e-6)
+    assert found[-1] > 0.01
 
 
 def test_a_tether_holds_the_vehicle_where_it_pulls_as_the_thrusters_push() -> None:

@@ -3,7 +3,9 @@
 The equations of motion stand here, written by hand and solved by SciPy's DOP853.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu import load
-from rov_fmu.build import build
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading, findings_of
 from rov_fmu.identify.identify import identify
@@ -51,6 +53,7 @@ class Dive:
     z: NDArray[np.float64]
 
 
+@cache
 def dive(seed: int) -> Dive:
     """Simulate m u' = X - d |u| u - b u, and the same downward with a load."""
     random = np.random.default_rng(seed)
@@ -82,12 +85,18 @@ def write(path: Path, header: str, *columns: NDArray[np.float64]) -> None:
     np.savetxt(path, np.column_stack(columns), "%.17g", ",", header=header, comments="")
 
 
-def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
-    (tmp_path / "rov.toml").write_text(ROV, encoding="utf-8")
+HEADER = "time [s],X_ext [N],Z_ext [N],surge velocity [m/s],depth [m]"
+
+
+def write_dives(folder: Path, rov: str) -> None:
+    (folder / "rov.toml").write_text(rov, encoding="utf-8")
     for n in (1, 2):
         d = dive(n)
-        header = "time [s],X_ext [N],Z_ext [N],surge velocity [m/s],depth [m]"
-        write(tmp_path / f"dive_{n}.csv", header, d.time, d.X, d.Z, d.u, d.z)
+        write(folder / f"dive_{n}.csv", HEADER, d.time, d.X, d.Z, d.u, d.z)
+
+
+def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
+    write_dives(tmp_path, ROV)
     found = identify(load_tests(tmp_path))
     vehicle = found.vehicle
     assert not vehicle.layout.thrusters
@@ -101,26 +110,39 @@ def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
         assert high - low < 0.5 * truth, name
     assert {result.verdict.word for result in found.axes} == {"good"}
     largest = max(abs(dive(n).X).max() for n in (1, 2))
-    facts = by_heading(found.findings)["Facts"]
-    assert any(
-        f"100% of a command is the largest of all logs: X_ext = {largest:.3g} N and Z_ext" in fact for fact in facts
-    )
+    told = f"100% of a command is the largest of all logs: X_ext = {largest:.3g} N and Z_ext"
+    assert any(told in fact for fact in by_heading(found.findings)["Facts"])
     write_vehicle(vehicle, tmp_path / "mixer.toml")
     again = load_vehicle(tmp_path / "mixer.toml")
     assert again.layout == vehicle.layout
+    assert again.layout.example(SURGE) == {"X_ext": 5.0}
     rate = again.derivatives(again.layout.usual_inputs | {"X_ext": 10.0}, again.layout.at_rest)["u"]
     assert rate == pytest.approx(10.0 / INERTIA["u"], rel=0.1)
-    built = build(again, tmp_path / "mixer.fmu", platforms=["host"])
-    assert "X_ext = 5 gives u = 0." in built.note
 
 
-def test_a_draft_of_topics_as_text_needs_one_edit(tmp_path: Path) -> None:
-    """The files are as `rostopic echo -p` writes them; the heading in them points up, and so does z."""
-    d = dive(1)
+def of_topics(folder: Path, d: Dive) -> None:
+    """Write topics as `rostopic echo -p` does, whose z points up, as does the heading."""
     none, stamp = np.zeros(len(d.time)), 1.7e18 + 1e9 * d.time
     part = "field.force.x,field.force.y,field.force.z,field.torque.x,field.torque.y,field.torque.z"
-    write(tmp_path / "wrench.csv", f"%time,{part}", stamp, d.X, none, -d.Z, none, none, none)
-    write(tmp_path / "state.csv", "%time,field.velocity.x,field.position.z", stamp, d.u, -d.z)
+    write(folder / "wrench.csv", f"%time,{part}", stamp, d.X, none, -d.Z, none, none, none)
+    write(folder / "state.csv", "%time,field.velocity.x,field.position.z", stamp, d.u, -d.z)
+
+
+def of_symbols(folder: Path, d: Dive) -> None:
+    write(folder / "dive.csv", "time,X_ext,Z_ext,N_ext,u,depth,r", d.time, d.X, d.Z, 0.1 * d.X, d.u, d.z, 0.1 * d.u)
+
+
+def of_columns(folder: Path, d: Dive) -> None:
+    write(folder / "dive.csv", HEADER, d.time, d.X, d.Z, d.u, d.z)
+
+
+@pytest.mark.parametrize(
+    ("write_log", "axes"), [(of_topics, "surge heave"), (of_symbols, "surge heave yaw"), (of_columns, "surge heave")]
+)
+def test_a_draft_of_a_wrench_needs_one_edit(write_log: Callable[[Path, Dive], None], axes: str, tmp_path: Path) -> None:
+    """Forces and velocities may have their symbols alone, or be topics as text."""
+    d = dive(1)
+    write_log(tmp_path, d)
     assert main(["identify", str(tmp_path), "--draft"]) == 0
     path = tmp_path / "rov.toml"
     draft = path.read_text(encoding="utf-8")
@@ -128,7 +150,7 @@ def test_a_draft_of_topics_as_text_needs_one_edit(tmp_path: Path) -> None:
     assert [line.partition(" ")[0] for line in lines] == ["m_rov", "I_r"]
     path.write_text(draft.replace('value = "?"', "value = 20.0"), encoding="utf-8")
     tests = load_tests(tmp_path)
-    assert tests.tested.logs == ["surge", "heave"]
+    assert tests.tested.logs == axes.split()
     (log,) = tests.folder.logs
     assert log.commands
     places = [log.commands.thrusters.index(name) for name in ("X_ext", "Z_ext")]
@@ -156,23 +178,6 @@ def test_a_wrench_in_a_bag_is_turned_into_the_body_frame(tmp_path: Path, frame: 
     assert pytest.approx(d.Z / abs(d.Z).max(), abs=1e-6) == Z
 
 
-def test_logs_without_a_wrench_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    d = dive(1)
-    (tmp_path / "rov.toml").write_text(ROV, encoding="utf-8")
-    write(tmp_path / "dive.csv", "time [s],u_1 [%],surge velocity [m/s]", d.time, d.X, d.u)
-    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    place = f"rov-fmu: {tmp_path / 'dive.csv'}, line 1: there is no column of commands. Possible columns: "
-    assert line.startswith(f"{place}X_ext, Y_ext, Z_ext, K_ext, M_ext, N_ext, in [N] or [N.m]")
-
-
-def test_forces_on_a_vehicle_with_thrusters_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_dives(tmp_path, MIX.replace("wrench = true", ""))
-    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
-    line = capsys.readouterr().err.splitlines()[0]
-    assert "X_ext [N]' and 'Z_ext [N]' are forces on the body, if wrench = true stands in [logs]" in line
-
-
 TOE, TILT = 0.6, 0.2
 """The angles of the rear thrusters to the bow, and of the vertical one to straight down, rad."""
 QUADRATIC_THRUST, LINEAR_THRUST = 40.0, 8.0
@@ -181,35 +186,15 @@ CURVE = """[curves.all]
 a_t = { value = 40.0, unit = "N", source = "Bollard pull" }
 b_t = { value = 8.0, unit = "N", source = "Bollard pull" }
 """
-MIX = (
-    ROV.replace("[axes.surge]", "")
-    + f"""
-[logs]
-wrench = true
-
-{CURVE}
-"""
-)
+MIX = ROV.replace("[axes.surge]", "") + f"\n[logs]\nwrench = true\n\n{CURVE}\n"
 for name, direction in {
     "l": (np.cos(TOE), np.sin(TOE), 0.0),
     "r": (np.cos(TOE), -np.sin(TOE), 0.0),
     "t": (np.sin(TILT), 0.0, np.cos(TILT)),
 }.items():
-    MIX += f"""
-[[thruster]]
-name = "{name}"
-curve = "all"
-direction = {{ value = [{", ".join(f"{x:.17g}" for x in direction)}], source = "CAD" }}
-"""
+    value = ", ".join(f"{x:.17g}" for x in direction)
+    MIX += f'\n[[thruster]]\nname = "{name}"\ncurve = "all"\ndirection = {{ value = [{value}], source = "CAD" }}\n'
 MIX += "[axes.surge]\n"
-
-
-def write_dives(folder: Path, rov: str = MIX) -> None:
-    (folder / "rov.toml").write_text(rov, encoding="utf-8")
-    for n in (1, 2):
-        d = dive(n)
-        header = "time [s],X_ext [N],Z_ext [N],surge velocity [m/s],depth [m]"
-        write(folder / f"dive_{n}.csv", header, d.time, d.X, d.Z, d.u, d.z)
 
 
 def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
@@ -217,7 +202,7 @@ def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
 
     So are the steady velocities that the result tells, whose commands are those of the thrusters.
     """
-    write_dives(tmp_path)
+    write_dives(tmp_path, MIX)
     found = identify(load_tests(tmp_path))
     assert not {"beyond thrusters", "saturation"} & {finding.kind for finding in findings_of(found)}
     (wrench,) = (finding for finding in found.findings if finding.kind == "wrench")
@@ -262,52 +247,56 @@ def test_weak_thrusters_are_told_and_their_forces_are_those_of_loads(
     assert pushed == pytest.approx(loaded, rel=1e-12)
 
 
-def test_a_moment_that_no_thruster_gives_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Weight may right a vehicle in pitch, but the logs command a moment, which no thruster gives."""
-    position = 'position = { value = [0, 0, 0], unit = "m", source = "CAD" }'
-    rov = MIX.replace(_CAD, f"{_CAD}\n{position}").replace("[body]", f"[body]\n{PITCHING}") + "[axes.pitch]\n"
-    (tmp_path / "rov.toml").write_text(rov, encoding="utf-8")
-    d = dive(1)
-    header = "time [s],X_ext [N],Z_ext [N],M_ext [N.m],surge velocity [m/s],depth [m],pitch [rad]"
-    write(tmp_path / "dive_1.csv", header, d.time, d.X, d.Z, 0.1 * d.X, d.u, d.z, 0.1 * np.sin(d.time))
-    assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
-    reason = "no thruster turns the vehicle: give one a position beside the line of its force, or remove this table"
-    assert f"{tmp_path / 'rov.toml'}: axes.pitch: {reason}" in capsys.readouterr().err
-
-
-LOSS = 'd = { value = 1.0, unit = "N.s/m", source = "Towed" }\n'
 _CAD = 'source = "CAD" }'
-PITCHING = """I_q = { value = 1.0, unit = "kg.m2", source = "CAD" }
+_UP = 'direction = { value = [0.19866933079506122, 0, 0.98006657784124163], source = "CAD" }'
+_LOSS = 'd = { value = 1, unit = "N.s/m", source = "" }'
+PITCHING = """[body]
+I_q = { value = 1.0, unit = "kg.m2", source = "CAD" }
 W = { value = 196.2, unit = "N", source = "Weighed" }
 B = { value = 196.2, unit = "N", source = "Weighed" }
-z_B = { value = -0.05, unit = "m", source = "CAD" }
-"""
-_UP = 'direction = { value = [0.19866933079506122, 0, 0.98006657784124163], source = "CAD" }'
+z_B = { value = -0.05, unit = "m", source = "CAD" }"""
+MOMENT = {
+    _CAD: f'{_CAD}\nposition = {{ value = [0, 0, 0], unit = "m", source = "CAD" }}',
+    "[body]": PITCHING,
+    "[axes.surge]": "[axes.pitch]\n[axes.surge]",
+}
+"""Weight may right a vehicle in pitch, but the logs command a moment, which no thruster gives."""
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "line"),
+    ("changes", "header", "line"),
     [
-        (_UP, _UP.replace("0.98006657784124163", "0"), "rov.toml: axes.heave: no thruster drives it: give one a dir"),
-        (CURVE, "[curves.all]\n", "rov.toml: curves.all.a_t: this key is missing"),
-        ('curve = "all"', 'curve = "al"', "rov.toml: thruster.l.curve = 'al': there is no such curve, only all"),
-        ("[logs]", "[inputs]\nahead = { q = 1 }\n[logs]", "rov.toml: inputs.ahead.q: there is no such thruster"),
+        ({_UP: _UP.replace("0.98006657784124163", "0")}, HEADER, "axes.heave: no thruster drives it: give one a dir"),
+        ({CURVE: "[curves.all]\n"}, HEADER, "curves.all.a_t: this key is missing"),
+        ({'curve = "all"': 'curve = "al"'}, HEADER, "thruster.l.curve = 'al': there is no such curve, only all"),
+        ({"[logs]": "[inputs]\nahead = { q = 1 }\n[logs]"}, HEADER, "inputs.ahead.q: there is no such thruster"),
+        ({CURVE: f"{CURVE}{_LOSS}\n"}, HEADER, "curves.all.d"),
+        ({"[vehicle]": 'base = "bluerov2"\n[vehicle]'}, HEADER, "logs.wrench = True: is not allowed with base"),
         (
-            'source = "Bollard pull" }\n\n',
-            'source = "" }\nd = { value = 1, unit = "N.s/m", source = "" }\n\n',
-            "curves.all.d",
+            MOMENT,
+            "time [s],X_ext [N],M_ext [N.m],surge velocity [m/s],pitch [rad]",
+            "axes.pitch: no thruster turns the vehicle: give one a position beside the line of its force, or remove",
         ),
         (
-            "[vehicle]",
-            'base = "bluerov2"\n[vehicle]',
-            "rov.toml: logs.wrench = True: is not allowed with base",
+            {"wrench = true": ""},
+            HEADER,
+            "'X_ext [N]' and 'Z_ext [N]' are forces on the body, if wrench = true stands in [logs]",
+        ),
+        (
+            {MIX: ROV},
+            HEADER.replace("X_ext [N],Z_ext [N]", "u_1 [%],x"),
+            "there is no column of commands. Possible columns: X_ext, Y_ext, Z_ext, K_ext, M_ext, N_ext, in [N] or [N",
         ),
     ],
 )
-def test_thrusters_that_cannot_give_the_wrench_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, line: str
+def test_what_cannot_give_a_wrench_is_refused(
+    changes: Mapping[str, str], header: str, line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert old in MIX
-    write_dives(tmp_path, MIX.replace(old, new))
+    rov, d = MIX, dive(1)
+    for old, new in changes.items():
+        assert old in rov
+        rov = rov.replace(old, new)
+    (tmp_path / "rov.toml").write_text(rov, encoding="utf-8")
+    write(tmp_path / "dive.csv", header, d.time, d.X, d.Z, d.u, d.z)
     assert main(["identify", str(tmp_path), "-o", str(tmp_path / "out.toml")]) == 2
     assert line in capsys.readouterr().err

@@ -13,8 +13,9 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
 from tests.folders import rows_of
-from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log, used
-from tests.tank.readers import motion, test_bags, test_mavlink, test_ulog
+from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log
+from tests.tank.readers import motion
+from tests.tank.readers.good_logs import SUFFIXES, good_log
 from tests.tank.readers.motion import BLUEROV2, TIME
 from tests.tank.test_several_files import ROV, table
 
@@ -36,33 +37,14 @@ def dive(path: Path) -> Path:
 # ---- Formats ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["tlog", "bin", "ulg", "bag", "mcap", "csv", "mat"])
-def test_a_log_is_read_under_any_name(kind: str, tmp_path: Path) -> None:
-    if kind == "tlog":
-        path = test_mavlink.tlog(tmp_path / "a", test_mavlink.dive())
-    elif kind == "bin":
-        path = test_mavlink.dataflash(tmp_path / "a", test_mavlink.turn())
-    elif kind == "ulg":
-        path = test_ulog.dive().write(tmp_path / "a")
-    elif kind in ("bag", "mcap"):
-        ros = test_bags.Ros(1 if kind == "bag" else 2)
-        (tmp_path / "ros").mkdir()
-        path = ros.write(tmp_path / "ros", test_bags.dive(ros), f".{kind}")
-    elif kind == "csv":
-        path = dive(tmp_path / "a")
-    else:
-        path = tmp_path / "a.mat"
-        titles = {f"u{n}": values for n, values in enumerate(motion.THRUSTERS.values())}
-        savemat(path, {"time": TIME, "z": motion.DEPTH, **titles})
+@pytest.mark.parametrize("suffix", [*SUFFIXES, ".csv"])
+def test_a_log_is_read_under_any_name(suffix: str, tmp_path: Path) -> None:
+    path = dive(tmp_path / "a") if suffix == ".csv" else good_log(suffix, tmp_path)
     other = tmp_path / "any.log"
     shutil.copy(path, other)
+    assert axes(read_log(other, BLUEROV2).log)
     (one,) = inspect(other, [BLUEROV2])
-    assert one.commands or one.unread
-    if kind == "mat":
-        assert {"time", "z", "u0"} <= {*one.unread, *one.columns}
-        assert one.columns["time"] == "time [s]"
-    else:
-        assert axes(read_log(other, BLUEROV2).log)
+    assert one.commands
 
 
 def test_variables_of_matlab(tmp_path: Path) -> None:
@@ -71,6 +53,10 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
     savemat(tmp_path / "dive.mat", {"log": {"t": TIME, "pwm": pulses, "z": motion.DEPTH, "note": "a dive"}})
     columns = '[columns]\n"log.t" = "time [s]"\n"log.z" = "depth [m]"\n'
     columns += "".join(f'"log.pwm({n})" = "u_{n} [us]"\n' for n in range(1, 7))
+    (seen,) = inspect(Path(shutil.copy(tmp_path / "dive.mat", tmp_path / "any")), [BLUEROV2])
+    assert seen.columns["log.t"] == "time [s]"
+    assert seen.columns["log.pwm(1)"] == "u_1 [us]"
+    (tmp_path / "any").unlink()
     (one,) = load_tests(folder(tmp_path, columns)).folder.logs
     assert measured(one, "depth") == pytest.approx(motion.DEPTH)
     assert commanded(one, "6") == pytest.approx(motion.THRUSTERS["6"])
@@ -85,26 +71,6 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
     tests = load_tests(folder(tmp_path))
     assert [one.file for one in tests.folder.logs] == [name]
     assert not rows_of(tests, "thrust")
-
-
-def test_messages_of_rostopic_are_columns(tmp_path: Path) -> None:
-    """`rostopic echo -p` writes a row for each message, with `%time` in ns and the fields as columns."""
-    stamps = [f"{1_669_909_208_877_428_140 + 100_000_000 * n}" for n in range(len(TIME))]
-    titles = ",".join(["%time", "field.header.frame_id", *(f"field.data{n}" for n in range(6)), "field.position.z"])
-    pulses = np.column_stack([1500.0 + 400.0 * c for c in motion.THRUSTERS.values()])
-    rows = [
-        ",".join([stamp, "map", *(f"{pulse:.0f}" for pulse in row), f"{-depth:.4f}"])
-        for stamp, row, depth in zip(stamps, pulses, motion.DEPTH, strict=True)
-    ]
-    (tmp_path / "rov.csv").write_text("\n".join([titles, *rows]), encoding="utf-8")
-    (one,) = inspect(tmp_path / "rov.csv", [BLUEROV2])
-    assert "%time" not in one.unread
-    columns = '[columns]\n"field.position.z" = "-depth [m]"\n'
-    columns += "".join(f'"field.data{n}" = "u_{n + 1} [us]"\n' for n in range(6))
-    (log_of,) = load_tests(folder(tmp_path, columns)).folder.logs
-    depth = used(log_of, "depth")
-    assert depth.values == pytest.approx(motion.DEPTH, abs=1e-4)
-    assert depth.time[-1] - depth.time[0] == pytest.approx(9.9, abs=1e-5)
 
 
 # ---- Tables and vehicles ---------------------------------------------------------------------------------------------

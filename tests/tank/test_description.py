@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import HEAVE, SWAY
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
@@ -24,7 +24,6 @@ from tests.folders import (
     FORCE,
     HEAD,
     MASS,
-    RATE,
     SPEED,
     TOP,
     VECTORED,
@@ -135,27 +134,6 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
 # ---- Hardware tables -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
-def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
-    tables = {"thrust_t200.csv": pulled(30.0, 20.0)}
-    known = {"m_rov": 6.57, "I_r": 0.105, "m_a_v": 7.1, "a_t_t200": 30.0, "b_t_t200": 20.0}
-    drag = {"a_d_u": 18.0, "b_d_u": 4.0, "a_d_v": 22.0, "b_d_v": 6.0, "a_d_r": 1.5, "b_d_r": 0.1}
-    placeholders = {f"steady_{name}.csv": f"{SPEED}\n0.1,0.1\n" for name in ("surge", "sway")}
-    placeholders["steady_yaw.csv"] = f"{RATE}\n0.1,0.1\n"
-    layout = read(tmp_path / "all", VECTORED, tables | placeholders).given.vehicle.layout
-    true = Vehicle(layout, dict.fromkeys(layout.coefficients, 1.0) | known | drag)
-    for axis in (SURGE, SWAY, YAW):
-        tables |= responses(true, axis)
-    found = identify(read(tmp_path / "tests", VECTORED, tables))
-    assert [*found.vehicle.layout.kinds] == ["surge", "sway", "yaw"]
-    for name, value in (known | drag | {"beta_u": 1.0, "beta_v": 1.0, "beta_r": 1.0}).items():
-        assert found.vehicle[name] == pytest.approx(value, rel=0.02), name
-    assert found.vehicle.sources["m_a_v"] == "a strip"
-    assert sources_by_name(found.vehicle)["3"] == {"direction": "drawn: 3", "position": "drawn too"}
-    assert found.vehicle.layout.signs(SWAY) == {"u_1": 1.0, "u_2": -1.0, "u_3": 1.0, "u_4": -1.0}
-    read_again(found, tmp_path / "mine.toml")
-
-
 def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) -> None:
     """The directions of two thrusters are opposite, so with equal commands they do not push along the axis."""
     rov = VECTORED + "".join(
@@ -200,16 +178,6 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     found = identify(tests)
     assert found.vehicle["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
     read_again(found, tmp_path / "mine.toml")
-
-
-def test_any_coefficient_may_be_known(tmp_path: Path) -> None:
-    more = (
-        'm_a_w = { value = 3.0, unit = "kg", source = "a sphere" }\nT_top = { value = 0.1, unit = "s", source = "s" }\n'
-    )
-    given = read(tmp_path, f"{HEAD}[known]\n{MASS}{TOP}{more}", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
-    assert given.vehicle.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
-    assert given.vehicle.layout.curves[0].has_lag
-    assert (given.vehicle["m_a_w"], given.known["m_a_w"].source) == (3.0, "a sphere")
 
 
 @pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",)), ("[]", ())])

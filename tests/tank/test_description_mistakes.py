@@ -1,6 +1,6 @@
 """Mistakes in rov.toml and in the files of tests: all of them are reported at once, with a line each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -106,11 +106,6 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         {"thrust_t200.csv": pulled(1.0, 1.0), "steady_yaw.csv": f"{RATE}\n0.3,0.2\n"},
         "/rov.toml: thruster.1.position: this key, or arm, is missing, and the vehicle has yaw",
     ),
-    (
-        DOWN,
-        WITH_THRUST | {"steady_surge.csv": f"{SPEED}\n0.3,0.2\n"},
-        "/steady_surge.csv: no thruster of the vehicle drives surge",
-    ),
     (DOWN, HEAVE_ALONE, ": no thrust_t200*.csv, and [known] in rov.toml does not give a_t_t200"),
     (DOWN, {"thrust_t200.csv": pulled(30.0, 20.0)}, ": no axis is tested: there is no steady_, time_co"),
     (
@@ -123,7 +118,6 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         {"thrust_t200.csv": pulled(30.0, 20.0), "time_constant_heave.csv": f"{TAU}\n0.3,2\n"},
         ": no steady_heave*.csv or log of heave that counts, and [known] in rov.toml does not give a_d_w, b_d_w",
     ),
-    (DOWN, {"steadyheave.csv": f"{SPEED}\n0.3,0.2\n"}, "/steadyheave.csv: neither a log, which has"),
     (
         DOWN + PLACE.format(0.1, 0.0),
         {"a.csv": "day\nMonday\n"},
@@ -155,7 +149,6 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         HEAVE_ALONE,
         "/rov.toml: windows.thrust_rear: there is no such key, only thrust_t200, surge, sway, heave, roll, pitch, yaw",
     ),
-    (f"{BLUEROV2}[windows]\nheave = [0.2, 0.5, 0.7]\n", HEAVE_ALONE, "/rov.toml: windows.heave"),
     (f"{BLUEROV2}[windows]\nheave = [20, 70]\n", HEAVE_ALONE, "/rov.toml: windows.heave = [20, 70]: must be [low"),
     (f"{BLUEROV2}[windows]\nheave = [0.7, 0.2]\n", HEAVE_ALONE, "/rov.toml: windows.heave = [0.7, 0.2]: must be ["),
     (f"{BLUEROV2}[windows\n", HEAVE_ALONE, "/rov.toml: not TOML"),
@@ -182,15 +175,16 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
 
 @pytest.mark.parametrize("case", range(len(WRONG)))
 def test_what_is_wrong_is_told(case: int, tmp_path: Path) -> None:
-    rov, tables, words = WRONG[case]
-    lines = words.split(" | ")
-    folder = folder_of(tmp_path / "tests", rov, tables or HEAVE_ALONE)
+    rov, tables, lines = WRONG[case]
+    check_refused(folder_of(tmp_path / "tests", rov, tables or HEAVE_ALONE), lines.split(" | "))
+
+
+def check_refused(folder: Path, starts: Sequence[str]) -> None:
+    """Check that the refusal of a folder has a line for each mistake, which begins with the folder and these words."""
     with pytest.raises(FileError) as caught:
         load_tests(folder)
-    told = str(caught.value).splitlines()
-    assert [line[: len(f"{folder}{start}")] for line, start in zip(told, lines, strict=True)] == [
-        f"{folder}{start}" for start in lines
-    ]
+    for line, start in zip(str(caught.value).splitlines(), starts, strict=True):
+        assert line.startswith(f"{folder}{start}")
 
 
 def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
@@ -204,9 +198,6 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
         "thrust_left.csv": f"{FORCE}\n0.3,0.2\n",
         "thrust_rear.csv": f"{FORCE}\n0.3,10\n-0.3,7\n",
     }
-    folder = folder_of(tmp_path / "tests", rov, tables)
-    with pytest.raises(FileError) as caught:
-        load_tests(folder)
     starts = [
         "/rov.toml: known.m_rov.unit = 'lb'",
         "/rov.toml: windows.sway",
@@ -222,10 +213,7 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
         "/rov.toml: known.gamma",
         ": no thrust_top*.csv",
     ]
-    lines = str(caught.value).splitlines()
-    assert [line[: len(str(folder)) + len(start)] for line, start in zip(lines, starts, strict=True)] == [
-        f"{folder}{start}" for start in starts
-    ]
+    check_refused(folder_of(tmp_path / "tests", rov, tables), starts)
 
 
 HEADERS = """[columns]
@@ -246,8 +234,6 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
         ("m_rov =", "m_rof =", "body.m_rof: there is no such key; did you mean m_rov?"),
         ("value = 6.57", 'value = "?"', "body.m_rov.value = '?': must be a number"),
         ('"kg"', '"lb"', "body.m_rov.unit = 'lb': must be 'kg'"),
-        ("[body]", "[boddy]", "boddy: there is no such key; did you mean body?"),
-        ('name = "Mine"', "name = Mine", "not TOML"),
         ('"force [N]"', '"force [lb]"', "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or"),
         ('"force [N]"', "5", "columns.Pull (N) = 5: must be text in quotes"),
         ("[columns]", "[column]", "column: there is no such key; did you mean columns?"),
@@ -256,11 +242,7 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
 def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, line: str, tmp_path: Path) -> None:
     """The headers are those that [columns] explains, although the vehicle cannot be used."""
     rov = DOWN.replace("[known]", "[body]") + HEADERS
-    folder = folder_of(tmp_path / "tests", rov.replace(old, new), FILES)
-    with pytest.raises(FileError) as caught:
-        load_tests(folder)
-    (told,) = str(caught.value).splitlines()
-    assert told.startswith(f"{folder}/rov.toml: {line}")
+    check_refused(folder_of(tmp_path / "tests", rov.replace(old, new), FILES), [f"/rov.toml: {line}"])
 
 
 def check_lines(text: str, folder: Path) -> None:

@@ -66,10 +66,6 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     )
 
 
-def test_a_log_without_fault_has_no_findings(tmp_path: Path) -> None:
-    assert not read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).findings
-
-
 def test_rows_in_no_order_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
         DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back and does not return"

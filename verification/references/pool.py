@@ -6,9 +6,9 @@ what a real dive has and a model may lack. Vehicles that roll and pitch are thos
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
-from math import copysign, cos, pi, sin
+from math import copysign, cos, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,10 @@ class Conditions:
     tilt: Tilt | None = None
     """The roll and pitch of a vehicle that has neither axis. Thrust and velocity tilt with the vehicle, its net weight
     F_0_w stays vertical. The products of its velocities with the rates of roll and pitch are left out."""
+    curves: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    """By curve: the steady thrust (N) of one thruster as a function of its command, where it is no polynomial."""
+    has_rotors: bool = False
+    """True if the speeds of the rotors lag behind, and thrust is proportional to their square. All have a lag."""
 
 
 NOTHING = Conditions()
@@ -196,7 +200,10 @@ class _Vehicle:
     def rates(self, command: Array) -> Rates:
         """Return the function that gives the derivatives of the state under held commands."""
         k, n, given = self.k, len(self.axes), self.conditions
-        steady = [_force(k, t, c) for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)]
+        steady = [
+            given.curves[t.curve](c) if t.curve in given.curves else _force(k, t, c)
+            for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)
+        ]
         lagging = [number for number, lag in enumerate(self.lags) if lag]
         immediate = self.arms @ np.array([0.0 if lag else F for F, lag in zip(steady, self.lags, strict=True)])
         pushes = immediate.tolist()
@@ -214,7 +221,10 @@ class _Vehicle:
             for axis, (a, b, a_reverse, b_reverse) in enumerate(self.drag):
                 speed = y[axis]
                 resistance = (a * speed + b) * speed if speed >= 0.0 else (-a_reverse * speed + b_reverse) * speed
-                force = thrust * pushes[axis] + load[axis] + sum(arm * y[at] for at, arm in lagging_arms[axis])
+                lagging_force = sum(
+                    arm * y[at] * (abs(y[at]) if given.has_rotors else 1.0) for at, arm in lagging_arms[axis]
+                )
+                force = thrust * pushes[axis] + load[axis] + lagging_force
                 found[axis] = (force - resistance) / self.inertia[axis]
             u, v, w, r = (y[at] if at >= 0 else 0.0 for at in (u_at, v_at, w_at, r_at))
             if k.layout.coupled:
@@ -225,7 +235,9 @@ class _Vehicle:
             found[n], found[n + 1], found[n + 2] = north + given.current[0], east + given.current[1], down
             found[n + 3] = (r + theta_rate * sin(phi)) / (cos(phi) * cos(theta))
             for number in lagging:
-                found[n + 4 + number] = (thrust * steady[number] - y[n + 4 + number]) / self.lags[number]
+                goal = thrust * steady[number]
+                goal = copysign(sqrt(abs(goal)), goal) if given.has_rotors else goal
+                found[n + 4 + number] = (goal - y[n + 4 + number]) / self.lags[number]
             return found
 
         return derivatives

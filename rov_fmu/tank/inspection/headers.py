@@ -30,6 +30,8 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
 _CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
 _LIKELY = {"depth": 100.0, "heading": 2.1 * pi, "roll angle": pi, "pitch angle": 0.5 * pi, "voltage": 1000.0}
 """The largest number that is likely in the SI unit. If a larger one has no unit, it is in a smaller unit."""
+_EXTERNAL = {axis.external.casefold(): axis for axis in AXES.values()}
+_VELOCITIES = {axis.velocity: f"{axis.name} velocity" for axis in AXES.values()}
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """The least time since 1970 that is in a unit."""
 
@@ -45,9 +47,13 @@ class TableHeaders:
 
 
 def header_parts(title: str) -> tuple[str, str]:
-    """Return the name and the unit in a header with brackets of any kind."""
+    """Return the name and the unit in a header with brackets of any kind.
+
+    A number in round brackets right behind the name is that of a column of a matrix, such as `pwm(1)`.
+    """
     match = _HEADER.fullmatch(title)
-    return (match["name"].rstrip(), match["unit"]) if match else (title, "")
+    has_unit = match and not re.fullmatch(r".*\S\(\d+\)", title)
+    return (match["name"].rstrip(), match["unit"]) if match and has_unit else (title, "")
 
 
 def axis_in_name(path: Path) -> Axis | None:
@@ -87,16 +93,15 @@ def guessed(
     commanding = _commanding(meant, numbers)
     names = _names(commanding)
     forces = {title: force for title in commanding if (force := _force(title))}
-    if forces:
-        wrench = {title: f"{axis.external} [{axis.load}]" for title, axis in forces.items()}
-        others = {title: name for title, name in meant.items() if title not in forces}
-        measured = _measured(others, numbers, is_up=_is_up(meant, numbers))
-        return Layout.of_wrench(map(VehicleAxis, AXES.values())), wrench | measured
-    layout = fitting(names, layouts) or layout_of(names)
+    if forces:  # beside them, a velocity may have its symbol alone
+        layout = Layout.of_wrench(map(VehicleAxis, AXES.values()))
+        meant = {title: name or _VELOCITIES.get(header_parts(title)[0], "") for title, name in meant.items()}
+    else:
+        layout = fitting(names, layouts) or layout_of(names)
     known = [thruster.name for thruster in layout.thrusters]
     is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
-    columns: dict[str, str] = {}
-    if not all(map(is_column, commanding)):
+    columns = {title: f"{of.external} [{of.load}]" for title, of in forces.items() if not is_column(title)}
+    if not forces and not all(map(is_column, commanding)):
         for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):
             columns[title] = f"u_{name} [{_unit_of_command(title, numbers[title])}]"
     others = {title: name for title, name in meant.items() if title not in commanding and not is_column(title)}
@@ -200,7 +205,12 @@ def _unit(title: str, name: str, numbers: Array) -> str:
 
 
 def _force(title: str) -> Axis | None:
-    """Return the axis of a component of a wrench, a force or torque that is applied; None for another header."""
+    """Return the axis of a component of a wrench, a force or torque that is applied; None for another header.
+
+    It has a symbol, such as `X_ext`, or names a force or a torque and its direction.
+    """
+    if axis := _EXTERNAL.get(header_parts(title)[0].casefold()):
+        return axis
     match = re.search(rf"\b({FORCE}|{TORQUE})\b.* ([xyz])$", _words(title))
     if not match:
         return None

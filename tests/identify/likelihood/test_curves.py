@@ -40,24 +40,6 @@ def test_a_warped_command_has_its_sign_and_is_whole_at_the_ends(seed: int) -> No
     assert np.abs(warped / np.where(COMMANDS, COMMANDS, 1.0) - 1.0).max() > 0.01
 
 
-def deviations(shape: Shapes, *commands: float) -> list[float]:
-    """Return eta at some commands of the rear curve, which has no dead band."""
-    warped = shape.commands("rear", np.array(commands)).tolist()
-    return [acting / c - 1.0 for acting, c in zip(warped, commands, strict=True)]
-
-
-def test_the_deviation_is_smooth_and_constant_below_the_knots() -> None:
-    """eta and its slope have no jump at a knot; at the outer ones its curvature is 0."""
-    shape, h = drawn(1), 1e-4
-    for knot in KNOTS[1:]:
-        below, at, above = deviations(shape, knot - h, knot, knot + h)
-        assert at - below == pytest.approx(above - at, abs=1e-3 * h)
-    first, second, third = deviations(shape, KNOTS[0], KNOTS[0] + h, KNOTS[0] + 2.0 * h)
-    assert third - 2.0 * second + first == pytest.approx(0.0, abs=1e-2 * h**2 + 1e-11)
-    assert deviations(shape, 0.01, 0.05) == pytest.approx([first, first])
-    assert deviations(shape, -0.3) != pytest.approx(deviations(shape, 0.3))
-
-
 def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
     """The thrust of another maker's propeller, 51.5 N ((c - 0.06) / 0.94)^1.45, from the curve of the BlueROV2."""
     k = load_vehicle(SHIPPED["bluerov2"])
@@ -98,28 +80,6 @@ def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:
     assert spread[:4] == pytest.approx(0.1 * np.sqrt(1.0 - to_full**2), rel=0.05)
     assert correlation[0, 1] == pytest.approx(np.exp(-0.5 * (0.15 / 0.3) ** 2), abs=0.03)
     assert correlation[0, 4] == pytest.approx(0.5, abs=0.05)
-
-
-def test_force_and_motion_are_those_of_the_warped_command() -> None:
-    shape = drawn(3)
-    for command in (0.3, -0.3):
-        (acting,) = shape.commands("rear", np.array([command])).tolist()
-        assert shape.force(VIDEORAY, REAR, command) == pytest.approx(2.0 * VIDEORAY.curve_force(REAR, acting))
-        assert shape.motion(VIDEORAY, SURGE, command).steady_velocity() == pytest.approx(
-            VIDEORAY.response(SURGE, acting)[0]
-        )
-        assert shape.motion(VIDEORAY, HEAVE, command).steady_velocity() == VIDEORAY.response(HEAVE, command)[0]
-
-
-def test_inputs_have_the_commands_of_their_thrusters() -> None:
-    names = [*VIDEORAY.layout.inputs]
-    rows = np.random.default_rng(4).uniform(-1.0, 1.0, (5, len(names)))
-    shape = drawn(4)
-    found = shape.inputs(VIDEORAY.layout, rows)
-    for place, name in enumerate(names):
-        expected = shape.commands("rear", rows[:, place]) if name in ("u_l", "u_r") else rows[:, place]
-        assert found[:, place].tolist() == expected.tolist()
-    assert NO_SHAPES.inputs(VIDEORAY.layout, rows) is rows
 
 
 # ---- The curve in the file -------------------------------------------------------------------------------------------

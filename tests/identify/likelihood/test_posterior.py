@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.stats import multivariate_normal, norm, t
+from scipy.stats import multivariate_normal, t
 
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
-from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, number
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
 from rov_fmu.tank.arrays import Array
 from tests.vehicles import VIDEORAY
 
@@ -32,21 +31,6 @@ def conjugate(parameters: Sequence[Parameter], A: Array, y: Array, noise: float)
     M = A.T @ A / noise**2 + weight
     z = np.linalg.solve(M, A.T @ y / noise**2 + weight @ np.array([p.mean for p in parameters]))
     return Posterior.of(table(*parameters), z, 2.0 * M)
-
-
-@pytest.mark.parametrize("true", [0.0, 0.03, 0.2])
-def test_the_evidence_of_one_number_is_that_of_an_integral(true: float) -> None:
-    noise = 0.04
-    y = true + noise * np.random.default_rng(1).standard_normal(12)
-    posterior = conjugate([LOAD], np.ones((12, 1)), y, noise)
-
-    def likelihood(z: float) -> float:
-        return float(np.prod(norm.pdf(y, z, noise)) * 1e-10)
-
-    whole, _ = quad(
-        lambda z: likelihood(z) * norm.pdf(z, LOAD.mean, LOAD.deviation), -1.0, 1.0, points=[0.0, true], epsrel=1e-10
-    )
-    assert posterior.evidence(0) == pytest.approx(2.0 * np.log(whole / likelihood(0.0)), rel=1e-6)
 
 
 @pytest.mark.parametrize("true", [0.0, 0.15])
@@ -73,14 +57,6 @@ def posterior_of(*parameters: Parameter, seed: int = 3) -> Posterior:
     s = 0.5 * np.array([p.deviation for p in parameters]) / np.sqrt(np.diag(C))
     z = np.array([p.mean for p in parameters]) + 0.1 * s
     return Posterior(table(*parameters), z, C * np.outer(s, s))
-
-
-def test_the_posterior_is_the_inverse_of_the_information() -> None:
-    """J is twice the negative logarithm of the posterior, so its second derivatives are twice the inverse."""
-    C = posterior_of(LOAD, INERTIA, LINEAR).covariance
-    found = Posterior.of(table(LOAD, INERTIA, LINEAR), np.zeros(3), np.asarray(2.0 * np.linalg.inv(C), float))
-    assert found.covariance == pytest.approx(C)
-    assert found.errors == pytest.approx(np.sqrt(np.diag(C)))
 
 
 def test_without_an_effect_the_others_have_their_conditional_means() -> None:
@@ -145,8 +121,3 @@ def test_intervals_are_those_of_student() -> None:
     assert 0.0 < low < 3.0
     assert low * high == pytest.approx(9.0), "of a positive number, the logarithm has the symmetric distribution"
     assert np.isfinite(around(1e-9, 1e9, positive=True)).all()
-
-
-def test_a_coordinate_stands_for_a_number() -> None:
-    assert number(INERTIA, 0.0) == 1.0
-    assert number(LOAD, -0.1) == -0.1

@@ -9,7 +9,6 @@ from rov_fmu.identify.likelihood.records import driven_axes, recorded
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.log import Channel, Log
-from rov_fmu.tank.quality import unwrapped
 from tests.tank.logs import channel, commands, log
 from tests.vehicles import VIDEORAY
 
@@ -99,17 +98,3 @@ def test_the_channels_of_an_axis_that_is_not_pushed_still_tell_how_the_vehicle_m
     one = recorded(dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)), VIDEORAY.layout)
     assert one
     assert [sensor.axis.name for sensor in one.record.sensors] == ["surge", "heave", "yaw"]
-
-
-@pytest.mark.parametrize("turn", [2.0 * np.pi, 0.0], ids=["of a compass", "continuous"])
-def test_a_heading_is_unwrapped_as_an_inspection_does(turn: float) -> None:
-    """A continuous heading stays as it is, although it turns by more than half a turn in a gap."""
-    there = (TIME < 8.0) | (TIME > 13.0)
-    heading = 0.7 * TIME[there]
-    compass = channel("heading", TIME[there], heading % turn if turn else heading)
-    one = recorded(dive(STEP, -STEP, STEP, compass), VIDEORAY.layout)
-    assert one
-    (measured,) = one.measured
-    assert (measured.channel.values == unwrapped(compass)).all()
-    assert np.abs(np.diff(measured.channel.values)).max() < (np.pi if turn else 4.0)
-    assert (measured.channel.values == heading).all() == (not turn)

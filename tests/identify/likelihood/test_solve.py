@@ -23,9 +23,8 @@ class Small(Objective):
         mean: Array,
         deviation: float = 1.0,
         low: float = -np.inf,
-        noise: Sequence[int] = (),
     ) -> None:
-        parameters = tuple(Parameter("number", str(n), of_motion=n not in noise) for n in range(len(mean)))
+        parameters = tuple(Parameter("number", str(n)) for n in range(len(mean)))
         self.table = Table(VIDEORAY.layout, {}, {}, parameters)
         self.mean, self.deviation = mean, np.full(len(mean), deviation)
         self.low, self.high = np.full(len(mean), low), np.full(len(mean), np.inf)
@@ -93,13 +92,6 @@ def test_bounds_hold_and_the_others_move_on() -> None:
     assert (found.z > -0.1 - 1e-12).all()
     assert found.z[[1, 3]] == pytest.approx([-0.1, -0.1], abs=1e-12)
     least(found, 2.0 * bounded.cost)
-
-
-def test_without_noise_its_parameters_keep_their_value() -> None:
-    found = minimise(Small(linear, np.zeros(4), WIDE, noise=(0, 3)), np.zeros(4), with_noise=False)
-    assert found.z[[0, 3]].tolist() == [0.0, 0.0]
-    M = A[:, 1:3].T @ A[:, 1:3] + np.eye(2) / WIDE**2
-    assert found.z[1:3] == pytest.approx(np.linalg.solve(M, A[:, 1:3].T @ Y), abs=0.05)
 
 
 TIME = np.linspace(0.0, 3.0, 80)

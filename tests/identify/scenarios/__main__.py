@@ -4,6 +4,7 @@ A name is that of a scenario or a part of it; without any, all scenarios are run
 """
 
 from collections.abc import Sequence
+from math import nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -25,8 +26,7 @@ _HEADER = (
 @click.argument("names", nargs=-1)
 @click.option("--seeds", default=2, show_default=True, help="The number of seeds.")
 @click.option("--csv", "table", type=click.Path(path_type=Path), help="Write the numbers of all seeds to this file.")
-@click.option("--verbose", is_flag=True, help="Print every estimate, effect, cause and verdict.")
-def main(names: tuple[str, ...], seeds: int, table: Path | None, verbose: bool) -> None:
+def main(names: tuple[str, ...], seeds: int, table: Path | None) -> None:
     """Run the scenarios whose names contain one of the words; a whole name runs that scenario alone."""
     chosen = {
         name: scenario
@@ -41,8 +41,6 @@ def main(names: tuple[str, ...], seeds: int, table: Path | None, verbose: bool) 
         with TemporaryDirectory() as folder:
             outcomes = [outcome(scenario, seed, Path(folder) / str(seed)) for seed in range(seeds)]
         click.echo(line(name, outcomes, scenario.expected, ratios_to_gate(name, outcomes, gate)))
-        if verbose:
-            click.echo("\n".join(f"    seed {seed}: {text}" for seed, o in enumerate(outcomes) for text in details(o)))
         all_promises += [(name, promise) for promise in promises(name, outcomes, scenario.expected, gate)]
         all_rows += [row for n, o in enumerate(outcomes) for row in rows(name, n, o, scenario.expected.effects)]
         if table:  # after each scenario, so that a long run may be stopped
@@ -56,33 +54,15 @@ def line(name: str, outcomes: Sequence[Outcome], expected: Expected, ratios: dic
     estimates = [e for o in outcomes for e in o.estimates]
     means = [float(np.mean([e.error for e in some])) for some in by_number(outcomes).values() if some[0].truth]
     bands = [band.coverage for o in outcomes for band in o.bands]
-    nothing = float("nan")
     return (
         f"{name:40} {f'{sum(e.covered for e in estimates)}/{len(estimates)}':>9} "
-        f"{100.0 * max(means, key=abs, default=nothing):+6.1f}% {max(ratios.values(), default=nothing):6.2f} "
-        f"{100.0 * float(np.mean(bands)) if bands else nothing:5.0f}% "
-        f"{max(band_widths(outcomes).values(), default=nothing):6.2f} "
+        f"{100.0 * max(means, key=abs, default=nan):+6.1f}% {max(ratios.values(), default=nan):6.2f} "
+        f"{100.0 * float(np.mean(bands)) if bands else nan:5.0f}% "
+        f"{max(band_widths(outcomes).values(), default=nan):6.2f} "
         f"{sum(bool(o.false_effects(expected.effects)) for o in outcomes):5} {sum(bool(o.alarms) for o in outcomes):6} "
         f"{sum(bool(o.unusable) for o in outcomes):8} {sum(bool(o.error) for o in outcomes):7} "
         f"{float(np.mean([o.seconds for o in outcomes])):6.1f}"
     )
-
-
-def details(found: Outcome) -> list[str]:
-    """Return a line for every estimate, effect, disturbance, verdict, band and refusal."""
-    lines = found.error.splitlines()
-    for e in found.estimates:
-        low, high = e.interval or (float("nan"), float("nan"))
-        mark = "" if e.covered else "  not covered"
-        lines.append(f"{e.axis} {e.quantity} {e.value:.4g} ({low:.4g} to {high:.4g}), {e.truth:.4g}{mark}")
-    lines += [f"effect: {kind} of {of} {value:.3g}" for kind, of, value in found.effects]
-    lines += [f"disturbance: {axis}, {cause or 'unknown'}" for axis, cause in found.disturbances]
-    lines += [f"verdict: {axis} {word}" for axis, word in found.verdicts.items()]
-    lines += [
-        f"band: {b.axis} {b.quantity} {b.coverage:.0%}, RMS {b.error**0.5:.3g}, claimed {b.claimed**0.5:.3g}"
-        for b in found.bands
-    ]
-    return lines
 
 
 if __name__ == "__main__":

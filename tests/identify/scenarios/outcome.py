@@ -5,7 +5,7 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from pathlib import Path
 
 import numpy as np
@@ -18,20 +18,6 @@ from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, steady_n
 
 GATE = Path(__file__).with_name("gate.csv")
 """The outcomes of the identification before this one, which the widths of intervals are compared with."""
-FIELDS = (
-    "scenario",
-    "seed",
-    "axis",
-    "quantity",
-    "covered",
-    "error",
-    "width",
-    "alarms",
-    "false_effects",
-    "causes",
-    "cpu",
-)
-"""The columns of a table of outcomes. A row without a quantity is about a whole identification."""
 _POSSIBLE = {
     "lag": (0.0, 2.0),
     "dead time": (0.0, 1.0),
@@ -66,12 +52,12 @@ class Estimate:
     @property
     def error(self) -> float:
         """The relative error; NaN where the truth is 0."""
-        return self.value / self.truth - 1.0 if self.truth else float("nan")
+        return self.value / self.truth - 1.0 if self.truth else nan
 
     @property
     def width(self) -> float:
         """The width of the interval; NaN without one."""
-        return self.interval[1] - self.interval[0] if self.interval else float("nan")
+        return self.interval[1] - self.interval[0] if self.interval else nan
 
 
 @dataclass(frozen=True)
@@ -118,10 +104,11 @@ class Outcome:
     @property
     def impossible(self) -> tuple[str, ...]:
         """The effects whose value no vehicle has."""
+        limits = [_POSSIBLE.get(kind, (-inf, inf)) for kind, _, _ in self.effects]
         return tuple(
             f"{kind} of {of or 'the vehicle'} {value:.3g}"
-            for kind, of, value in self.effects
-            if not _POSSIBLE.get(kind, (-inf, inf))[0] <= value <= _POSSIBLE.get(kind, (-inf, inf))[1]
+            for (kind, of, value), (low, high) in zip(self.effects, limits, strict=True)
+            if not low <= value <= high
         )
 
     def false_effects(self, true: Sequence[str]) -> tuple[str, ...]:
@@ -187,7 +174,7 @@ def _estimates(result: Identification, truths: Truths) -> Iterator[Estimate]:
         found |= {("", k.name): (k.value, k.interval, k.narrowed) for k in known}
     for key, truth in truths.items():
         if key in found or not key[1].startswith("V_ss -"):
-            value, interval, narrowed = found.get(key, (float("nan"), None, 1.0))
+            value, interval, narrowed = found.get(key, (nan, None, 1.0))
             yield Estimate(*key, value, interval, truth, narrowed)
 
 
@@ -225,9 +212,10 @@ def rows(name: str, seed: int, found: Outcome, true_effects: Sequence[str]) -> I
 
 
 def write_rows(path: Path, table: Sequence[Row]) -> None:
-    """Write a table of outcomes."""
+    """Write a table of outcomes. A row without a quantity is about a whole identification."""
+    fields = dict.fromkeys(field for row in table for field in row)
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
+        writer = csv.DictWriter(file, fields, lineterminator="\n")
         writer.writeheader()
         writer.writerows(table)
 

@@ -48,9 +48,6 @@ class Expected:
 NOTHING_SPECIAL = Expected()
 
 
-NOTHING_SPECIAL = Expected()
-
-
 class Scenario(Protocol):
     """Logs of a vehicle by a seed, of which the identification knows what rov.toml tells."""
 

@@ -133,9 +133,8 @@ class Tank:
         truth = self.truth
         seconds = self.logs.seconds if "voltage" in self.logs.columns else 0.0
         factor = sagging(0.5 * seconds, seconds) if seconds else 1.0
-        pushed = Vehicle(
-            truth.layout, {n: v * factor if n[:4] in ("a_t_", "b_t_") else v for n, v in truth.coefficients.items()}
-        )
+        thrust = [name for name in truth.coefficients if name[:4] in ("a_t_", "b_t_")]
+        pushed = truth.replaced({name: factor * truth[name] for name in thrust})
         found: dict[tuple[str, str], float] = {}
         for axis in self.recorded:
             names = [axis.coefficient(key) for key in ("a_d", "b_d", "beta")]
@@ -145,18 +144,6 @@ class Tank:
         return found | {("", name): value for name, value in self.more.items() if name.startswith("T_")}
 
 
-_PATTERNS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
-    "videoray": {"surge": {"l": 1.0, "r": 1.0}, "heave": {"t": 1.0}, "yaw": {"l": 1.0, "r": -1.0}},
-    "bluerov2_heavy": {
-        "surge": {"1": -1.0, "2": -1.0, "3": 1.0, "4": 1.0},
-        "sway": {"1": 1.0, "2": -1.0, "3": 1.0, "4": -1.0},
-        "yaw": {"1": 1.0, "2": -1.0, "3": -1.0, "4": 1.0},
-        "heave": {"5": 1.0, "6": 1.0, "7": 1.0, "8": 1.0},
-        "roll": {"5": 1.0, "6": -1.0, "7": 1.0, "8": -1.0},
-        "pitch": {"5": -1.0, "6": -1.0, "7": 1.0, "8": 1.0},
-    },
-}
-"""The thrusters that a stick or a test of each axis drives, with their signs, by vehicle."""
 _STICKS: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "videoray": {"surge": (0.7, 5.0), "heave": (0.7, 6.0), "yaw": (0.3, 3.0)},
     "bluerov2_heavy": {
@@ -174,6 +161,19 @@ _REST = 3.0
 _GAP = 4.0
 _UNITS = {"m": ("m", 1.0), "rad": ("deg", 180.0 / pi)}
 """The unit of a logged position, and its factor, by the unit of the position."""
+
+
+def driven(k: Vehicle, axis: Axis) -> dict[str, float]:
+    """Return the thrusters that a stick or a test of an axis drives, with their signs.
+
+    Those of the Heavy that push sideways take no part in roll and pitch.
+    """
+    rolls = axis in (ROLL, PITCH)
+    return {
+        thruster.name: k.layout.signs(axis)[f"u_{thruster.name}"]
+        for thruster in k.layout.thrusters
+        if f"u_{thruster.name}" in k.layout.signs(axis) and (thruster.direction.value[2] or not rolls)
+    }
 
 
 # ---- Flights ---------------------------------------------------------------------------------------------------------
@@ -195,7 +195,8 @@ class Flight:
 
 def flights(scenario: Tank, random: Random) -> Iterator[Flight]:
     """Yield the recordings of a scenario."""
-    logs, patterns, given = scenario.logs, _PATTERNS[scenario.vehicle], scenario.conditions
+    logs, given = scenario.logs, scenario.conditions
+    patterns = {axis.name: driven(TRUTHS[scenario.vehicle], axis) for axis in logs.axes}
     conditions = [replace(given, current=current) for current in scenario.currents] or [given] * logs.count
     if logs.plan == "pilot":
         for n in range(logs.count):
@@ -248,13 +249,17 @@ def _rows(random: Random, logs: Logs, commands: Commands) -> Array:
     return time
 
 
+def tilted(conditions: Conditions, at: Array) -> Array:
+    """Return roll and pitch of a vehicle that has neither axis."""
+    return np.array([conditions.tilt.at(t)[:2] if conditions.tilt else (0.0, 0.0) for t in at.tolist()]).T
+
+
 def moved(truth: Vehicle, commands: Commands, at: Array, conditions: Conditions) -> Motion:
     """Return the motion at ascending times, with the surge and sway velocity over ground as `u ground`, `v ground`."""
     simulate = rigid_pool.motion if truth.layout.has_attitude else pool.motion
     found = simulate(truth, commands, np.maximum(at, 0.0), conditions)
     if "phi" not in found:
-        tilts = [conditions.tilt.at(t)[:2] if conditions.tilt else (0.0, 0.0) for t in at.tolist()]
-        found["phi"], found["theta"] = np.array(tilts).T
+        found["phi"], found["theta"] = tilted(conditions, at)
     (north, east), phi, theta, psi = conditions.current, found["phi"], found["theta"], found["psi"]
     along = north * np.cos(psi) + east * np.sin(psi)
     across = east * np.cos(psi) - north * np.sin(psi)

@@ -47,11 +47,6 @@ def wrong(
     return broken(promises("a", outcomes, expected, gate), family)
 
 
-def some(outcomes: Sequence[Outcome], count: int, **changed: object) -> list[Outcome]:
-    """Return the outcomes with the first of them changed."""
-    return [*(replace(o, **changed) for o in outcomes[:count]), *outcomes[count:]]  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("n", [2, 20, 200])
 @pytest.mark.parametrize("expected", [COMPLETE, INCOMPLETE, OWNER])
 def test_kept_promises_pass(n: int, expected: Expected) -> None:
@@ -63,31 +58,88 @@ def test_kept_promises_pass(n: int, expected: Expected) -> None:
 
 def test_exact_binomial_limits() -> None:
     """Of 200 intervals, 179 to 198 pass at 0.1 % on each side; the limit of rare things is that of binom.ppf."""
-    covered = range(201)
-    assert next(k for k in covered if at_least("", k, 200, 0.95).p_value > BY_CHANCE) == 179
-    assert max(k for k in covered if at_most("", k, 200, 0.95).p_value > BY_CHANCE) == 198
-    assert max(k for k in covered if at_most("", k, 200, 0.02).p_value > BY_CHANCE) == binom.ppf(
-        1 - BY_CHANCE, 200, 0.02
-    )
-    assert at_least("", 0, 0, 0.95).p_value == 0.0
-    assert at_most("", 0, 0, 0.02).p_value == 1.0
+
+    def passing(limit: Callable[[str, int, int, float], Promise], share: float) -> list[int]:
+        return [k for k in range(201) if limit("", k, 200, share).p_value > BY_CHANCE]
+
+    assert passing(at_least, 0.95)[0] == 179
+    assert passing(at_most, 0.95)[-1] == 198
+    assert passing(at_most, 0.02)[-1] == binom.ppf(1 - BY_CHANCE, 200, 0.02)
+    assert (at_least("", 0, 0, 0.95).p_value, at_most("", 0, 0, 0.02).p_value) == (0.0, 1.0)
 
 
-def test_holms_correction() -> None:
+@pytest.mark.parametrize(
+    ("p_values", "family", "failed"),
+    [
+        ((0.0004, 0.0004, 0.5), 0, ""),
+        ((0.0003, 0.0004, 0.5), 0, "ab"),
+        ((0.0003, 0.0006, 0.5), 0, "a"),
+        ((0.0009,), 0, "a"),
+        ((0.0009,), 10, ""),
+        ((0.0,), 10**9, "a"),
+    ],
+)
+def test_holms_correction(p_values: Sequence[float], family: int, failed: str) -> None:
     """The smallest of m probabilities is compared with 0.1 %/m, the next with 0.1 %/(m - 1) ..."""
-
-    def failed(*p_values: float, family: int = 0) -> list[str]:
-        return broken([Promise(name, p) for name, p in zip("abc", p_values, strict=False)], family)
-
-    assert failed(0.0004, 0.0004, 0.5) == []
-    assert failed(0.0003, 0.0004, 0.5) == ["a", "b"]
-    assert failed(0.0003, 0.0006, 0.5) == ["a"]
-    assert failed(0.0009) == ["a"]
-    assert failed(0.0009, family=10) == []
-    assert failed(0.0, family=10**9) == ["a"]
+    assert broken([Promise(name, p) for name, p in zip("abc", p_values, strict=False)], family) == [*failed]
 
 
 # ---- Each promise can be broken --------------------------------------------------------------------------------------
+
+CURRENT = {"effects": (("current", "log.csv", 0.1),)}
+TETHER = {"disturbances": (("thrust", "the voltage"), ("surge", "the distance"))}
+FORCE = {"disturbances": (("surge", ""),)}
+UNUSABLE = {"verdicts": {"surge": "do not use", "heave": "good"}}
+REFUSED = {"error": "log.csv: no"}
+
+
+def of_bands(coverage: float) -> dict[str, object]:
+    return {"bands": (Band("surge", "velocity", coverage, 1.0, 1.0),)}
+
+
+@pytest.mark.parametrize(
+    ("total", "changed", "expected", "passes", "fails", "words"),
+    [
+        (200, CURRENT, COMPLETE, 9, 20, "20 of 200 runs report a false effect: current of log.csv"),
+        (100, CURRENT, OWNER, 15, 30, "30 of 200 axes have a false effect: current of log.csv"),
+        (20, {"effects": (("load", "surge", 0.3),)}, COMPLETE, 0, 20, "20 of 20 runs report a false effect: load of"),
+        (200, CURRENT, replace(COMPLETE, effects=("current",)), 200, 0, ""),
+        (200, FORCE, COMPLETE, 9, 20, "20 of 200 runs raise an alarm"),
+        (200, UNUSABLE, COMPLETE, 9, 20, "20 of 200 runs raise an alarm"),
+        (20, FORCE, INCOMPLETE, 20, 0, ""),
+        (20, UNUSABLE, INCOMPLETE, 20, 0, ""),
+        (100, TETHER, INCOMPLETE, 15, 25, "25 of 100 runs name a wrong cause: the distance"),
+        (100, {"disturbances": (("surge", "the voltage"),)}, INCOMPLETE, 100, 0, ""),
+        (100, UNUSABLE, replace(INCOMPLETE, unusable=("surge",)), 100, 0, ""),
+        (100, {}, replace(INCOMPLETE, unusable=("surge",)), -1, 1, "only 0 of 100 runs say `do not use` of surge"),
+        (20, REFUSED, COMPLETE, 0, 1, "seed 0: refused: log.csv: no"),
+        (20, REFUSED, INCOMPLETE, 0, 1, "seed 0: refused: log.csv: no"),
+        (100, of_bands(0.9), COMPLETE, 100, 0, ""),
+        (100, of_bands(0.75), COMPLETE, 0, 100, "bands contain 75.0% of the held-out samples"),
+        (100, of_bands(0.85), INCOMPLETE, 100, 0, ""),
+        (100, of_bands(0.7), INCOMPLETE, 0, 100, "bands contain 70.0% of the held-out samples"),
+        (100, of_bands(0.98), OWNER, 100, 0, ""),
+        (100, of_bands(1.1), OWNER, 0, 100, "bands contain 110.0% of the held-out samples"),
+        (20, {"bands": ()}, COMPLETE, 0, 20, "bands contain 0.0% of the held-out samples"),
+        (2, {"seconds": 9.0}, replace(COMPLETE, seconds=8.0), 0, 2, "9.0 s of processor time, at most 8 s"),
+    ],
+)
+def test_some_runs_may_be_wrong_and_no_more(
+    total: int, changed: dict[str, object], expected: Expected, passes: int, fails: int, words: str
+) -> None:
+    """Chance allows a few wrong runs; more of them break one promise, which says what is wrong.
+
+    Causes that are unknown are never wrong. For owners, bands that contain too many samples are wrong as well.
+    """
+
+    def with_changes(count: int) -> list[str]:
+        good = seeds(total)
+        return wrong([*(replace(o, **changed) for o in good[:count]), *good[count:]], expected)  # type: ignore[arg-type]
+
+    if passes >= 0:
+        assert with_changes(passes) == []
+    if fails:
+        assert any(found.startswith(words) for found in with_changes(fails))
 
 
 @pytest.mark.parametrize(("n", "share"), [(2, 1.0), (20, 0.3), (200, 0.2)])
@@ -115,71 +167,24 @@ def test_a_bias_fails() -> None:
     assert wrong(seeds(2, offset=0.04, half=0.01))
 
 
-def test_a_refusal_fails() -> None:
-    for expected in (COMPLETE, INCOMPLETE):
-        assert "seed 0: refused: log.csv: no" in wrong(some(seeds(20), 1, error="log.csv: no"), expected)
-
-
-def test_false_effects_fail() -> None:
-    """Of 200 runs, 2 % may have one. It is told by its kind, or by its kind and what has it."""
-    false = (("current", "log.csv", 0.1),)
-    assert wrong(some(seeds(200), 9, effects=false)) == []
-    assert wrong(some(seeds(200), 20, effects=false)) == ["20 of 200 runs report a false effect: current of log.csv"]
-    assert wrong(seeds(20, effects=(("load", "surge", 0.3),)))
-    assert wrong(seeds(200, effects=false), replace(COMPLETE, effects=("current",))) == []
-    assert wrong(some(seeds(100), 15, effects=false), OWNER) == []
-    assert wrong(some(seeds(100), 30, effects=false), OWNER) == [
-        "30 of 200 axes have a false effect: current of log.csv"
-    ]
-
-
 @pytest.mark.parametrize(
-    "alarm", [{"disturbances": (("surge", ""),)}, {"verdicts": {"surge": "do not use", "heave": "good"}}]
+    ("half", "covers", "scenario", "names", "axes"),
+    [
+        (0.1 / 2.49, True, "a", ("a_d", "beta", "V_ss"), ()),
+        (0.1 / 2.51, True, "a", ("a_d", "beta", "V_ss"), ("surge", "heave")),
+        (0.01, False, "a", ("a_d", "beta", "V_ss"), ()),
+        (0.01, True, "b", ("a_d", "beta", "V_ss"), ()),
+        (0.01, True, "a", ("V_ss",), ()),
+    ],
 )
-def test_alarms_on_a_complete_model_fail(alarm: dict[str, object]) -> None:
-    assert wrong(some(seeds(200), 9, **alarm)) == []
-    assert wrong(some(seeds(200), 20, **alarm)) == ["20 of 200 runs raise an alarm"]
-    assert wrong(some(seeds(20), 20, **alarm), INCOMPLETE) == []
-
-
-def test_a_wrong_cause_fails_and_an_unknown_one_does_not() -> None:
-    for cause in ("the voltage", ""):
-        assert wrong(seeds(100, disturbances=(("surge", cause),)), INCOMPLETE) == []
-    tether = {"disturbances": (("thrust", "the voltage"), ("surge", "the distance"))}
-    assert wrong(some(seeds(100), 15, **tether), INCOMPLETE) == []
-    assert wrong(some(seeds(100), 25, **tether), INCOMPLETE) == ["25 of 100 runs name a wrong cause: the distance"]
-
-
-@pytest.mark.parametrize(
-    ("expected", "passes", "fails"), [(COMPLETE, 0.9, 0.75), (INCOMPLETE, 0.85, 0.7), (OWNER, 0.98, 1.1)]
-)
-def test_bands_that_contain_too_few_samples_fail(expected: Expected, passes: float, fails: float) -> None:
-    """For owners too many are wrong as well."""
-
-    def with_bands(coverage: float) -> list[Outcome]:
-        return seeds(100, bands=(Band("surge", "velocity", coverage, 1.0, 1.0),))
-
-    assert wrong(with_bands(passes), expected) == []
-    assert wrong(with_bands(fails), expected) == [f"bands contain {fails:.1%} of the held-out samples"]
-    assert "bands contain 0.0% of the held-out samples" in wrong(seeds(20, bands=()), expected)
-
-
-def gate(half: float, *, covers: bool = True) -> Gate:
-    """Return what the gate did on 20 seeds."""
-    widths = {key: 2.0 * half * truth for key, truth in TRUTHS.items()}
-    return {("a", seed, *key): (covers, width) for seed in range(20) for key, width in widths.items()}
-
-
-def test_intervals_that_are_wider_than_those_of_the_gate_fail() -> None:
+def test_intervals_that_are_wider_than_those_of_the_gate_fail(
+    half: float, covers: bool, scenario: str, names: tuple[str, ...], axes: Sequence[str]
+) -> None:
     """Those of V_ss, of another scenario, and of an axis that the gate did not cover do not count."""
-    assert wrong(seeds(20), gate=gate(0.1 / 2.49)) == []
-    found = wrong(seeds(20), gate=gate(0.1 / 2.51))
-    assert found == [f"{axis}: intervals are 2.51 times as wide as the gate's" for axis in ("surge", "heave")]
-    assert wrong(seeds(20), gate=gate(0.01, covers=False)) == []
-    assert wrong(seeds(20), gate={("b", *key): value for (_, *key), value in gate(0.01).items()}) == []  # type: ignore[misc]
-    only_answers = {key: value for key, value in gate(0.01).items() if key[3].startswith("V_ss")}
-    assert wrong(seeds(20), gate=only_answers) == []
-
-
-def test_a_slow_identification_fails() -> None:
-    assert wrong(seeds(2, seconds=9.0), replace(COMPLETE, seconds=8.0)) == ["9.0 s of processor time, at most 8 s"]
+    gate = {
+        (scenario, seed, axis, name): (covers, 2.0 * half * truth)
+        for seed in range(20)
+        for (axis, name), truth in TRUTHS.items()
+        if name.startswith(names)
+    }
+    assert wrong(seeds(20), gate=gate) == [f"{axis}: intervals are 2.51 times as wide as the gate's" for axis in axes]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.tank.columns import Names, names_of, seconds
+from rov_fmu.tank.columns import Names, names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import measured, read_log
@@ -85,10 +85,3 @@ def test_times_in_any_unit(header: str, times: list[str], tmp_path: Path) -> Non
     (log,) = read_logs(csv(tmp_path, header, times), BLUEROV2, names)
     assert log.commands is not None
     assert np.diff(log.commands.rows) == pytest.approx(0.2 * np.ones(len(times) - 1), abs=1e-6)
-
-
-def test_iso_8601() -> None:
-    assert seconds("1970-01-01T00:00:01.5Z") == 1.5
-    assert seconds("1970-01-01 01:00:02+01:00") == 2.0
-    with pytest.raises(ValueError, match="should be a valid datetime"):
-        seconds("yesterday")

@@ -12,22 +12,15 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.tank.logs import commanded, measured, read_log, used
+from tests.tank.readers.motion import BLUEROV2
 
 BOOT = 1_700_000_000.0  # s since 1970: when the vehicle began to count
 LATE = 0.05  # s, from the vehicle to the ground station
 N = 60
-
-
-@pytest.fixture(scope="module")
-def bluerov2() -> Layout:
-    return load_vehicle(SHIPPED["bluerov2"]).layout
 
 
 def pulse(command: float) -> int:
@@ -81,7 +74,7 @@ def dive(start: float = 100.0) -> list[tuple[float, Any]]:
     return found
 
 
-def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
+def test_thrusters_by_the_parameters_of_the_autopilot(tmp_path: Path) -> None:
     """Motor 6 is on servo 9 and turns in the opposite direction; the lights are on servo 6."""
     numbers = {"MOT_6_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0, "SERVO9_FUNCTION": 38}
     parameters = [parameter(name, value) for name, value in numbers.items()]
@@ -90,27 +83,27 @@ def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path
         down = 0.5 * (n >= 10)
         messages += [servos(0.1 * n, 1500, 1500, 1500, 1500, pulse(down), 1100, 1500, 1500, pulse(-down))]
         messages += [altitude(0.1 * n, -0.01 * n)]
-    log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), bluerov2)
+    log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), BLUEROV2)
     assert commanded(log.log, "6")[-1] == 0.5
     assert log.findings == [Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"})]
 
 
-def test_a_clock_of_servos_that_begins_anew(bluerov2: Layout, tmp_path: Path) -> None:
+def test_a_clock_of_servos_that_begins_anew(tmp_path: Path) -> None:
     start = 2.0**32 * 1e-6 - 3.0
-    log = read_log(tlog(tmp_path / "dive.tlog", dive(start)), bluerov2).log
+    log = read_log(tlog(tmp_path / "dive.tlog", dive(start)), BLUEROV2).log
     assert log.commands is not None
     since = log.commands.rows - log.commands.rows[0]
     assert used(log, "depth").time[-1] - log.commands.rows[0] == pytest.approx(0.1 * (N - 1) + 0.03, abs=2e-3)
     assert since[np.flatnonzero(commanded(log, "5"))[0]] == pytest.approx(1.0, abs=2e-3)
 
 
-def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> None:
+def test_depth_of_messages_without_a_time(tmp_path: Path) -> None:
     """VFR_HUD has no time; it arrives with the delay of the other messages."""
     messages = []
     for n in range(N):
         hud = mavlink.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, -0.5 - 0.01 * n, 0.0)
         messages += [servos(0.1 * n, *[1500] * 4, *[1500 + 4 * n] * 2), attitude(0.1 * n, 0.0), (0.1 * n + 0.02, hud)]
-    log = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2, HEAVE)
+    log = read_log(tlog(tmp_path / "dive.tlog", messages), BLUEROV2, HEAVE)
     assert log.log.commands is not None
     since = used(log.log, "depth").time - log.log.commands.rows[0]
     assert since == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
@@ -120,7 +113,7 @@ def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> N
     )
 
 
-def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -> None:
+def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
     """The vehicle moves ahead at 0.01 n m/s over ground while it turns, with a pitch of -0.2 and a roll of 0.1 rad.
 
     The first ten velocities are unknown.
@@ -132,7 +125,7 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
         local = mavlink.MAVLink_local_position_ned_message(100 * n, 0, 0, 0, V * cos(psi), V * sin(psi), 0)
         flags = mavlink.MAVLink_ekf_status_report_message(831 if n >= 10 else 165, 0, 0, 0, 0, 0)
         messages += [(0.1 * n - 0.01, flags), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
-    read = read_log(tlog(tmp_path / "dive.tlog", messages), bluerov2)
+    read = read_log(tlog(tmp_path / "dive.tlog", messages), BLUEROV2)
     log, speed = read.log, 0.01 * np.arange(10, N)
     assert measured(log, "surge velocity") == pytest.approx(cos(-0.2) * speed, abs=1e-6)
     assert measured(log, "sway velocity") == pytest.approx(sin(0.1) * sin(-0.2) * speed, abs=1e-6)
@@ -140,11 +133,11 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
     assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in read.findings
 
 
-def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
+def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) -> None:
     path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
     tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
     tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
-    log = read_log(path, bluerov2)
+    log = read_log(path, BLUEROV2)
     assert not commanded(log.log, "1").any()
     assert commanded(log.log, "5")[0] == 0.0
     names = {"vehicles": "1 and 2", "vehicle": "1"}
@@ -199,10 +192,6 @@ def att(time: float, yaw: float) -> bytes:
     return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
 
 
-def baro(time: float, instance: int, alt: float) -> bytes:
-    return packed("BARO", round(time * 1e6), instance, alt, 1e5, 20.0, 0.0, 0, 0.0, 0.0, 1)
-
-
 def turn() -> list[bytes]:
     """Return messages of a turn: from 1 s on, the heading passes north at 20 deg/s, by all horizontal thrusters."""
     messages = [packed("PARM", 1, f"MOT_{n}_DIRECTION".encode(), 1.0, 1.0) for n in range(1, 7)]
@@ -214,26 +203,11 @@ def turn() -> list[bytes]:
     return messages
 
 
-def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
-    """At a heading of 90 deg, the vehicle moves to starboard at 0.01 n m/s; the second core differs."""
-    messages = []
-    for n in range(N):
-        time, c = 0.1 * n, 0.3 * (n >= 10)
-        messages += [rcou(time, *(pulse(s * c) for s in (1, -1, 1, -1)), 1500, 1500)]
-        for core, sign in ((0, 1.0), (1, -1.0)):
-            numbers = [-sign * 0.01 * n, 0.0, *[0.0] * 5, 0.0, 0.0, 0.0, 0.0]
-            messages += [packed("XKF1", round(time * 1e6), core, 0.0, 0.0, 90.0, *numbers)]
-    log = read_log(dataflash(tmp_path / "a.bin", messages), bluerov2).log
-    assert measured(log, "sway velocity") == pytest.approx(0.01 * np.arange(N), abs=1e-6)
-    assert measured(log, "surge velocity") == pytest.approx(np.zeros(N), abs=1e-6)
-    assert commanded(log, "3") == pytest.approx(0.3 * (np.arange(N) >= 10))
-
-
 @pytest.mark.parametrize("cut", [1, 40, 500])
-def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layout, tmp_path: Path) -> None:
+def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, tmp_path: Path) -> None:
     path = dataflash(tmp_path / "a.bin", turn())
     path.write_bytes(path.read_bytes()[:-cut])
-    assert N - 6 <= len(measured(read_log(path, bluerov2).log, "heading")) <= N
+    assert N - 6 <= len(measured(read_log(path, BLUEROV2).log, "heading")) <= N
 
 
 # ---- Neither ---------------------------------------------------------------------------------------------------------
@@ -255,12 +229,12 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, bluerov2: Layou
     ],
 )
 def test_what_is_no_log_is_one_clear_line(
-    name: str, content: bytes, told: str, bluerov2: Layout, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    name: str, content: bytes, told: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(DataFileError, match=told) as error:
-        read_log(path, bluerov2)
+        read_log(path, BLUEROV2)
     assert str(error.value).startswith(f"{path}")
     assert len(str(error.value).splitlines()) == 1
     assert capfd.readouterr() == ("", "")

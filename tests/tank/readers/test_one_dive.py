@@ -173,16 +173,8 @@ def bag(version: int) -> Callable[[Path, Dive], Path]:
         ros, messages = Ros(version), []
         for n, time in enumerate(dive.time):
             header, R = ros.header(time, "map"), dive.rotation[n]
-            place, attitude = ros.vector("Point", ENU @ dive.position[n]), ros.quaternion(ENU @ R @ FLU)
-            pose = ros.message("geometry_msgs/msg/Pose", position=place, orientation=attitude)
-            twist = ros.message("geometry_msgs/msg/Twist", linear=ros.vector("Vector3", FLU @ dive.velocity[n]))
-            odometry = ros.message(
-                "nav_msgs/msg/Odometry",
-                header=header,
-                child_frame_id="base_link",
-                pose=ros.message("geometry_msgs/msg/PoseWithCovariance", pose=pose),
-                twist=ros.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
-            )
+            place, velocity = ENU @ dive.position[n], FLU @ dive.velocity[n]
+            odometry = ros.odometry(header, place, ENU @ R @ FLU, velocity)
             pulses = dive.pulses[n].astype(np.uint16)
             outputs = ros.message("mavros_msgs/msg/RCOut", header=header, channels=pulses)
             battery = ros.message("sensor_msgs/msg/BatteryState", header=header, voltage=dive.voltage[n])
@@ -239,17 +231,9 @@ def check(log: Log, dive: Dive) -> None:
         assert np.abs(difference).max() < within, name
 
 
-@settings(max_examples=2, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(dive=dives())
-def test_one_dive_gives_the_same_log_in_every_format(dive: Dive) -> None:
-    read_all(dive)
-
-
-@pytest.mark.long
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(dive=dives())
-def test_any_dive_gives_the_same_log_in_every_format(dive: Dive) -> None:
-    read_all(dive)
+@pytest.mark.parametrize("examples", [2, pytest.param(25, marks=pytest.mark.long)])
+def test_one_dive_gives_the_same_log_in_every_format(examples: int) -> None:
+    settings(max_examples=examples, suppress_health_check=[HealthCheck.too_slow])(given(dive=dives())(read_all))()
 
 
 def read_all(dive: Dive) -> None:

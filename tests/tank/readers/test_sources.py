@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import Names, names_of
+from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
@@ -270,7 +270,3 @@ def test_pressures_of_ardusub(tmp_path: Path) -> None:
     depth = log.used("depth")
     assert depth is not None
     assert depth.source.topic == "SCALED_PRESSURE2"
-
-
-def test_names_without_tables_know_the_header_of_rostopic() -> None:
-    assert Names().columns["%time"] == "time [ns]"
