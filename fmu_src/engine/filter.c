@@ -103,6 +103,7 @@ typedef struct {
     const places *where;
     const record *log;
     const parameters *set;
+    double *at; /* the variables, of which those that do not change are set */
     model_numbers n;
     model_held *thrust; /* of each row */
     int listed[N_X], count;
@@ -181,17 +182,26 @@ static double over_ground(const filter *f, const double x[N_X], const double row
     return found;
 }
 
-/* Compute the rates of the vehicle's states. */
-static void rates(const filter *f, const double x[N_X], const double held[N_HELD], double rate[N_STATES])
+/* Multiply what a row commands by the slow change of all thrust. */
+static void scale_thrust(const double x[N_X], const double held[N_HELD], model_held *q)
 {
-    double at[N_VARIABLES], scaled[N_HELD], R[3][3];
-    const bool tilts = f->log->tilts >= 2;
     const double gain = exp(x[GAIN]); /* above 0: thrust never changes its direction */
-    model_held q;
-    memcpy(at, f->set->at, sizeof at);
+    double scaled[N_HELD];
+    for (int i = 0; i < N_HELD; i++) {
+        scaled[i] = held[i] * gain;
+    }
+    memcpy(q, scaled, sizeof scaled);
+}
+
+/* Compute the rates of the vehicle's states under the thrust in q. */
+static void rates(const filter *f, const double x[N_X], const model_held *thrust, double rate[N_STATES])
+{
+    double *const at = f->at, R[3][3];
+    const bool tilts = f->log->tilts >= 2;
+    model_held q = *thrust;
     memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
     for (int i = 0; i < N_AXES; i++) {
-        at[f->where->external[i]] += x[FORCE + i];
+        at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i];
     }
     if (tilts) { /* the load along heave is a net weight, which stays vertical */
         const double load = f->where->load >= 0 ? at[f->where->load] : 0.0;
@@ -201,10 +211,6 @@ static void rates(const filter *f, const double x[N_X], const double held[N_HELD
             at[f->where->external[i]] += along >= 0 ? load * (R[2][along] - (along == 2 ? 1.0 : 0.0)) : 0.0;
         }
     }
-    for (int i = 0; i < N_HELD; i++) {
-        scaled[i] = held[i] * gain;
-    }
-    memcpy(&q, scaled, sizeof q);
 #if !HAS_LAG
     model_hold(at, &f->n, &q);
 #endif
@@ -266,10 +272,12 @@ static void step_mean(const filter *f, double x[N_X], const double held[N_HELD],
                       double middle[N_X])
 {
     double k[4][N_STATES], y[N_X];
+    model_held q;
+    scale_thrust(x, held, &q);
     memcpy(y, x, sizeof y);
     for (int stage = 0; stage < 4; stage++) {
         const double part = stage == 2 ? h : 0.5 * h;
-        rates(f, y, held, k[stage]);
+        rates(f, y, &q, k[stage]);
         for (int i = 0; i < N_STATES; i++) {
             y[i] = x[i] + part * k[stage][i];
         }
@@ -298,15 +306,23 @@ typedef struct {
 static void slopes(const filter *f, const double x[N_X], const double held[N_HELD], sparse *A)
 {
     double base[N_STATES], moved[N_STATES], y[N_X];
+    model_held q;
     memset(A->count, 0, sizeof A->count);
     memcpy(y, x, sizeof y);
-    rates(f, x, held, base);
+    scale_thrust(x, held, &q);
+    rates(f, x, &q, base);
     for (int c = 0; c < f->count && f->listed[c] < NOISE; c++) {
         const int j = f->listed[c];
         const double change = j < FORCE ? 1e-6 * (1.0 + fabs(x[j])) : 1e-3;
         y[j] = x[j] + change;
-        rates(f, y, held, moved);
+        if (j == GAIN) {
+            scale_thrust(y, held, &q);
+        }
+        rates(f, y, &q, moved);
         y[j] = x[j];
+        if (j == GAIN) {
+            scale_thrust(y, held, &q);
+        }
         for (int i = 0; i < N_STATES; i++) {
             if (moved[i] != base[i]) {
                 A->column[i][A->count[i]] = c;
@@ -412,10 +428,10 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
 {
     const double h = (to - from) / pieces;
     ptrdiff_t row = f->row, reset = f->reset;
-    double remains[N_SLOW];
+    double remains[N_SLOW] = {0.0};
     sparse A, phi;
-    for (int i = 0; i < N_SLOW; i++) {
-        remains[i] = exp(-h / f->set->time_constant[i]);
+    for (int a = vehicle_count(f); a < f->count - 1; a++) {
+        remains[f->listed[a] - FORCE] = exp(-h / f->set->time_constant[f->listed[a] - FORCE]);
     }
     for (int piece = 0; piece < pieces; piece++) {
         const double begin = from + piece * h, end = begin + h;
@@ -436,13 +452,16 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         for (ptrdiff_t j = row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < end; j++) {
             const double growth = spread(f, j, end) - spread(f, j, begin);
             double r0[N_STATES], r1[N_STATES];
+            model_held q;
             if (reset < j) {
                 reset = j;
                 reset_lateness(f, b->P);
             }
             if (growth > 0.0) {
-                rates(f, middle, commanded(f, j - 1), r0);
-                rates(f, middle, commanded(f, j), r1);
+                scale_thrust(middle, commanded(f, j - 1), &q);
+                rates(f, middle, &q, r0);
+                scale_thrust(middle, commanded(f, j), &q);
+                rates(f, middle, &q, r1);
                 for (int i = 0; i < N_STATES; i++) {
                     late[i] += growth * (r1[i] - r0[i]);
                 }
@@ -618,8 +637,8 @@ static int pieces_over(const filter *f, double from, double to)
 EXPORT int run_filter(const places *where, const record *log, const parameters *set, const double *inputs, const mode *how,
                       const output *to, model_held *scratch)
 {
-    filter f = {.where = where, .log = log, .set = set, .thrust = scratch, .reset = 0};
     double at[N_VARIABLES], own_gain[N_X];
+    filter f = {.where = where, .log = log, .set = set, .at = at, .thrust = scratch, .reset = 0};
     const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
     double restart = log->time[0] + how->begin, last = log->time[0];
     memcpy(at, set->at, sizeof at);
@@ -631,6 +650,7 @@ EXPORT int run_filter(const places *where, const record *log, const parameters *
         }
         model_thrust(at, &scratch[j]);
     }
+    memcpy(at, set->at, sizeof at);
     for (int i = 0; i < N_X; i++) {
         if (log->active[i]) {
             f.listed[f.count++] = i;
