@@ -232,12 +232,11 @@ static void scale_thrust(const real x[N_X], const real held[N_HELD], model_held 
     memcpy(q, scaled, sizeof scaled);
 }
 
-/* Compute the rates of the vehicle's states under the thrust in q. */
-static void rates(const filter *f, const real x[N_X], const model_held *thrust, real rate[N_STATES])
+/* Compute the rates of the vehicle's states under the thrust in q, whose other numbers change. */
+static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N_STATES])
 {
     real *const at = f->at, R[3][3];
     const bool tilts = f->log->tilts >= 2;
-    model_held q = *thrust;
     memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
     for (int i = 0; i < N_AXES; i++) {
         at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i];
@@ -252,9 +251,9 @@ static void rates(const filter *f, const real x[N_X], const model_held *thrust, 
         }
     }
 #if !HAS_LAG
-    model_hold(at, &f->n, &q);
+    model_hold(at, &f->n, q);
 #endif
-    model_derive(at, &f->n, &q);
+    model_derive(at, &f->n, q);
     memcpy(rate, at + FIRST_STATE + N_STATES, N_STATES * sizeof rate[0]);
     for (int i = 0; i < N_DRIFTS; i++) {
         if (f->where->position[i] >= 0) {

@@ -343,8 +343,8 @@ def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) ->
     def moved() -> Parameters:
         changed = {name: value * random.uniform(0.9, 1.1) for name, value in known.coefficients.items()}
         louder = tuple(sigma * random.uniform(0.5, 2.0) for sigma in known.white)
-        late = {"offset": random.uniform(-0.1, 0.1), "width": random.uniform(0.0, 1.0)}
-        return replace(known, coefficients=changed, white=louder, **late)
+        offset, width = random.uniform(-0.1, 0.1), random.uniform(0.0, 1.0)
+        return replace(known, coefficients=changed, white=louder, offset=offset, width=width)
 
     sets = [moved() for _ in range(11)]
     first = of_both.run(log, replace(known, width=0.5))
@@ -352,11 +352,11 @@ def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) ->
     bad = replace(sets[5], coefficients={**sets[5].coefficients, "m_rov": np.nan})
     found = of_both.run_many(log, [*sets[:5], bad, *sets[6:]], first, frozen=frozen)
     assert [n for n, run in enumerate(found) if run is None] == [5]
-    for run, expected in zip(found, alone, strict=True):
-        if run is not None:
+    for one, expected in zip(found, alone, strict=True):
+        if one is not None:
             scale = np.abs(expected.innovations).max()
-            assert run.innovations == pytest.approx(expected.innovations, rel=1e-9, abs=1e-9 * scale)
-            assert run.variances == pytest.approx(expected.variances, rel=1e-9)
+            assert one.innovations == pytest.approx(expected.innovations, rel=1e-9, abs=1e-9 * scale)
+            assert one.variances == pytest.approx(expected.variances, rel=1e-9)
 
 
 def test_a_small_change_of_the_delay_counts_with_the_times_of_any_clock() -> None:
