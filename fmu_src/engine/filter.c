@@ -9,7 +9,10 @@
  *
  * A change of the commands happens at an unknown time within a window. The mean uses the expected command, and the state `lateness`
  * has the deviation of the integral of the command from its mean. The mean takes fourth-order Runge-Kutta steps; the covariance
- * follows from the derivatives of the rates in the middle of each step. Names as in step.c: at, n, q. */
+ * follows from the derivatives of the rates in the middle of each step. Names as in step.c: at, n, q.
+ *
+ * filter_lanes.c compiles it for several sets of parameters at once, one in each lane of a vector (real.h). They repeat the steps of
+ * an earlier run. */
 #include <stddef.h>
 
 #include "model.h"
@@ -17,6 +20,15 @@
 #include "series.c"
 
 #include "step.c"
+
+#if LANES > 1
+EACH_LANE(exp, (real x), LANE(x, i))
+EACH_LANE(asin, (real x), LANE(x, i))
+EACH_LANE(remainder, (real x, double y), LANE(x, i), y)
+#define exp lanes_exp
+#define asin lanes_asin
+#define remainder lanes_remainder
+#endif
 
 #if defined _WIN32
 #define EXPORT __declspec(dllexport)
@@ -35,7 +47,7 @@ enum {
     LATENESS = NOISE + MOST_SENSORS,
     N_X,
     N_SLOW = LATENESS - FORCE, /* the Ornstein-Uhlenbeck processes */
-    N_HELD = sizeof(model_held) / sizeof(double)
+    N_HELD = sizeof(model_held) / sizeof(real)
 };
 
 static const double TURN = 6.283185307179586;
@@ -71,17 +83,22 @@ typedef struct {
     double share;                /* the longest step relative to the fastest time constant */
 } record;
 
-/* One set of parameters. */
+/* The numbers of the parameters. */
 typedef struct {
-    double at[N_VARIABLES];                   /* the coefficients, and the inputs besides the commands */
-    double size[N_SLOW], time_constant[N_SLOW]; /* of the slow processes */
-    double white[MOST_SENSORS];               /* the standard deviation of each sensor's white noise */
-    double unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
-    double offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
+    real at[N_VARIABLES];                   /* the coefficients, and the inputs besides the commands */
+    real size[N_SLOW], time_constant[N_SLOW]; /* of the slow processes */
+    real white[MOST_SENSORS];               /* the standard deviation of each sensor's white noise */
+    real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
+    real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
                                                  the time between two rows */
 } parameters;
 
-/* What one run writes for each sample; each may be NULL. `pieces` and `gain` are read in a run that repeats another one. */
+/* One set of parameters: its numbers in the order of the struct above, and N_INPUTS numbers for each row, which are added to it. */
+typedef struct {
+    const double *numbers, *inputs;
+} parameter_set;
+
+/* What the run of a set writes for each sample; each may be NULL. `pieces` and `gain` are read in a run that repeats another one. */
 typedef struct {
     double *innovation, *variance; /* samples */
     int *pieces;                   /* samples: the number of steps before the sample */
@@ -96,25 +113,28 @@ typedef struct {
 } mode;
 
 typedef struct {
-    double x[N_X], P[N_X][N_X];
+    real x[N_X], P[N_X][N_X];
 } belief;
 
 typedef struct {
     const places *where;
     const record *log;
-    const parameters *set;
+    parameters *set;
+    real *at; /* the variables, of which those that do not change are set */
     model_numbers n;
     model_held *thrust; /* of each row */
     int listed[N_X], count;
     belief now, ahead; /* after all samples so far, and the prediction */
-    ptrdiff_t row, reset, tilt;
-    bool beside[MOST_SENSORS];     /* if the last sample of a sensor was far beside its prediction */
-    double phi, theta, theta_rate; /* the measured roll and pitch at the time of the step or sample, and the rate of the pitch */
+    ptrdiff_t row, tilt;
+    real reset;                /* the last row at which the lateness began anew */
+    mask beside[MOST_SENSORS]; /* if the last sample of a sensor was far beside its prediction */
+    real cf, sf, ct, st;       /* cosines and sines of the measured roll and pitch at the time of the step or sample */
+    double theta_rate;
 } filter;
 
 /* Return a number, or 0 for a tiny one. What decays for long would become so small that processors compute with it a hundred times
  * more slowly. */
-static double flushed(double value)
+static inline real flushed(real value)
 {
     return fabs(value) < TINY ? 0.0 : value;
 }
@@ -122,11 +142,11 @@ static double flushed(double value)
 /* ---- The mean ----------------------------------------------------------------------------------------------------- */
 
 /* Compute the rotation matrix from the body to the earth. */
-static void rotation(const filter *f, const double x[N_X], double R[3][3])
+static void rotation(const filter *f, const real x[N_X], real R[3][3])
 {
     if (f->where->quaternion >= 0) {
-        const double *q = x + f->where->quaternion - FIRST_STATE;
-        const double s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        const real *q = x + f->where->quaternion - FIRST_STATE;
+        const real s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
         R[0][0] = 1.0 - s * (q[2] * q[2] + q[3] * q[3]);
         R[0][1] = s * (q[1] * q[2] - q[0] * q[3]);
         R[0][2] = s * (q[1] * q[3] + q[0] * q[2]);
@@ -137,8 +157,12 @@ static void rotation(const filter *f, const double x[N_X], double R[3][3])
         R[2][1] = s * (q[2] * q[3] + q[0] * q[1]);
         R[2][2] = 1.0 - s * (q[1] * q[1] + q[2] * q[2]);
     } else {
-        const double psi = f->where->heading >= 0 ? x[f->where->heading - FIRST_STATE] : 0.0;
-        const double cf = cos(f->phi), sf = sin(f->phi), ct = cos(f->theta), st = sin(f->theta), cp = cos(psi), sp = sin(psi);
+        const real cf = f->cf, sf = f->sf, ct = f->ct, st = f->st;
+        real cp = 1.0, sp = 0.0;
+        if (f->where->heading >= 0) {
+            cp = cos(x[f->where->heading - FIRST_STATE]);
+            sp = sin(x[f->where->heading - FIRST_STATE]);
+        }
         R[0][0] = cp * ct;
         R[0][1] = cp * st * sf - sp * cf;
         R[0][2] = cp * st * cf + sp * sf;
@@ -155,106 +179,141 @@ static void rotation(const filter *f, const double x[N_X], double R[3][3])
 static void set_tilt(filter *f, double t)
 {
     const record *log = f->log;
-    if (log->tilts < 2) {
-        return;
+    double phi = 0.0, theta = 0.0;
+    if (log->tilts >= 2) {
+        while (f->tilt > 0 && log->tilt_time[f->tilt] > t) {
+            f->tilt--;
+        }
+        while (f->tilt + 2 < log->tilts && log->tilt_time[f->tilt + 1] <= t) {
+            f->tilt++;
+        }
+        const double *time = log->tilt_time + f->tilt, *roll = log->roll + f->tilt, *pitch = log->pitch + f->tilt;
+        const double h = time[1] - time[0], since = (t - time[0]) / h, share = since < 0.0 ? 0.0 : since > 1.0 ? 1.0 : since;
+        phi = roll[0] + share * (roll[1] - roll[0]);
+        theta = pitch[0] + share * (pitch[1] - pitch[0]);
+        f->theta_rate = (pitch[1] - pitch[0]) / h;
     }
-    while (f->tilt > 0 && log->tilt_time[f->tilt] > t) {
-        f->tilt--;
-    }
-    while (f->tilt + 2 < log->tilts && log->tilt_time[f->tilt + 1] <= t) {
-        f->tilt++;
-    }
-    const double *time = log->tilt_time + f->tilt, *roll = log->roll + f->tilt, *pitch = log->pitch + f->tilt;
-    const double h = time[1] - time[0], share = fmin(fmax((t - time[0]) / h, 0.0), 1.0);
-    f->phi = roll[0] + share * (roll[1] - roll[0]);
-    f->theta = pitch[0] + share * (pitch[1] - pitch[0]);
-    f->theta_rate = (pitch[1] - pitch[0]) / h;
+    f->cf = cos(phi);
+    f->sf = sin(phi);
+    f->ct = cos(theta);
+    f->st = sin(theta);
 }
 
-/* Return the velocity of the vehicle over ground along an axis of the earth, with its row of the rotation matrix. */
-static double over_ground(const filter *f, const double x[N_X], const double row[3], int axis)
+/* Return the velocity of the water along an axis of the earth. */
+static real current(const filter *f, int axis)
 {
-    double found = f->where->current[axis] >= 0 ? f->set->at[f->where->current[axis]] : 0.0;
-    for (int i = 0; i < N_AXES; i++) {
-        found += f->where->direction[i] >= 0 ? row[f->where->direction[i]] * x[i] : 0.0;
+    real found = 0.0;
+    if (f->where->current[axis] >= 0) {
+        found = f->set->at[f->where->current[axis]];
     }
     return found;
 }
 
-/* Compute the rates of the vehicle's states. */
-static void rates(const filter *f, const double x[N_X], const double held[N_HELD], double rate[N_STATES])
+/* Return the velocity of the vehicle over ground along an axis of the earth, with its row of the rotation matrix. */
+static real over_ground(const filter *f, const real x[N_X], const real row[3], int axis)
 {
-    double at[N_VARIABLES], scaled[N_HELD], R[3][3];
-    const bool tilts = f->log->tilts >= 2;
-    const double gain = exp(x[GAIN]); /* above 0: thrust never changes its direction */
-    model_held q;
-    memcpy(at, f->set->at, sizeof at);
-    memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
+    real found = current(f, axis);
     for (int i = 0; i < N_AXES; i++) {
-        at[f->where->external[i]] += x[FORCE + i];
-    }
-    if (tilts) { /* the load along heave is a net weight, which stays vertical */
-        const double load = f->where->load >= 0 ? at[f->where->load] : 0.0;
-        rotation(f, x, R);
-        for (int i = 0; i < N_AXES; i++) {
-            const int along = f->where->direction[i];
-            at[f->where->external[i]] += along >= 0 ? load * (R[2][along] - (along == 2 ? 1.0 : 0.0)) : 0.0;
+        if (f->where->direction[i] >= 0) {
+            found += row[f->where->direction[i]] * x[i];
         }
     }
+    return found;
+}
+
+/* Multiply what a row commands by the slow change of all thrust. */
+static void scale_thrust(const real x[N_X], const real held[N_HELD], model_held *q)
+{
+    const real gain = exp(x[GAIN]); /* above 0: thrust never changes its direction */
+    real scaled[N_HELD];
     for (int i = 0; i < N_HELD; i++) {
         scaled[i] = held[i] * gain;
     }
-    memcpy(&q, scaled, sizeof q);
+    memcpy(q, scaled, sizeof scaled);
+}
+
+/* Compute the rates of the vehicle's states under the thrust in q, whose other numbers change. */
+static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N_STATES])
+{
+    real *const at = f->at, R[3][3];
+    const bool tilts = f->log->tilts >= 2;
+    memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
+    for (int i = 0; i < N_AXES; i++) {
+        at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i];
+    }
+    if (tilts) { /* the load along heave is a net weight, which stays vertical */
+        rotation(f, x, R);
+        for (int i = 0; i < N_AXES && f->where->load >= 0; i++) {
+            const int along = f->where->direction[i];
+            if (along >= 0) {
+                at[f->where->external[i]] += at[f->where->load] * (R[2][along] - (along == 2 ? 1.0 : 0.0));
+            }
+        }
+    }
 #if !HAS_LAG
-    model_hold(at, &f->n, &q);
+    model_hold(at, &f->n, q);
 #endif
-    model_derive(at, &f->n, &q);
+    model_derive(at, &f->n, q);
     memcpy(rate, at + FIRST_STATE + N_STATES, N_STATES * sizeof rate[0]);
     for (int i = 0; i < N_DRIFTS; i++) {
         if (f->where->position[i] >= 0) {
-            double *position = &rate[f->where->position[i] - FIRST_STATE];
-            *position = (tilts ? over_ground(f, x, R[i], i) : *position) + x[DRIFT + i];
+            real *position = &rate[f->where->position[i] - FIRST_STATE];
+            if (tilts) {
+                *position = over_ground(f, x, R[i], i);
+            }
+            *position += x[DRIFT + i];
         }
     }
     if (tilts && f->where->heading >= 0) {
-        double *heading = &rate[f->where->heading - FIRST_STATE];
-        *heading = (*heading + f->theta_rate * sin(f->phi)) / (cos(f->phi) * cos(f->theta));
+        real *heading = &rate[f->where->heading - FIRST_STATE];
+        *heading = (*heading + f->theta_rate * f->sf) / (f->cf * f->ct);
     }
 }
 
-static double window(const filter *f, ptrdiff_t row)
+static real window(const filter *f, ptrdiff_t row)
 {
     return f->set->width * (f->log->told[row] - f->log->since[row]);
 }
 
-/* Return the integral until t of the expected share of a row's change that has happened. */
-static double happened(const filter *f, ptrdiff_t row, double t)
+/* Return when the window of a row begins or ends. */
+static real begins(const filter *f, ptrdiff_t row)
 {
-    const double width = window(f, row), since = t - (f->log->told[row] + f->set->offset - 0.5 * width);
-    return since <= 0.0 ? 0.0 : since < width ? 0.5 * since * since / width : since - 0.5 * width;
+    return f->log->told[row] + f->set->offset - 0.5 * window(f, row);
+}
+
+static real ends(const filter *f, ptrdiff_t row)
+{
+    return f->log->told[row] + f->set->offset + 0.5 * window(f, row);
+}
+
+/* Return the integral until t of the expected share of a row's change that has happened. */
+static real happened(const filter *f, ptrdiff_t row, double t)
+{
+    const real width = window(f, row), since = t - begins(f, row);
+    const real within = since < width ? 0.5 * since * since / width : since - 0.5 * width;
+    return since <= 0.0 ? 0.0 : within;
 }
 
 /* Return the standard deviation of the time since a change, which is uniformly distributed over a window. */
-static double spread(const filter *f, ptrdiff_t row, double t)
+static real spread(const filter *f, ptrdiff_t row, double t)
 {
-    const double width = window(f, row), begin = f->log->told[row] + f->set->offset - 0.5 * width;
-    const double since = fmin(fmax(t - begin, 0.0), width);
+    const real width = window(f, row), since = fmin(fmax(t - begins(f, row), 0.0), width);
     return width > 0.0 ? since * sqrt(fmax(since / width * (1.0 / 3.0 - 0.25 * since / width), 0.0)) : 0.0;
 }
 
 /* Return what a row commands. The struct has numbers alone. */
-static const double *commanded(const filter *f, ptrdiff_t row)
+static const real *commanded(const filter *f, ptrdiff_t row)
 {
-    return (const double *)&f->thrust[row];
+    return (const real *)&f->thrust[row];
 }
 
 /* Compute the mean thrust over a step. Changes that end before it are behind `row`. */
-static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, double held[N_HELD])
+static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, real held[N_HELD])
 {
     memcpy(held, commanded(f, row), N_HELD * sizeof held[0]);
-    for (ptrdiff_t j = row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < to; j++) {
-        const double share = (happened(f, j, to) - happened(f, j, from)) / (to - from);
-        const double *before = commanded(f, j - 1), *after = commanded(f, j);
+    for (ptrdiff_t j = row + 1; j < f->log->rows && ANY(begins(f, j) < to); j++) {
+        const real share = (happened(f, j, to) - happened(f, j, from)) / (to - from);
+        const real *before = commanded(f, j - 1), *after = commanded(f, j);
         for (int i = 0; i < N_HELD; i++) {
             held[i] += share * (after[i] - before[i]);
         }
@@ -262,14 +321,16 @@ static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, 
 }
 
 /* Take one Runge-Kutta step, and compute the states in its middle. */
-static void step_mean(const filter *f, double x[N_X], const double held[N_HELD], double h, const double remains[N_SLOW],
-                      double middle[N_X])
+static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], double h, const real remains[N_SLOW],
+                      real middle[N_X])
 {
-    double k[4][N_STATES], y[N_X];
+    real k[4][N_STATES], y[N_X];
+    model_held q;
+    scale_thrust(x, held, &q);
     memcpy(y, x, sizeof y);
     for (int stage = 0; stage < 4; stage++) {
         const double part = stage == 2 ? h : 0.5 * h;
-        rates(f, y, held, k[stage]);
+        rates(f, y, &q, k[stage]);
         for (int i = 0; i < N_STATES; i++) {
             y[i] = x[i] + part * k[stage][i];
         }
@@ -291,24 +352,35 @@ static void step_mean(const filter *f, double x[N_X], const double held[N_HELD],
 /* The entries other than 0 of a matrix, row by row. A column is the place of a listed state. */
 typedef struct {
     int count[N_STATES], column[N_STATES][N_X];
-    double entry[N_STATES][N_X];
+    real entry[N_STATES][N_X];
 } sparse;
 
 /* Compute the derivatives of the rates of the vehicle's states with respect to the listed states. */
-static void slopes(const filter *f, const double x[N_X], const double held[N_HELD], sparse *A)
+static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], sparse *A)
 {
-    double base[N_STATES], moved[N_STATES], y[N_X];
+    real base[N_STATES], moved[N_STATES], y[N_X];
+    model_held q;
     memset(A->count, 0, sizeof A->count);
     memcpy(y, x, sizeof y);
-    rates(f, x, held, base);
+    scale_thrust(x, held, &q);
+    rates(f, x, &q, base);
     for (int c = 0; c < f->count && f->listed[c] < NOISE; c++) {
         const int j = f->listed[c];
-        const double change = j < FORCE ? 1e-6 * (1.0 + fabs(x[j])) : 1e-3;
+        real change = 1e-3;
+        if (j < FORCE) {
+            change = 1e-6 * (1.0 + fabs(x[j]));
+        }
         y[j] = x[j] + change;
-        rates(f, y, held, moved);
+        if (j == GAIN) {
+            scale_thrust(y, held, &q);
+        }
+        rates(f, y, &q, moved);
         y[j] = x[j];
+        if (j == GAIN) {
+            scale_thrust(y, held, &q);
+        }
         for (int i = 0; i < N_STATES; i++) {
-            if (moved[i] != base[i]) {
+            if (ANY(moved[i] != base[i])) {
                 A->column[i][A->count[i]] = c;
                 A->entry[i][A->count[i]++] = (moved[i] - base[i]) / change;
             }
@@ -332,10 +404,11 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
     const int vehicle = vehicle_count(f);
     for (int a = 0; a < vehicle; a++) {
         const int i = f->listed[a];
-        double row[N_X] = {0.0};
+        real row[N_X];
+        memset(row, 0, sizeof row);
         for (int k = 0; k < A->count[i]; k++) {
             const int b = A->column[i][k];
-            const double entry = h * A->entry[i][k];
+            const real entry = h * A->entry[i][k];
             row[b] += entry;
             if (b < vehicle) {
                 const int j = f->listed[b];
@@ -347,7 +420,7 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
         row[a] += 1.0;
         phi->count[a] = 0;
         for (int b = 0; b < f->count; b++) {
-            if (row[b] != 0.0) {
+            if (ANY(row[b] != 0.0)) {
                 phi->column[a][phi->count[a]] = b;
                 phi->entry[a][phi->count[a]++] = row[b];
             }
@@ -357,10 +430,10 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
 
 /* Move the covariance over one step. `late` is the change of each rate by the growth of the lateness; `remains` is how much of each
  * slow process remains. */
-static void step_covariance(const filter *f, double P[N_X][N_X], const sparse *phi, const double late[N_STATES], const double remains[N_SLOW])
+static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi, const real late[N_STATES], const real remains[N_SLOW])
 {
     const int n = f->count, last = n - 1, vehicle = vehicle_count(f);
-    double moved[N_STATES][N_X];
+    real moved[N_STATES][N_X];
     for (int a = 0; a < vehicle; a++) {
         for (int b = 0; b < n; b++) {
             moved[a][b] = late[f->listed[a]] * P[last][b];
@@ -373,7 +446,7 @@ static void step_covariance(const filter *f, double P[N_X][N_X], const sparse *p
     }
     for (int a = 0; a < vehicle; a++) {
         for (int b = 0; b <= a; b++) {
-            double sum = moved[a][last] * late[f->listed[b]];
+            real sum = moved[a][last] * late[f->listed[b]];
             for (int c = 0; c < phi->count[b]; c++) {
                 sum += moved[a][phi->column[b][c]] * phi->entry[b][c];
             }
@@ -383,7 +456,7 @@ static void step_covariance(const filter *f, double P[N_X][N_X], const sparse *p
     }
     for (int a = vehicle; a < last; a++) {
         const int slow = f->listed[a] - FORCE;
-        const double size = f->set->size[slow];
+        const real size = f->set->size[slow];
         for (int b = 0; b < vehicle; b++) {
             P[a][b] = P[b][a] = flushed(remains[slow] * moved[b][a]);
         }
@@ -396,13 +469,13 @@ static void step_covariance(const filter *f, double P[N_X][N_X], const sparse *p
 }
 
 /* Let the lateness begin anew, uncorrelated with the other states. */
-static void reset_lateness(const filter *f, double P[N_X][N_X])
+static void reset_lateness(const filter *f, real P[N_X][N_X], mask begins_anew)
 {
     const int last = f->count - 1;
     for (int b = 0; b <= last; b++) {
-        P[last][b] = P[b][last] = 0.0;
+        P[last][b] = P[b][last] = begins_anew ? 0.0 : P[last][b];
     }
-    P[last][last] = 1.0;
+    P[last][last] = begins_anew ? 1.0 : P[last][last];
 }
 
 /* ---- Steps and samples -------------------------------------------------------------------------------------------- */
@@ -411,16 +484,17 @@ static void reset_lateness(const filter *f, double P[N_X][N_X])
 static void advance(filter *f, belief *b, double from, double to, int pieces, bool has_covariance)
 {
     const double h = (to - from) / pieces;
-    ptrdiff_t row = f->row, reset = f->reset;
-    double remains[N_SLOW];
+    ptrdiff_t row = f->row;
+    real reset = f->reset, remains[N_SLOW];
     sparse A, phi;
-    for (int i = 0; i < N_SLOW; i++) {
-        remains[i] = exp(-h / f->set->time_constant[i]);
+    memset(remains, 0, sizeof remains);
+    for (int a = vehicle_count(f); a < f->count - 1; a++) {
+        remains[f->listed[a] - FORCE] = exp(-h / f->set->time_constant[f->listed[a] - FORCE]);
     }
     for (int piece = 0; piece < pieces; piece++) {
         const double begin = from + piece * h, end = begin + h;
-        double held[N_HELD], middle[N_X], late[N_STATES] = {0.0};
-        while (row + 1 < f->log->rows && f->log->told[row + 1] + f->set->offset + 0.5 * window(f, row + 1) <= begin) {
+        real held[N_HELD], middle[N_X], late[N_STATES];
+        while (row + 1 < f->log->rows && ALL(ends(f, row + 1) <= begin)) {
             row++;
         }
         set_tilt(f, 0.5 * (begin + end));
@@ -433,18 +507,23 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
             slopes(f, middle, held, &A);
             transition(f, &A, h, &phi);
         }
-        for (ptrdiff_t j = row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < end; j++) {
-            const double growth = spread(f, j, end) - spread(f, j, begin);
-            double r0[N_STATES], r1[N_STATES];
-            if (reset < j) {
-                reset = j;
-                reset_lateness(f, b->P);
+        memset(late, 0, sizeof late);
+        for (ptrdiff_t j = row + 1; j < f->log->rows && ANY(begins(f, j) < end); j++) {
+            const real growth = spread(f, j, end) - spread(f, j, begin);
+            const mask begins_anew = begins(f, j) < end && reset < (double)j;
+            real r0[N_STATES], r1[N_STATES];
+            model_held q;
+            if (ANY(begins_anew)) {
+                reset = begins_anew ? (double)j : reset;
+                reset_lateness(f, b->P, begins_anew);
             }
-            if (growth > 0.0) {
-                rates(f, middle, commanded(f, j - 1), r0);
-                rates(f, middle, commanded(f, j), r1);
+            if (ANY(growth > 0.0)) {
+                scale_thrust(middle, commanded(f, j - 1), &q);
+                rates(f, middle, &q, r0);
+                scale_thrust(middle, commanded(f, j), &q);
+                rates(f, middle, &q, r1);
                 for (int i = 0; i < N_STATES; i++) {
-                    late[i] += growth * (r1[i] - r0[i]);
+                    late[i] += fmax(growth, 0.0) * (r1[i] - r0[i]);
                 }
             }
         }
@@ -456,33 +535,37 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
 static void pass_rows(filter *f, double time)
 {
     const record *log = f->log;
-    while (f->row + 1 < log->rows && log->told[f->row + 1] + f->set->offset + 0.5 * window(f, f->row + 1) <= time) {
+    while (f->row + 1 < log->rows && ALL(ends(f, f->row + 1) <= time)) {
         f->row++;
     }
-    while (f->reset + 1 < log->rows && log->told[f->reset + 1] + f->set->offset - 0.5 * window(f, f->reset + 1) < time) {
-        f->reset++;
+    for (ptrdiff_t j = f->row > 0 ? f->row : 1; j < log->rows && ANY(begins(f, j) < time); j++) {
+        f->reset = begins(f, j) < time ? fmax(f->reset, (double)j) : f->reset;
     }
 }
 
 /* Return what a sensor measures without noise. */
-static double measured(const filter *f, const double x[N_X], ptrdiff_t sensor)
+static real measured(const filter *f, const real x[N_X], ptrdiff_t sensor)
 {
     const int place = f->log->place[sensor];
-    double R[3][3], value;
+    real R[3][3], value;
     if (f->log->kind[sensor] == STATE) {
         return x[place - FIRST_STATE];
     }
     rotation(f, x, R);
     if (f->log->kind[sensor] == ANGLE) { /* the place is 0 for roll, 1 for pitch, 2 for the heading */
-        return place == 0 ? atan2(R[2][1], R[2][2]) : place == 1 ? -asin(fmax(fmin(R[2][0], 1.0), -1.0)) : atan2(R[1][0], R[0][0]);
+        if (place == 1) {
+            return -asin(fmax(fmin(R[2][0], 1.0), -1.0));
+        }
+        return place == 0 ? atan2(R[2][1], R[2][2]) : atan2(R[1][0], R[0][0]);
     }
     value = 0.0; /* the place is the number of the direction: ahead, to starboard, down */
     for (int i = 0; i < N_DRIFTS; i++) {
-        const double current = f->where->current[i] >= 0 ? f->set->at[f->where->current[i]] : 0.0;
-        value += R[i][place] * (x[DRIFT + i] + current);
+        value += R[i][place] * (x[DRIFT + i] + current(f, i));
     }
     for (int i = 0; i < N_AXES; i++) {
-        value += f->where->direction[i] == place ? x[i] : 0.0;
+        if (f->where->direction[i] == place) {
+            value += x[i];
+        }
     }
     return value;
 }
@@ -495,11 +578,10 @@ static bool turns(const filter *f, int state)
 }
 
 /* Compute the derivatives of what a sensor measures with respect to the listed states. */
-static void gradient(const filter *f, const double x[N_X], ptrdiff_t sensor, double H[N_X])
+static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real H[N_X])
 {
     const int kind = f->log->kind[sensor], place = f->log->place[sensor];
-    double y[N_X], R[3][3] = {{0.0}};
-    double base = 0.0;
+    real y[N_X], R[3][3], base = 0.0;
     if (kind != STATE) {
         memcpy(y, x, sizeof y);
         rotation(f, x, R);
@@ -523,23 +605,26 @@ static void gradient(const filter *f, const double x[N_X], ptrdiff_t sensor, dou
 }
 
 /* Return the innovation of a sample. Angles are compared within half a turn. */
-static double innovation(const filter *f, const belief *b, ptrdiff_t k)
+static real innovation(const filter *f, const belief *b, ptrdiff_t k)
 {
     const int sensor = f->log->sensor[k];
-    const double off = f->log->value[k] - measured(f, b->x, sensor) - b->x[NOISE + sensor];
+    const real off = f->log->value[k] - measured(f, b->x, sensor) - b->x[NOISE + sensor];
     const bool wraps = f->log->kind[sensor] == ANGLE || f->log->place[sensor] == f->where->heading;
-    return wraps && f->log->kind[sensor] != OVER_GROUND ? remainder(off, TURN) : off;
+    if (wraps && f->log->kind[sensor] != OVER_GROUND) {
+        return remainder(off, TURN);
+    }
+    return off;
 }
 
 /* Compute P H and return the variance H P H + white noise. */
-static double project(const filter *f, const belief *b, ptrdiff_t sensor, double PH[N_X])
+static real project(const filter *f, const belief *b, ptrdiff_t sensor, real PH[N_X])
 {
-    const double white = f->set->white[sensor];
-    double H[N_X], variance = white * white;
+    const real white = f->set->white[sensor];
+    real H[N_X], variance = white * white;
     gradient(f, b->x, sensor, H);
     memset(PH, 0, N_X * sizeof PH[0]);
     for (int c = 0; c < f->count; c++) {
-        if (H[c] != 0.0) {
+        if (ANY(H[c] != 0.0)) {
             for (int a = 0; a < f->count; a++) {
                 PH[a] += H[c] * b->P[c][a];
             }
@@ -552,14 +637,14 @@ static double project(const filter *f, const belief *b, ptrdiff_t sensor, double
 }
 
 /* Correct the states by an innovation. The quaternion keeps the length 1. */
-static void correct(const filter *f, belief *b, const double gain[N_X], double off)
+static void correct(const filter *f, belief *b, const real gain[N_X], real off)
 {
     for (int i = 0; i < N_X; i++) {
         b->x[i] += f->set->unit[i] * gain[i] * off;
     }
     if (f->where->quaternion >= 0) {
-        double *q = b->x + f->where->quaternion - FIRST_STATE;
-        const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        real *q = b->x + f->where->quaternion - FIRST_STATE;
+        const real length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
         for (int i = 0; i < 4; i++) {
             q[i] /= length;
         }
@@ -568,7 +653,7 @@ static void correct(const filter *f, belief *b, const double gain[N_X], double o
 
 /* Take one sample into the belief, and write its innovation, its variance and its gain. A sample far beside its prediction counts less.
  * If the sensor's sample before was, too, it has its full weight: then the state is lost, and not the sample. */
-static void take(filter *f, belief *b, ptrdiff_t k, int repeats, double *off, double *variance, double gain[N_X])
+static void take(filter *f, belief *b, ptrdiff_t k, int repeats, real *off, real *variance, real gain[N_X])
 {
     const int sensor = f->log->sensor[k];
     *off = innovation(f, b, k);
@@ -576,15 +661,15 @@ static void take(filter *f, belief *b, ptrdiff_t k, int repeats, double *off, do
         correct(f, b, gain, *off);
         return;
     }
-    double PH[N_X];
+    real PH[N_X];
     *variance = project(f, b, sensor, PH);
-    const double size = fabs(*off) / sqrt(*variance);
-    const bool is_beside = size > OUTLYING;
-    const double weight = is_beside && !f->beside[sensor] ? OUTLYING / size : 1.0;
+    const real size = fabs(*off) / sqrt(*variance);
+    const mask is_beside = size > OUTLYING;
+    const real weight = is_beside & ~f->beside[sensor] ? OUTLYING / size : 1.0;
     f->beside[sensor] = is_beside;
     memset(gain, 0, N_X * sizeof gain[0]);
     for (int a = 0; a < f->count; a++) {
-        const double share = weight * PH[a] / *variance;
+        const real share = weight * PH[a] / *variance;
         gain[f->listed[a]] = share / f->set->unit[f->listed[a]];
         for (int c = 0; c < f->count; c++) {
             b->P[a][c] -= share * PH[c];
@@ -593,6 +678,7 @@ static void take(filter *f, belief *b, ptrdiff_t k, int repeats, double *off, do
     correct(f, b, gain, *off);
 }
 
+#if LANES == 1
 /* Return how many steps the time before a sample needs: none is longer than `longest`, or than a share of the fastest time constant.
  * Steps in which a command changes are shorter, because they take the mean of the thrust. */
 static int pieces_over(const filter *f, double from, double to)
@@ -605,55 +691,80 @@ static int pieces_over(const filter *f, double from, double to)
             fastest = fmax(fastest, f->listed[A.column[i][k]] == i ? fabs(A.entry[i][k]) / f->log->share : 0.0);
         }
     }
-    for (ptrdiff_t j = f->row + 1; j < f->log->rows && f->log->told[j] + f->set->offset - 0.5 * window(f, j) < to + MARGIN; j++) {
-        if (f->log->told[j] + f->set->offset + 0.5 * window(f, j) > from - MARGIN) {
+    for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN; j++) {
+        if (ends(f, j) > from - MARGIN) {
             fastest = fmax(fastest, 1.0 / f->log->changing);
         }
     }
     return (int)fmin(fmax(ceil((to - from) * fastest - 1e-6), 1.0), 1e5);
 }
+#endif
 
-/* Run through a log. `inputs` has N_INPUTS numbers for each row, which are added to those of the set. Returns 0, or 1 when a number
- * is not finite. `scratch` has room for one model_held per row. */
-EXPORT int run_filter(const places *where, const record *log, const parameters *set, const double *inputs, const mode *how,
-                      const output *to, model_held *scratch)
+/* Begin a run: take the sets of parameters of all lanes, and compute the thrust of each row. */
+static void begin_run(filter *f, const parameter_set sets[LANES])
 {
-    filter f = {.where = where, .log = log, .set = set, .thrust = scratch, .reset = 0};
-    double at[N_VARIABLES], own_gain[N_X];
+    const record *const log = f->log;
+    real *const numbers = (real *)f->set;
+    for (int i = 0; i < LANES; i++) {
+        for (size_t k = 0; k < sizeof(parameters) / sizeof(real); k++) {
+            LANE(numbers[k], i) = sets[i].numbers[k];
+        }
+    }
+    memcpy(f->at, f->set->at, sizeof f->set->at);
+    model_prepare(f->at, &f->n);
+    for (ptrdiff_t j = 0; j < log->rows; j++) {
+        for (int k = 0; k < N_INPUTS; k++) {
+            for (int i = 0; i < LANES; i++) {
+                LANE(f->at[k], i) = LANE(f->set->at[k], i) + sets[i].inputs[j * N_INPUTS + k];
+            }
+        }
+        memset(&f->thrust[j], 0, sizeof f->thrust[j]);
+        model_thrust(f->at, &f->thrust[j]);
+    }
+    memcpy(f->at, f->set->at, sizeof f->set->at);
+    for (int i = 0; i < N_X; i++) {
+        f->now.x[i] = log->start[i];
+        if (log->active[i]) {
+            real *const variance = &f->now.P[f->count][f->count];
+            *variance = i >= FORCE && i < LATENESS ? f->set->size[i - FORCE] : log->error[i];
+            *variance *= *variance;
+            f->listed[f->count++] = i;
+        }
+    }
+    pass_rows(f, log->time[0]);
+    set_tilt(f, log->time[0]);
+    f->ahead = f->now;
+}
+
+/* Run through a log with the parameters of each lane. failed[lane] becomes 1 when a number is not finite, and the run ends when this
+ * is so for all. `scratch` has room for one model_held per row. */
+EXPORT void run_filter(const places *where, const record *log, const parameter_set sets[LANES], const mode *how,
+                       const output results[LANES], int failed[LANES], model_held *scratch)
+{
+    real at[N_VARIABLES];
+    parameters numbers;
+    filter f;
+    memset(&f, 0, sizeof f);
+    f.where = where;
+    f.log = log;
+    f.set = &numbers;
+    f.at = at;
+    f.thrust = scratch;
+    begin_run(&f, sets);
     const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
     double restart = log->time[0] + how->begin, last = log->time[0];
-    memcpy(at, set->at, sizeof at);
-    model_prepare(at, &f.n);
-    for (ptrdiff_t j = 0; j < log->rows; j++) {
-        memset(&scratch[j], 0, sizeof scratch[j]);
-        for (int i = 0; i < N_INPUTS; i++) {
-            at[i] = set->at[i] + inputs[j * N_INPUTS + i];
-        }
-        model_thrust(at, &scratch[j]);
-    }
-    for (int i = 0; i < N_X; i++) {
-        if (log->active[i]) {
-            f.listed[f.count++] = i;
-        }
-    }
-    memcpy(f.now.x, log->start, sizeof f.now.x);
-    for (int a = 0; a < f.count; a++) {
-        const int i = f.listed[a];
-        const double error = i >= FORCE && i < LATENESS ? set->size[i - FORCE] : log->error[i];
-        f.now.P[a][a] = error * error;
-    }
-    pass_rows(&f, last);
-    set_tilt(&f, last);
-    f.ahead = f.now;
-    for (ptrdiff_t k = 0; k < log->samples; k++) {
+    int *const pieces = results[0].pieces, running = LANES;
+    memset(failed, 0, LANES * sizeof failed[0]);
+    for (ptrdiff_t k = 0; k < log->samples && running > 0; k++) {
         const double h = log->time[k] - last;
-        double off = 0.0, variance = 0.0, *gain = to->gain ? to->gain + k * N_X : own_gain;
+        real off, variance = 0.0, gain[N_X];
         if (h > 0.0) {
-            const int pieces = how->repeats ? to->pieces[k] : pieces_over(&f, last, log->time[k]);
-            to->pieces[k] = pieces;
-            advance(&f, &f.now, last, log->time[k], pieces, has_covariance);
+#if LANES == 1
+            pieces[k] = how->repeats == 0 ? pieces_over(&f, last, log->time[k]) : pieces[k];
+#endif
+            advance(&f, &f.now, last, log->time[k], pieces[k], has_covariance);
             if (predicts) {
-                advance(&f, &f.ahead, last, log->time[k], pieces, has_covariance);
+                advance(&f, &f.ahead, last, log->time[k], pieces[k], has_covariance);
             }
             last = log->time[k];
             pass_rows(&f, last);
@@ -663,34 +774,44 @@ EXPORT int run_filter(const places *where, const record *log, const parameters *
             f.ahead = f.now;
             restart += how->span * (floor((log->time[k] - restart) / how->span) + 1.0);
         }
+        for (int i = 0; i < LANES && how->repeats == 2; i++) {
+            for (int n = 0; n < N_X; n++) {
+                LANE(gain[n], i) = results[i].gain[k * N_X + n];
+            }
+        }
+        take(&f, &f.now, k, how->repeats, &off, &variance, gain);
         if (predicts) {
-            double PH[N_X];
-            const double ahead = innovation(&f, &f.ahead, k);
-            const double its_variance = has_covariance ? project(&f, &f.ahead, log->sensor[k], PH) : 0.0;
-            take(&f, &f.now, k, how->repeats, &off, &variance, gain);
-            off = ahead;
-            variance = its_variance;
-        } else {
-            take(&f, &f.now, k, how->repeats, &off, &variance, gain);
+            real PH[N_X];
+            off = innovation(&f, &f.ahead, k);
+            if (has_covariance) {
+                variance = project(&f, &f.ahead, log->sensor[k], PH);
+            }
         }
-        if (!isfinite(off)) {
-            return 1;
-        }
-        to->innovation[k] = off;
-        if (has_covariance) {
-            to->variance[k] = variance;
-        }
-        for (int a = 0; a < f.count && to->states; a++) {
-            to->states[k * N_X + f.listed[a]] = f.now.x[f.listed[a]];
-            to->deviations[k * N_X + f.listed[a]] = sqrt(fmax(f.now.P[a][a], 0.0));
+        for (int i = 0; i < LANES; i++) {
+            const output *const to = &results[i];
+            if (failed[i] != 0 || !isfinite(LANE(off, i))) {
+                running -= failed[i] == 0;
+                failed[i] = 1;
+                continue;
+            }
+            to->innovation[k] = LANE(off, i);
+            if (has_covariance) {
+                to->variance[k] = LANE(variance, i);
+            }
+            for (int n = 0; n < N_X && has_covariance && to->gain; n++) {
+                to->gain[k * N_X + n] = LANE(gain[n], i);
+            }
+            for (int a = 0; a < f.count && to->states; a++) {
+                to->states[k * N_X + f.listed[a]] = LANE(f.now.x[f.listed[a]], i);
+                to->deviations[k * N_X + f.listed[a]] = sqrt(LANE(f.now.P[a][a], i));
+            }
         }
     }
-    return 0;
 }
 
 /* Return the sizes that Python needs to lay out its arrays. */
-EXPORT void filter_sizes(int sizes[6])
+EXPORT void filter_sizes(int sizes[7])
 {
-    const int found[6] = {N_X, N_AXES, MOST_SENSORS, N_VARIABLES, N_INPUTS, (int)sizeof(model_held)};
+    const int found[7] = {N_X, N_AXES, MOST_SENSORS, N_VARIABLES, N_INPUTS, (int)sizeof(model_held), LANES};
     memcpy(sizes, found, sizeof found);
 }

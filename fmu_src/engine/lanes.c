@@ -3,13 +3,7 @@
  * its neighbours. When a vehicle ends, the next one takes its lane. Steps that need more than that are taken alone by engine.c: while
  * commands wait for the dead time, where a velocity may begin to move with a higher power of time, where a number is not finite,
  * and where a step has many pieces, because engine.c ends a step early when all velocities are steady. */
-#if defined __AVX512F__
-#define LANES 8
-#elif defined __AVX__
-#define LANES 4
-#else
-#define LANES 2
-#endif
+#include "vectors.h"
 
 #include <stdlib.h>
 

@@ -28,9 +28,11 @@ UNITY_FILE = "fmu.c"
 MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
 ENGINE_HEADER = FMU_SRC / "engine" / "engine.h"
+VECTORS_HEADER = FMU_SRC / "engine" / "vectors.h"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
 FILTER_FILE = FMU_SRC / "engine" / "filter.c"
 LANES_FILE = FMU_SRC / "engine" / "lanes.c"
+FILTER_LANES_FILE = FMU_SRC / "engine" / "filter_lanes.c"
 _LOCATION_FILE = FMU_SRC / "python" / "location.c"
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """The name by which PythonFMU's library for Linux knows itself."""
@@ -200,18 +202,18 @@ def compile_location(pythonfmu: bytes) -> bytes:
 def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
     """Return the compiler's arguments for a file of the engine: those of the FMU, so the numbers are the same.
 
-    The file that computes many vehicles in the lanes of a vector is compiled together with the engine, for the widest
-    vectors of this processor. There, a product and a sum are one operation with one rounding error, which takes a sixth
-    of the time away: the numbers need not be those of the FMU to the last bit. The compiler warns wrongly about
-    conditions that are vectors (-Wno-conversion).
+    The files that compute in the lanes of a vector are compiled for the widest vectors of this processor. The compiler
+    warns wrongly about conditions that are vectors (-Wno-conversion). The file for many vehicles is compiled together
+    with the engine. There, a product and a sum are one operation with one rounding error, which takes a sixth of the
+    time away: the numbers need not be those of the FMU to the last bit.
     """
     name = host_platform(fmi=3)
-    in_lanes = file == LANES_FILE.name
+    in_lanes, of_vehicles = file in (LANES_FILE.name, FILTER_LANES_FILE.name), file == LANES_FILE.name
     target = ["-target", PLATFORMS[name].target] if name else []
-    vectors = ["-mcpu=native", "-ffp-contract=on", "-Wno-conversion"]
+    vectors = ["-mcpu=native", "-Wno-conversion", *(["-ffp-contract=on"] if of_vehicles else [])]
     processor = vectors if in_lanes else [] if name else ["-mcpu=baseline"]
     libraries = PLATFORMS[name].flags if name else ("-lm",)
-    files = [file, ENGINE_FILE.name] if in_lanes else [file]
+    files = [file, ENGINE_FILE.name] if of_vehicles else [file]
     return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, *processor, "-Wno-unused-function", *files, *libraries]
 
 

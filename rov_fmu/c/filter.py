@@ -1,18 +1,19 @@
 """The extended Kalman filter of the identification, in C (fmu_src/engine/filter.c).
 
-It runs through the samples of one log with one set of parameters. The model of the log is a stochastic differential
-equation around the vehicle's equation of motion; filter.c states it.
+It runs through the samples of one log with one set of parameters, or with several at once. The model of the log is a
+stochastic differential equation around the vehicle's equation of motion; filter.c states it.
 """
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.c.compile import FILTER_FILE
+from rov_fmu.c.compile import FILTER_FILE, FILTER_LANES_FILE
 from rov_fmu.c.library import load_library
 from rov_fmu.c.simulation import places_of
 from rov_fmu.equation.attitude import QUATERNION
@@ -139,6 +140,10 @@ class _Output(ctypes.Structure):
     ]
 
 
+class _Set(ctypes.Structure):
+    _fields_ = [("numbers", ctypes.c_void_p), ("inputs", ctypes.c_void_p)]
+
+
 class DivergedError(Exception):
     """The motion of the model overflows."""
 
@@ -153,13 +158,10 @@ class Filter:
         than this share of the fastest time constant.
         """
         layout = vehicle.layout
-        self.layout, self._steps = layout, (longest, changing, share)
-        library = load_library(vehicle, FILTER_FILE)
-        sizes = (ctypes.c_int * 6)()
-        library.filter_sizes(sizes)
-        self.states, axes, sensors, self.variables, self.inputs, self.held = sizes
+        self.layout, self._steps, self._vehicle = layout, (longest, changing, share), vehicle
+        self._libraries: dict[Path, tuple[Callable[..., None], list[int]]] = {}
+        self.states, axes, sensors, self.variables, self.inputs, *_ = self._library(FILTER_FILE)[1]
         assert (axes, sensors) == (len(layout.axes), MOST_SENSORS)
-        self._run = library.run_filter
         self._places = places_of(layout)
         self._records: dict[tuple[Record, tuple[bool, ...]], tuple[_Record, list[object]]] = {}
         self._where = np.array(_where(layout, self._places), np.intc)
@@ -186,31 +188,61 @@ class Filter:
         `frozen`, also its gains, and no covariance is computed. With `begin` >= 0 the innovations are those of a
         prediction that starts anew at `begin`, and after each `span`. Raises DivergedError.
         """
-        n = len(record.time)
-        numbers = self._numbers(parameters)
-        log = self._record(record, parameters)
-        rows = np.ascontiguousarray(record.inputs if parameters.inputs is None else parameters.inputs, np.float64)
+        n, states = len(record.time), self.states
         pieces = np.ones(n, np.intc) if repeated is None else repeated.pieces
-        gains = repeated.gains if repeated is not None and frozen else np.zeros((n, self.states))
-        found = Run(
-            np.zeros(n),
-            np.zeros(0 if frozen else n),
-            pieces,
-            gains,
-            np.zeros((n, self.states) if with_states else (0, 0)),
-            np.zeros((n, self.states) if with_states else (0, 0)),
-        )
-        first, last = (found.innovations, found.variances), (gains, found.states, found.deviations)
-        arrays: list[Array | Indices] = [*first, pieces, *last]
-        output = _Output(*(array.ctypes.data if array.size else None for array in arrays))
+        gains = repeated.gains if repeated is not None and frozen else np.zeros((n, states))
+        asked = (n, states) if with_states else (0, 0)
+        found = Run(np.zeros(n), np.zeros(0 if frozen else n), pieces, gains, np.zeros(asked), np.zeros(asked))
         mode = _Mode(0 if repeated is None else 2 if frozen else 1, begin, min(span, 1e300))
-        scratch = np.zeros(len(record.told) * self.held // 8)
-        where, set_of, inputs, scratched = (
-            ctypes.c_void_p(array.ctypes.data) for array in (self._where, numbers, rows, scratch)
-        )
-        if self._run(where, ctypes.byref(log), set_of, inputs, ctypes.byref(mode), ctypes.byref(output), scratched):
+        if self._run(FILTER_FILE, record, [parameters], mode, [found]):
             raise DivergedError
         return found
+
+    def run_many(self, record: Record, sets: Sequence[Parameters], repeated: Run, *, frozen: bool) -> list[Run | None]:
+        """Run through a log with several sets of parameters, each in a lane of the processor's vectors.
+
+        All have the same slow processes, and repeat the steps of an earlier run and, with `frozen`, its gains. They
+        compute no gains of their own. A run that diverges is None and leaves the others alone.
+        """
+        n, gains = len(record.time), repeated.gains if frozen else np.zeros((0, 0))
+        found = [Run(np.zeros(n), np.zeros(0 if frozen else n), repeated.pieces, gains) for _ in sets]
+        mode = _Mode(2 if frozen else 1, -1.0, 0.0)
+        failed = self._run(FILTER_LANES_FILE, record, sets, mode, found)
+        return [None if k in failed else run for k, run in enumerate(found)]
+
+    def _library(self, file: Path) -> tuple[Callable[..., None], list[int]]:
+        """Return the function run_filter of a file, and its sizes."""
+        if file not in self._libraries:
+            library, sizes = load_library(self._vehicle, file), (ctypes.c_int * 7)()
+            library.filter_sizes(sizes)
+            library.run_filter.restype = None
+            self._libraries[file] = library.run_filter, list(sizes)
+        return self._libraries[file]
+
+    def _run(
+        self, file: Path, record: Record, sets: Sequence[Parameters], mode: _Mode, runs: Sequence[Run]
+    ) -> set[int]:
+        """Run through a log with sets of parameters, write the runs, and return the indices of those that diverge."""
+        run, (*_, held, lanes) = self._library(file)
+        log, failed = self._record(record, sets[0]), set[int]()
+        scratch = np.zeros(len(record.told) * held // 8 + 8)
+        aligned = ctypes.c_void_p(-(-scratch.ctypes.data // 64) * 64)
+        where = ctypes.c_void_p(self._where.ctypes.data)
+        for first in range(0, len(sets), lanes):
+            places = [min(first + lane, len(sets) - 1) for lane in range(lanes)]
+            arrays = [(self._numbers(one), _inputs(record, one)) for one in (sets[k] for k in places)]
+            results = [
+                (one.innovations, one.variances, one.pieces, one.gains, one.states, one.deviations)
+                for one in (runs[k] for k in places)
+            ]
+            given = (_Set * lanes)(*(_Set(*(array.ctypes.data for array in own)) for own in arrays))
+            outputs = (_Output * lanes)(
+                *(_Output(*(array.ctypes.data if array.size else None for array in own)) for own in results)
+            )
+            diverged = (ctypes.c_int * lanes)()
+            run(where, ctypes.byref(log), given, ctypes.byref(mode), outputs, diverged, aligned)
+            failed |= {k for k, has_diverged in zip(places, diverged, strict=True) if has_diverged}
+        return failed
 
     def _numbers(self, parameters: Parameters) -> Array:
         """Return the struct `parameters` of filter.c as an array."""
@@ -269,6 +301,11 @@ class Filter:
             state = "psi" if axis is YAW else ""
             return (STATE, self._places[state]) if state in self.vehicle_states else (ANGLE, axis.place)
         return STATE, self._places[DRIFTS[axis.place]]
+
+
+def _inputs(record: Record, parameters: Parameters) -> Array:
+    """Return the rows of inputs."""
+    return np.ascontiguousarray(record.inputs if parameters.inputs is None else parameters.inputs, np.float64)
 
 
 def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:

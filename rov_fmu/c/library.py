@@ -16,7 +16,9 @@ from rov_fmu.c.compile import (
     ENGINE_FILE,
     ENGINE_HEADER,
     FILTER_FILE,
+    FILTER_LANES_FILE,
     LANES_FILE,
+    VECTORS_HEADER,
     BuildError,
     compile_engine,
     engine_flags,
@@ -26,6 +28,13 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.vehicle import Vehicle
 
+_FILES = {
+    ENGINE_FILE: (ENGINE_HEADER, ENGINE_FILE),
+    LANES_FILE: (VECTORS_HEADER, ENGINE_HEADER, ENGINE_FILE, LANES_FILE),
+    FILTER_FILE: (FILTER_FILE,),
+    FILTER_LANES_FILE: (VECTORS_HEADER, FILTER_FILE, FILTER_LANES_FILE),
+}
+"""The files of each library; the last one is compiled."""
 _LOADED: dict[str, ctypes.CDLL] = {}
 """The libraries that this process has loaded, by the file and the layout of the vehicle."""
 _LOADING = Lock()
@@ -39,8 +48,7 @@ def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     key = f"{file.name} {vehicle.layout!r}"
     with _LOADING:
         if key not in _LOADED:
-            files = [file] if file == FILTER_FILE else [ENGINE_HEADER, ENGINE_FILE, file]
-            texts = sources(vehicle.layout) | {path.name: path.read_text(encoding="utf-8") for path in files}
+            texts = sources(vehicle.layout) | {path.name: path.read_text(encoding="utf-8") for path in _FILES[file]}
             try:
                 _LOADED[key] = _load(texts)
             except OSError as error:
@@ -72,7 +80,7 @@ def _key(texts: dict[str, str]) -> str:
         compiler = ""  # the compiler is not installed as a package
     *_, file = texts
     machine = sys.platform, platform.machine(), ctypes.sizeof(ctypes.c_void_p)
-    processor = _processor() if file == LANES_FILE.name else ""
+    processor = _processor() if file in (LANES_FILE.name, FILTER_LANES_FILE.name) else ""
     inputs = json.dumps([texts, engine_flags(file), compiler, machine, processor], sort_keys=True)
     return hashlib.sha256(inputs.encode()).hexdigest()[:32]
 

@@ -132,9 +132,9 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     proposed.records[number] = replace(record, value=-free.innovations)
     run = proposed.run(z, number)
     data = Data.of(run, len(z))
-    for k, parameter in enumerate(objective.table.parameters):
-        if parameter.of_motion and parameter.log is None and objective.concerns(parameter, number):
-            proposed.differentiate(z, number, k, run, data)
+    parameters = enumerate(objective.table.parameters)
+    concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
+    proposed.differentiate(z, number, concerned, run, data)
     return data.information()[1]
 
 

@@ -325,6 +325,40 @@ def test_frozen_gains_reproduce_the_run_that_they_come_from() -> None:
     assert np.abs(moved.innovations - first.innovations).max() > 1e-4
 
 
+@pytest.mark.parametrize("frozen", [False, True])
+@pytest.mark.parametrize("turns", [False, True])
+def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) -> None:
+    """They differ in coefficients, noise, and when commands act. One that diverges leaves the others alone."""
+    k = VIDEORAY if turns else LAGGING
+    if turns:
+        sensors, errors = PROBES, dict.fromkeys(("u", "r", "x", "y", "psi"), 0.1)
+        samples = [(0.1 * n, n % 3) for n in range(50)]
+        commands = (np.array([0.0, 1.02, 1.4, 3.0]), np.array([0.0, 0.4, -0.3, 0.2]))
+        log = record(sensors, samples, rows=commands, start={}, errors=errors, inputs=INPUTS)
+        known = parameters(k, 3, forces=(Slow(0.1),) * 3, gain=Slow(0.2, 5.0), coefficients=dict(k.coefficients))
+    else:
+        log, known = measured(k, record((DEPTH, VELOCITY), sampled())), with_all(k)
+    random, of_both = np.random.default_rng(7), Filter(k)
+
+    def moved() -> Parameters:
+        changed = {name: value * random.uniform(0.9, 1.1) for name, value in known.coefficients.items()}
+        louder = tuple(sigma * random.uniform(0.5, 2.0) for sigma in known.white)
+        offset, width = random.uniform(-0.1, 0.1), random.uniform(0.0, 1.0)
+        return replace(known, coefficients=changed, white=louder, offset=offset, width=width)
+
+    sets = [moved() for _ in range(11)]
+    first = of_both.run(log, replace(known, width=0.5))
+    alone = [of_both.run(log, one, repeated=first, frozen=frozen) for one in sets]
+    bad = replace(sets[5], coefficients={**sets[5].coefficients, "m_rov": np.nan})
+    found = of_both.run_many(log, [*sets[:5], bad, *sets[6:]], first, frozen=frozen)
+    assert [n for n, run in enumerate(found) if run is None] == [5]
+    for one, expected in zip(found, alone, strict=True):
+        if one is not None:
+            scale = np.abs(expected.innovations).max()
+            assert one.innovations == pytest.approx(expected.innovations, rel=1e-9, abs=1e-9 * scale)
+            assert one.variances == pytest.approx(expected.variances, rel=1e-9)
+
+
 def test_a_small_change_of_the_delay_counts_with_the_times_of_any_clock() -> None:
     """The clock of a ROS bag has numbers near 1.5e9, with steps of 2e-7 s. The samples are those of a clock from 0."""
     log, known, of_heave = measured(LAGGING, record((DEPTH, VELOCITY), sampled())), with_all(LAGGING), Filter(LAGGING)

@@ -118,13 +118,3 @@ def test_steps_of_any_length_agree(name: str) -> None:
     times = np.cumsum([0.0, 1e-6, 1e-3, 1000.0, 0.01, 30.0, 1e-3, 1.0, 0.01, 0.01, 1000.0])
     values = drawn(rng, rov, VEHICLES, len(times))
     assert difference(rov, times, values) < (1e-10 if name == "six" else SCALE)
-
-
-def test_a_reversal_in_one_lane_leaves_the_others_as_they_are() -> None:
-    times = np.arange(0.0, 3.0, 0.01)
-    surge = np.linspace(-1.0, 1.0, VEHICLES)[:, np.newaxis]
-    values = {"u": surge, "u_l": np.full((VEHICLES, 1), 0.5), "u_r": np.full((VEHICLES, 1), 0.5)}
-    found = simulate(VIDEORAY, times, values, vehicles=VEHICLES, lanes=True).values
-    velocity = found[[*VIDEORAY.layout.state].index("u")]
-    assert ((velocity[:, 0] < 0.0) & (velocity[:, -1] > 0.0)).sum() == VEHICLES // 2
-    assert difference(VIDEORAY, times, values) < SCALE

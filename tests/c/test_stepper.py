@@ -37,10 +37,6 @@ def test_steps_equal_one_simulation(n: int) -> None:
     assert stepper.time == pytest.approx(H * STEPS, abs=1e-12)
 
 
-def test_one_of_them_has_a_dead_time() -> None:
-    assert any(vehicle(n).layout.has_dead_time for n in range(len(FILES)))
-
-
 def test_a_motion_that_cannot_be_computed_is_told() -> None:
     rov = vehicle(0)
     stepper = Stepper(rov, {"u": 1e200}, ["u"])

@@ -182,8 +182,9 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
     assert etree.parse(str(picture)).getroot().tag.endswith("svg")
 
 
-def test_many_vehicles_are_measured_in_each_way(vehicle: Vehicle) -> None:
-    found = taylor.many_vehicles(vehicle, 1.0, 2)
+@pytest.mark.parametrize("cores", [1, 2])
+def test_many_vehicles_are_measured_in_each_way(vehicle: Vehicle, cores: int) -> None:
+    found = taylor.many_vehicles(vehicle, 1.0, 2, cores)
     ways = {taylor.OURS, taylor.LANES, taylor.TURNING, *(taylor.BATCHES if taylor.installed() else ())}
     assert {way: len(costs) for way, costs in found.seconds.items()} == dict.fromkeys(ways, 2)
     assert all(costs.min() > 0.0 for costs in found.seconds.values())

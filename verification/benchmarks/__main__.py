@@ -13,6 +13,7 @@ from rich.status import Status
 
 from rov_fmu.build import build
 from rov_fmu.c.compile import BuildError, host_platform
+from rov_fmu.c.simulation import usable_cores
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
@@ -129,7 +130,9 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
 def _many(effort: Effort, say: Callable[[str], Status]) -> Iterator[Section]:
     for limit, rov in _FLEETS.items():
         with say(f"many of {rov.name}"):
-            yield sections.many(rov.name, [many_vehicles(rov, h, effort.repetitions) for h in STEPS], limit)
+            for cores in sorted({1, usable_cores()}):
+                found = [many_vehicles(rov, h, effort.repetitions, cores) for h in STEPS]
+                yield sections.many(rov.name, found, limit)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

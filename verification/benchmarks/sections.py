@@ -76,7 +76,8 @@ def many(name: str, found: Sequence[Many], limit: float) -> Section:
 
     At 10 ms the promised ratio is at most `limit`.
     """
-    section = [[f"Many of {name}, one core, each and step", *(f"{one.h:g} s" for one in found)]]
+    where = "one core" if found[0].cores == 1 else f"{found[0].cores} cores"
+    section = [[f"Many of {name}, {where}, each and step", *(f"{one.h:g} s" for one in found)]]
     for way in found[0].seconds:
         cells = [duration(float(np.median(one.seconds[way]))) for one in found]
         if way in found[0].taken:

@@ -5,9 +5,11 @@ the heading. It is compiled once. The forces of a held command and the direction
 commands must not turn any velocity back. It computes no thrust and looks for no reversal, which favours it.
 """
 
+import copy
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -76,10 +78,12 @@ class Heyoka:
         return 1e-9 * seconds / (len(commands) * steps), end
 
     @cache  # noqa: B019 - heyoka compiles for seconds, and few of these objects are made
-    def integrator(self, size: int) -> Any:
-        """Return the integrator of `size` vehicles at once; that of one is the scalar one."""
+    def integrator(self, size: int, thread: int) -> Any:
+        """Return the integrator of `size` vehicles at once for a thread; that of one vehicle is the scalar one."""
         import heyoka
 
+        if thread:
+            return copy.deepcopy(self.integrator(size, 0))
         if size == 1:
             return self._integrator
         start, parameters = np.zeros((len(self._system), size)), np.zeros((len(self._parameters), size))
@@ -123,13 +127,19 @@ class Fleet:
         begun = [self._series.begun(*both) for both in zip(commands, starts, strict=True)]
         self._states, self._parameters = (np.array(part) for part in zip(*begun, strict=True))
 
-    def step(self, size: int, h: float, steps: int) -> tuple[float, float, bool]:
-        """Step `size` vehicles at once; 1 is the scalar integrator.
+    def step(self, size: int, h: float, steps: int, cores: int = 1) -> tuple[float, float, bool]:
+        """Step `size` vehicles at once, all of them on each core; 1 is the scalar integrator.
 
         Return the seconds and the steps that heyoka took, each per vehicle and step of h, and whether the states
         remained finite.
         """
-        integrator = self._series.integrator(size)
+        integrators = [self._series.integrator(size, n) for n in range(cores)]
+        with ThreadPoolExecutor(cores) as pool:
+            each = [pool.submit(self._step, own, size, h, steps) for own in integrators]
+        costs, taken, finite = zip(*(one.result() for one in each), strict=True)
+        return sum(costs) / cores**2, taken[0], all(finite)
+
+    def _step(self, integrator: Any, size: int, h: float, steps: int) -> tuple[float, float, bool]:
         seconds, taken, finite = 0, 0, True
         for first in range(0, len(self._states), size):
             states, parameters = (each[first : first + size].T for each in (self._states, self._parameters))
@@ -159,8 +169,9 @@ BATCHES = {"heyoka": 1, "heyoka, batches of 4": 4, "heyoka, batches of 8": 8}
 
 @dataclass(frozen=True)
 class Many:
-    """What many vehicles cost with steps of one length."""
+    """What many vehicles cost with steps of one length on some cores."""
 
+    cores: int
     h: float
     seconds: Mapping[str, Reals]
     """For each way to step them, the seconds per vehicle and step in each repetition."""
@@ -173,9 +184,10 @@ class Many:
         return float(np.median(self.seconds[way] / best))
 
 
-def many_vehicles(rov: Vehicle, h: float, repetitions: int) -> Many:
-    """Step vehicles that hold commands of their own, in turn by each way on one core.
+def many_vehicles(rov: Vehicle, h: float, repetitions: int, cores: int = 1) -> Many:
+    """Step vehicles that hold commands of their own, in turn by each way, as many on each core.
 
+    The time is the processor time of all cores over their number, so waiting for other programs does not count.
     They have moved for 0.2 s with their commands before, so no velocity turns back in what is measured. simulate_many
     computes the thrust, looks for reversals, and records all states after each step, which heyoka does not. In a run of
     their own, which heyoka cannot make, all commands change at random to and fro, each second or at each longer step.
@@ -184,21 +196,23 @@ def many_vehicles(rov: Vehicle, h: float, repetitions: int) -> Many:
     steps, layout = STEPS[h], rov.layout
     inputs: dict[str, Reals] = {name: commands[:, [n]] for n, name in enumerate(layout.commands)}
     starts = simulate(rov, [0.0, 0.2], inputs, vehicles=VEHICLES).values[:, :, -1].T
+    heyoka = Fleet(rov, commands, starts) if installed() else None
     values = inputs | {name: starts[:, [n]] for n, name in enumerate(layout.state)}
     times = h * np.arange(steps + 1)
     held = max(1, round(1.0 / h))
     changes = np.random.default_rng(49).uniform(-0.6, 0.6, (len(commands.T), VEHICLES, steps // held + 1))
     turning = values | dict(zip(inputs, np.repeat(changes, held, axis=2)[..., : steps + 1], strict=True))
     seconds, taken = defaultdict(list), {}
-    heyoka = Fleet(rov, commands, starts) if installed() else None
+    ours = {OURS: values, LANES: values, TURNING: turning}
+    on_all = {way: {name: np.tile(array, (cores, 1)) for name, array in given.items()} for way, given in ours.items()}
     for _ in range(repetitions + 1):  # the first one is not counted: it compiles
-        for way, given in {OURS: values, LANES: values, TURNING: turning}.items():
+        for way, given in on_all.items():
             began = time.process_time_ns()
-            simulate(rov, times, given, vehicles=VEHICLES, workers=1, lanes=way != OURS)
-            seconds[way].append(1e-9 * (time.process_time_ns() - began) / (VEHICLES * steps))
+            simulate(rov, times, given, vehicles=VEHICLES * cores, workers=cores, lanes=way != OURS)
+            seconds[way].append(1e-9 * (time.process_time_ns() - began) / (VEHICLES * steps * cores**2))
         if heyoka:
             for way, size in BATCHES.items():
-                cost, count, finite = heyoka.step(size, h, steps)
+                cost, count, finite = heyoka.step(size, h, steps, cores)
                 seconds[way].append(cost)
                 taken[way] = count if finite else np.nan
-    return Many(h, {way: np.array(costs[1:]) for way, costs in seconds.items()}, taken)
+    return Many(cores, h, {way: np.array(costs[1:]) for way, costs in seconds.items()}, taken)

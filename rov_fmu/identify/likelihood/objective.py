@@ -22,7 +22,7 @@ from functools import partial
 
 import numpy as np
 
-from rov_fmu.c.filter import Filter, Run
+from rov_fmu.c.filter import DivergedError, Filter, Run
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Curve, Layout
@@ -34,6 +34,8 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
+_TOGETHER = 8
+"""The number of parameters whose derivatives one thread computes at once: a multiple of the lanes of the filter."""
 OUTLYING = 3.0
 """The size of an innovation, in standard deviations, from which it counts less (as in filter.c)."""
 
@@ -198,14 +200,19 @@ class Objective:
         found = [Data.of(run, len(z)) for run in runs]
         work: list[Callable[[], None]] = []
         for n, run in enumerate(runs):
+            chosen: dict[bool, list[int]] = {False: [], True: []}
             for k, parameter in enumerate(self.table.parameters):
                 if not self.concerns(parameter, n):
                     continue
                 if with_noise or parameter.of_motion:
-                    work.append(partial(self.differentiate, z, n, k, run, found[n], exact=exact))
+                    chosen[parameter.keeps_gains and not exact].append(k)
                 elif earlier:
                     found[n].slopes[:, k] = earlier[n].slopes[:, k]
                     found[n].log_slopes[:, k] = earlier[n].log_slopes[:, k]
+            for places in chosen.values():
+                for first in range(0, len(places), _TOGETHER):
+                    some = places[first : first + _TOGETHER]
+                    work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
         with ThreadPoolExecutor(usable_cores()) as pool:
             for job in [pool.submit(one) for one in work]:
                 job.result()
@@ -213,19 +220,32 @@ class Objective:
             found.append(self._rows_data(z))
         return found
 
-    def differentiate(self, z: Array, n: int, k: int, run: Run, into: Data, *, exact: bool = True) -> None:
-        """Compute the derivatives of the innovations of a log with respect to one parameter, within its lower bound."""
-        parameter, step = self.table.parameters[k], self.table.parameters[k].step
-        frozen = parameter.keeps_gains and not exact
-        up, down = z.copy(), z.copy()
-        up[k] += step
-        down[k] -= step
-        above, below, width = self.run(up, n, repeated=run, frozen=frozen), run, step
-        if exact and down[k] >= parameter.low:
-            below, width = self.run(down, n, repeated=run), 2.0 * step
-        into.slopes[:, k] = (above.innovations - below.innovations) / width
-        if not frozen:
-            into.log_slopes[:, k] = np.log(above.variances / below.variances) / width
+    def differentiate(
+        self, z: Array, n: int, places: Sequence[int], run: Run, into: Data, *, exact: bool = True
+    ) -> None:
+        """Compute the derivatives of the innovations of a log with respect to parameters, within their lower bounds.
+
+        Their gains are all frozen, or all change. The runs are those of many parameters at once.
+        """
+        parameters = [self.table.parameters[k] for k in places]
+        frozen = parameters[0].keeps_gains and not exact
+        moves = [(k, own.step) for k, own in zip(places, parameters, strict=True)]
+        if exact:
+            moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
+        sets = []
+        for k, step in moves:
+            moved = z.copy()
+            moved[k] += step
+            sets.append(self.table.of_log(moved.tolist(), self.logs[n]))
+        runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=frozen), strict=True))
+        for k, own in zip(places, parameters, strict=True):
+            above, below = runs[k, own.step], runs.get((k, -own.step), run)
+            if above is None or below is None:
+                raise DivergedError
+            width = own.step if below is run else 2.0 * own.step
+            into.slopes[:, k] = (above.innovations - below.innovations) / width
+            if not frozen:
+                into.log_slopes[:, k] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
         off, variances = self.row_values(z)

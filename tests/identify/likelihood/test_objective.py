@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.c.filter import Run
+from rov_fmu.c.filter import Filter, Parameters, Record, Run
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.objective import Data, Objective, cost
@@ -57,6 +57,23 @@ def both_ways(objective: Objective, z: Array, n: int, runs: Sequence[Run]) -> It
 
 def names(parameters: Sequence[Parameter]) -> list[str]:
     return [" ".join(filter(None, (p.kind, p.of, p.part))) for p in parameters]
+
+
+def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
+    objective: Objective, place: Array, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = objective.runs(place)
+
+    def errors() -> Array:
+        _, information = total(objective, place, objective.data(place, runs))
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+
+    def one_by_one(self: Filter, record: Record, sets: Sequence[Parameters], first: Run, **how: bool) -> list[Run]:
+        return [self.run(record, one, repeated=first, **how) for one in sets]
+
+    in_lanes = errors()
+    monkeypatch.setattr(Filter, "run_many", one_by_one)
+    assert in_lanes == pytest.approx(errors(), rel=1e-6)
 
 
 def check_gradient(objective: Objective, z: Array) -> None:
