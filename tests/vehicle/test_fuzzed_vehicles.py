@@ -16,7 +16,7 @@ from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import REFIT
+from tests.commands import BARE, REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING
@@ -209,3 +209,13 @@ def test_a_rare_mistake_is_one_clear_line(case: str, path: Path) -> None:
     check_refusal(message, path)
     for word in named:
         assert word in message
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("identifier", ["x" * 100, "int", "__init__"])
+def test_any_identifier_makes_an_fmu(identifier: str, path: Path) -> None:
+    text = BARE.read_text(encoding="utf-8")
+    path.write_text(text.replace('identifier = "bare"', f'identifier = "{identifier}"'), encoding="utf-8")
+    fmu = path.with_name("out.fmu")
+    assert main(["build", str(path), "-o", str(fmu), "--platform", "host"]) == 0
+    assert read_model_description(str(fmu)).modelName == identifier
