@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -155,10 +156,7 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
         if curve.name in shapes.of:
             c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
 
-            def force(command: float, curve: Curve = curve) -> float:
-                return shapes.force(vehicle, curve, command)
-
-            coefficients |= fitted(curve, force, c_0, low, high)
+            coefficients |= fitted(curve, partial(shapes.forces, vehicle, curve), c_0, low, high)
     return coefficients | {name: table.base[name] for name in table.exact}
 
 

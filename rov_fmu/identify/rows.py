@@ -9,7 +9,7 @@ from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.objective import Objective, TableRow
+from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Point
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -39,7 +39,7 @@ def points_of(tests: Tests, held_out: HeldOut, vehicle: Vehicle, kind: str, only
             )
             out = held_out.get((quantity, subject, row.command), np.nan)
             counts = tests.counts(kind, subject, row.command)
-            numbers = row.command, row.value, one.model(vehicle, NO_SHAPES), out
+            numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out
             yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 
 
@@ -62,6 +62,7 @@ def held_out_rows(fit: Fit) -> HeldOut:
         ).z
         vehicle = Vehicle(objective.table.layout, objective.table.coefficients(z.tolist()))
         shapes = objective.table.shapes(z.tolist())
-        for row in (rows[n] for n in members):
-            found[row.quantity, row.subject.name, row.command] = row.model(vehicle, shapes)
+        some = [rows[n] for n in members]
+        for row, value in zip(some, modelled(some, vehicle, shapes).tolist(), strict=True):
+            found[row.quantity, row.subject.name, row.command] = value
     return found

@@ -154,7 +154,7 @@ def _peak(action: Callable[[], object]) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("rows", [4_000, pytest.param(40_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("rows", [10_000, pytest.param(40_000, marks=pytest.mark.long)])
 def test_a_log_takes_at_most_six_times_its_size_in_memory(rows: int, tmp_path: Path) -> None:
     path, layout = tmp_path / "log_dive.csv", load_vehicle(SHIPPED["bluerov2"]).layout
     _log(path, 300)

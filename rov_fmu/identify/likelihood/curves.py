@@ -82,10 +82,10 @@ class Shapes:
             found[:, place] = self.commands(curve.name, inputs[:, place])
         return found
 
-    def force(self, vehicle: Vehicle, curve: Curve, command: float) -> float:
-        """Return the steady thrust of all thrusters that a curve describes together, N."""
-        (acting,) = self.commands(curve.name, np.array([command])).tolist()
-        return curve.together * vehicle.curve_force(curve, acting)
+    def forces(self, vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
+        """Return the steady thrust of all thrusters that a curve describes together, for some commands, N."""
+        acting = self.commands(curve.name, commands).tolist()
+        return curve.together * np.array([vehicle.curve_force(curve, command) for command in acting])
 
     def motion(self, vehicle: Vehicle, axis: Axis, command: float) -> AxisAlone:
         """Return the equation of an axis alone under a held command, once the thrust is steady."""
@@ -101,10 +101,10 @@ class Shapes:
 NO_SHAPES = Shapes({})
 
 
-def fitted(curve: Curve, force: Callable[[float], float], c_0: float, low: float, high: float) -> dict[str, float]:
+def fitted(curve: Curve, forces: Callable[[Array], Array], c_0: float, low: float, high: float) -> dict[str, float]:
     """Return the coefficients a_t and b_t, ahead and astern, that are nearest to a curve over the tested commands.
 
-    `force` is the thrust of one command (N); the relative errors have equal weights over low to high.
+    `forces` gives the thrust for some commands (N); the relative errors have equal weights over low to high.
     """
     found: dict[str, float] = {}
     low = max(low, c_0 + 0.05)
@@ -112,7 +112,7 @@ def fitted(curve: Curve, force: Callable[[float], float], c_0: float, low: float
     for end, sign in (("", 1.0), (REVERSE, -1.0)):
         if f"a_t{end}" not in curve.keys:
             continue
-        F = np.array([sign * force(sign * c) for c in commands.tolist()])
+        F = sign * forces(sign * commands)
         beyond = commands - c_0
         a, b = np.linalg.lstsq(np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F)), rcond=None)[0]
         found |= {curve.coefficient(f"a_t{end}"): float(a), curve.coefficient(f"b_t{end}"): float(b)}

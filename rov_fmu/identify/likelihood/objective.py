@@ -63,12 +63,20 @@ class TableRow:
         curves = {thruster.curve for thruster in layout.drivers(self.subject)}
         return parameter.of in {"", self.subject.name, *curves}
 
-    def model(self, vehicle: Vehicle, shapes: Shapes) -> float:
-        """Return the value by the model, in the unit of the row."""
-        if isinstance(self.subject, Curve):
-            return shapes.force(vehicle, self.subject, self.command)
-        motion = shapes.motion(vehicle, self.subject, self.command)
-        return motion.steady_velocity() if self.quantity == "V_ss" else motion.time_constant()
+
+def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes) -> Array:
+    """Return the values of some rows by the model, in the unit of each row."""
+    found = np.zeros(len(rows))
+    forces: dict[Curve, list[int]] = {}
+    for n, row in enumerate(rows):
+        if isinstance(row.subject, Curve):
+            forces.setdefault(row.subject, []).append(n)
+            continue
+        motion = shapes.motion(vehicle, row.subject, row.command)
+        found[n] = motion.steady_velocity() if row.quantity == "V_ss" else motion.time_constant()
+    for curve, places in forces.items():
+        found[places] = shapes.forces(vehicle, curve, np.array([rows[n].command for n in places]))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +169,7 @@ class Objective:
         rows = self.rows if rows is None else rows
         vehicle = Vehicle(self.table.layout, self.table.coefficients(z.tolist()))
         shapes = self.table.shapes(z.tolist())
-        off = np.array([row.measured - row.model(vehicle, shapes) for row in rows])
+        off = np.array([row.measured for row in rows]) - modelled(rows, vehicle, shapes)
         noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
         return off, noise**2
 

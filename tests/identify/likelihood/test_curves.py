@@ -23,7 +23,8 @@ def test_a_curve_without_a_shape_keeps_its_commands() -> None:
     assert NO_SHAPES.commands("rear", COMMANDS).tolist() == COMMANDS.tolist()
     assert drawn(0).commands("top", COMMANDS).tolist() == COMMANDS.tolist()
     for command in (0.3, -0.7):
-        assert NO_SHAPES.force(VIDEORAY, REAR, command) == pytest.approx(2.0 * VIDEORAY.curve_force(REAR, command))
+        force = 2.0 * VIDEORAY.curve_force(REAR, command)
+        assert NO_SHAPES.forces(VIDEORAY, REAR, np.array([command])) == pytest.approx([force])
         for axis in (SURGE, HEAVE, YAW):
             motion = NO_SHAPES.motion(VIDEORAY, axis, command)
             response = VIDEORAY.response(axis, command)
@@ -50,7 +51,7 @@ def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
     def errors(p: np.ndarray) -> np.ndarray:
         rov = k.replaced({"c_0_t200": float(p[0])})
         shape = Shapes({curve.name: np.concatenate([p[2:], np.zeros(len(KNOTS))])}, {curve.name: (float(p[0]), 0.0)})
-        return np.asarray(np.exp(p[1]) * np.array([shape.force(rov, curve, c) for c in commands.tolist()]) - truth)
+        return np.asarray(np.exp(p[1]) * shape.forces(rov, curve, commands) - truth)
 
     best = least_squares(errors, [0.06, *np.zeros(1 + len(KNOTS))], diff_step=1e-5)
     assert np.abs(best.fun).max() < 0.05
@@ -63,8 +64,9 @@ def test_thrust_begins_at_the_dead_band_whatever_the_shape() -> None:
     for seed, size in ((0, 0.1), (1, 0.1), (2, 10.0)):
         deviation = size * np.random.default_rng(seed).standard_normal(COUNT)
         shape = Shapes({curve.name: deviation}, {curve.name: (0.07, 0.07)})
-        assert [shape.force(k, curve, c) for c in (0.0, 0.069, -0.069)] == [0.0, 0.0, 0.0]
-        assert shape.force(k, curve, 0.071) > 0.0 > shape.force(k, curve, -0.071)
+        assert not shape.forces(k, curve, np.array([0.0, 0.069, -0.069])).any()
+        ahead, astern = shape.forces(k, curve, np.array([0.071, -0.071]))
+        assert ahead > 0.0 > astern
 
 
 def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:
@@ -88,11 +90,11 @@ def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:
 def test_a_shape_is_fitted_where_it_was_tested() -> None:
     """No other quadratic curve has smaller relative errors over the tested commands, (6)."""
     shape, commands = drawn(5), np.linspace(0.2, 0.7, 40)
-    found = fitted(REAR, lambda c: shape.force(VIDEORAY, REAR, c), 0.0, 0.2, 0.7)
+    found = fitted(REAR, lambda c: shape.forces(VIDEORAY, REAR, c), 0.0, 0.2, 0.7)
 
     def error(coefficients: dict[str, float]) -> float:
         near = VIDEORAY.replaced(coefficients)
-        off = [NO_SHAPES.force(near, REAR, c) / shape.force(VIDEORAY, REAR, c) - 1.0 for c in commands.tolist()]
+        off = NO_SHAPES.forces(near, REAR, commands) / shape.forces(VIDEORAY, REAR, commands) - 1.0
         return float(np.sqrt(np.mean(np.square(off))))
 
     assert error(found) < 0.05 < error({})
