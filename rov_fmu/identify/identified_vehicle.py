@@ -1,6 +1,6 @@
 """The vehicle of a fit, with the sources, intervals and correlations of its coefficients."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +18,7 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.description import Provenance
-from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated, some_estimates
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -114,15 +114,9 @@ def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
         coefficients=numbers | {name: quantity.value for name, quantity in thrust.items()},
         sources=sources | {name: quantity.source for name, quantity in thrust.items()},
         intervals=intervals | {name: q.interval for name, q in thrust.items() if q.interval},
-        estimates={name: _of_kept(row, kept) for name, row in vehicle.estimates.items() if name in kept},
+        estimates=some_estimates(vehicle.estimates, kept),
         command_range=vehicle.command_range if tables.validity else (0.0, 1.0),
     )
-
-
-def _of_kept(row: Estimated, kept: Collection[str]) -> Estimated:
-    """Return an estimate with its correlations with the coefficients that are kept."""
-    correlation = {name: r for name, r in row.correlation.items() if name in kept}
-    return row.model_copy(update={"correlation": correlation})
 
 
 def _given_the_last(covariance: Array, count: int) -> Array:

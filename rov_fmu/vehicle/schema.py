@@ -299,6 +299,15 @@ class Estimated(Strict):
     """The correlations with other coefficients. Each pair is given once; without it, the correlation is 0."""
 
 
+def some_estimates(estimates: Mapping[str, Estimated], kept: Container[str]) -> dict[str, Estimated]:
+    """Return the estimates of the coefficients that are kept, with their correlations with each other."""
+    return {
+        name: row.model_copy(update={"correlation": {k: r for k, r in row.correlation.items() if k in kept}})
+        for name, row in estimates.items()
+        if name in kept
+    }
+
+
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 

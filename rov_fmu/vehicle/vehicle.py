@@ -27,7 +27,7 @@ from rov_fmu.vehicle.checks import check_parts, no_thrust
 from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, read_tables
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, read_tables, some_estimates
 
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
@@ -136,16 +136,11 @@ class Vehicle:
         check_coefficients(self.layout, values)
         if mistake := next(_contradictions(self.layout, {**self.coefficients, **values}), None):
             raise InputError(mistake)
-        estimates = {}
-        for name, estimated in self.estimates.items():
-            if name not in values:
-                kept = {other: r for other, r in estimated.correlation.items() if other not in values}
-                estimates[name] = estimated.model_copy(update={"correlation": kept})
         return replace(
             self.replaced(values),
             sources={**self.sources, **dict.fromkeys(values, BY_HAND)},
             intervals={name: interval for name, interval in self.intervals.items() if name not in values},
-            estimates=estimates,
+            estimates=some_estimates(self.estimates, self.coefficients.keys() - values.keys()),
         )
 
     @property
