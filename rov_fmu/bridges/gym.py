@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.io.messages import InputError
+from rov_fmu.io.messages import InputError, shown
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -43,6 +43,11 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
     def __init__(
         self, vehicle: Vehicle, count: int = 1, *, step: float = STEP, steps: int = STEPS, draws: bool = True
     ) -> None:
+        if not isinstance(vehicle, Vehicle):
+            raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, such as rov_fmu.load returns")
+        for name, value in {"count": count, "step": step, "steps": steps}.items():
+            if not value > 0:
+                raise InputError(f"{name} = {shown(value)}: must be above 0")
         layout = vehicle.layout
         self.vehicle, self.num_envs, self.length, self.steps = vehicle, count, step, steps
         self.draws = draws and len(vehicle.uncertainty.names) > 0
@@ -76,10 +81,11 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         """
         fractions = np.clip(np.asarray(actions, float), -1.0, 1.0)
         shape = self.num_envs, len(self.commands)
-        if fractions.shape != shape or not np.isfinite(fractions).all():
-            raise InputError(
-                f"actions: must be finite numbers of the shape {shape}, and have the shape {fractions.shape}"
-            )
+        if fractions.shape != shape:
+            raise InputError(f"actions: must have the shape {shape}, and have the shape {fractions.shape}")
+        if len(wrong := np.argwhere(~np.isfinite(fractions))):
+            vehicle, n = wrong[0].tolist()
+            raise InputError(f"actions: {self.commands[n]} of vehicle {vehicle} must be a finite number")
         layout, begun = self.vehicle.layout, self.over.copy()
         command_of = np.vectorize(layout.command_of, otypes=[float]) if layout.pulse else np.asarray
         commands = {name: command_of(fractions[:, n])[:, None] for n, name in enumerate(self.commands)}
@@ -124,5 +130,7 @@ class RovEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Hold the commands for one step."""
+        if np.shape(action) != self.action_space.shape:
+            raise InputError(f"action: must have the shape {self.action_space.shape}, and has {np.shape(action)}")
         state, reward, terminated, truncated, info = self.many.step(np.asarray(action)[np.newaxis])
         return state[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info

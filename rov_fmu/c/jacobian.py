@@ -14,6 +14,7 @@ the direction of a velocity is 0 where this velocity is 0, so the rates are cont
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.equation.expression import change_of, compiled, slope_name, tangents
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import equation_of
-from rov_fmu.io.messages import InputError, did_you_mean
+from rov_fmu.io.messages import InputError, did_you_mean, listed
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -64,9 +65,14 @@ def step_jacobian(
     a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
 
     Raises ValueError when the motion overflows or takes too many substeps, and InputError when a coefficient is
-    unknown.
+    unknown, an input or a state is missing, or h is not a time.
     """
     layout = vehicle.layout
+    if not 0.0 < h < inf:
+        raise InputError(f"h = {h}: must be a time above 0, s")
+    for what, needed, given in (("inputs", layout.inputs, inputs), ("state", layout.state, state)):
+        if missing := [name for name in needed if name not in given]:
+            raise InputError(f"{what}: {listed(missing)} must be given, too")
     for name in coefficients:
         if name not in vehicle.coefficients:
             raise InputError(f"coefficients: the vehicle has no {name!r}{did_you_mean(name, [*vehicle.coefficients])}")

@@ -3,6 +3,8 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from math import inf
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -14,6 +16,7 @@ from rov_fmu.bridges import arrays
 from rov_fmu.bridges.arrays import force_names
 from rov_fmu.c.simulation import Array, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
@@ -28,7 +31,7 @@ from rov_fmu.interface.arguments import (
     number_of_vehicles,
 )
 from rov_fmu.interface.result import Result
-from rov_fmu.io.messages import InputError, shown
+from rov_fmu.io.messages import InputError, only, shown
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 
@@ -200,6 +203,48 @@ class VehicleModel(Vehicle):
         Raises InputError if an input or a coefficient is unknown.
         """
         return arrays.forces(self, inputs, p)
+
+    def step(self, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> dict[str, float]:
+        """Return the states after h > 0 seconds with the inputs held, exact up to rounding.
+
+        `inputs` are those of `simulate` as numbers, also along axes: `vehicle.step({"surge": 0.3}, state, 0.1)`. The
+        other inputs have their usual values, and the states that `state` does not give are those at rest. Without a
+        dead time, repeated steps give the motion that `simulate` gives.
+
+        Raises InputError about an argument that cannot be used.
+        """
+        if not (isinstance(h, Real) and 0.0 < h < inf):
+            raise InputError(f"h = {shown(h)}: must be a time above 0, s")
+        return super().step(self._all_inputs(inputs), self._all_states(state), h)
+
+    def derivatives(self, inputs: Mapping[str, float], state: Mapping[str, float]) -> dict[str, float]:
+        """Return the time derivatives of the states by their names. The arguments are those of `step`."""
+        return super().derivatives(self._all_inputs(inputs), self._all_states(state))
+
+    def response(self, axis: Axis | str, command: float) -> tuple[float, float]:
+        """Return the signed V_ss, and Tau (17) from rest in s, of an axis alone: `vehicle.response("surge", 0.3)`.
+
+        Raises InputError if the vehicle has no such axis.
+        """
+        kinds = {name: kind.axis for name, kind in self.layout.kinds.items()}
+        if isinstance(axis, str) and axis not in kinds:
+            raise InputError(f"axis = {shown(axis)}: the vehicle has no such axis{only(axis, [*kinds])}")
+        return super().response(kinds[axis] if isinstance(axis, str) else axis, command)
+
+    def _all_inputs(self, inputs: Mapping[str, float]) -> dict[str, float]:
+        """Return the values of all inputs. Commands that act after the dead time pass as they are."""
+        layout = self.layout
+        delayed = {name: value for name, value in inputs.items() if name in layout.delayed}
+        given = {name: value for name, value in inputs.items() if name not in delayed}
+        _, values = checked_inputs(layout, np.array([0.0, 1.0]), given, many=False)
+        return {**layout.usual_inputs, **{name: float(value) for name, value in values.items()}, **delayed}
+
+    def _all_states(self, state: Mapping[str, float]) -> dict[str, float]:
+        """Return the values of all states, and the heading of a vehicle with an attitude if it is given."""
+        for name in state:
+            if name not in self.layout.state and name not in self.layout.continued:
+                raise InputError(f"state[{name!r}]: the vehicle has no such state{only(name, [*self.layout.state])}")
+        return {**self.layout.at_rest, **state}
 
     def build(
         self,

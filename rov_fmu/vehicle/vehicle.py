@@ -111,7 +111,7 @@ class Vehicle:
         return self.coefficients[name]
 
     def replaced(self, values: Values) -> Self:
-        """Return the vehicle with other values of some coefficients, which are not checked. It is cheap."""
+        """Return the vehicle with other values of some coefficients, without checking the values. It is cheap."""
         return replace(self, coefficients={**self.coefficients, **values})
 
     def extended(self, values: Values) -> Self:

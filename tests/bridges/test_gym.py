@@ -48,9 +48,26 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
     assert not states[:, : many.states.index("x")].any(), "a new episode begins at rest"
 
 
-@pytest.mark.parametrize("actions", [np.zeros((2, 3)), np.zeros(3), np.full((4, 3), np.nan)])
-def test_wrong_actions_give_one_line(actions: Any) -> None:
+@pytest.mark.parametrize(
+    ("actions", "message"),
+    [
+        (np.zeros((2, 3)), r"must have the shape \(4, 3\), and have the shape \(2, 3\)"),
+        (np.zeros(3), r"must have the shape \(4, 3\)"),
+        (np.full((4, 3), np.nan), "u_l of vehicle 0 must be a finite number"),
+    ],
+)
+def test_wrong_actions_give_one_line(actions: Any, message: str) -> None:
     env = RovVectorEnv(rov_fmu.load("videoray_refit"), 4)
     env.reset(seed=0)
-    with pytest.raises(InputError, match=r"^actions: must be finite numbers of the shape \(4, 3\)"):
+    with pytest.raises(InputError, match=f"^actions: {message}"):
         env.step(actions)
+
+
+def test_wrong_arguments_give_one_line() -> None:
+    vehicle: Any = "videoray"
+    with pytest.raises(InputError, match=r"^vehicle = 'videoray': must be a vehicle"):
+        RovEnv(vehicle)
+    with pytest.raises(InputError, match=r"^step = 0: must be above 0"):
+        RovEnv(rov_fmu.load(vehicle), step=0)
+    with pytest.raises(InputError, match=r"^action: must have the shape \(3,\), and has \(2,\)"):
+        RovEnv(rov_fmu.load(vehicle)).step(np.zeros(2))

@@ -13,7 +13,9 @@ from matplotlib.figure import Figure
 import rov_fmu
 from rov_fmu.build import build
 from rov_fmu.c.compile import OptionError
+from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.messages import FileError, InputError
@@ -242,6 +244,17 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": [1, -3]}),
         r"coefficients\['a_d_u'\] = -3: must be within 0 \.\.\. 1000000 N\.s2/m2",
     ),
+    "step of an unknown input": (
+        lambda v: v.step({"u_1": 1}, {}, 0.1),
+        r"inputs\['u_1'\]: .* no such input, only u_l, ",
+    ),
+    "step from an unknown state": (lambda v: v.step({}, {"q": 1}, 0.1), r"state\['q'\]: .* no such state, only u, w, "),
+    "step back": (lambda v: v.step({}, {}, -1.0), "h = -1.0: must be a time above 0, s"),
+    "response of an unknown axis": (lambda v: v.response("sway", 0.3), "axis = 'sway': .* only surge, heave, yaw"),
+    "derivatives of a step with missing inputs": (
+        lambda v: step_jacobian(v, {"u_l": 0.3}, v.layout.at_rest, 1.0),
+        "inputs: u_r, u_t, X_ext, .* must be given, too",
+    ),
     "no workers": (lambda v: v.simulate_many(TIMES, workers=0), "workers = 0: must be a whole number from 1 on"),
     "per vehicle and not per time": (
         lambda v: v.simulate_many(TIMES, {"u_l": np.full(1000, 0.1)}),
@@ -295,6 +308,16 @@ def test_a_command_along_an_axis_is_that_of_its_thrusters(videoray: VehicleModel
     expected = videoray.simulate(times, {"u_l": 0.3 + 0.1, "u_r": 0.3 - 0.1, "u_t": 0.02 * times})
     result = videoray.simulate(times, {"surge": 0.3, "yaw": 0.1, "heave": 0.02 * times})
     assert all(np.array_equal(result[name], expected[name]) for name in result)
+
+
+def test_a_step_takes_the_inputs_of_a_simulation(videoray: VehicleModel) -> None:
+    after = videoray.step({"surge": 0.3}, {"z": 2.0}, 1.0)
+    run = videoray.simulate([0.0, 1.0], {"surge": 0.3}, start={"z": 2.0})
+    assert after == pytest.approx({name: run[name][-1] for name in after}, rel=1e-12, abs=1e-12)
+    assert videoray.derivatives({"surge": 0.3}, {})["u"] == pytest.approx(
+        videoray.derivatives(AHEAD, videoray.layout.at_rest)["u"], rel=1e-15
+    )
+    assert videoray.response("surge", 0.3) == videoray.response(AXES["surge"], 0.3)
 
 
 def test_a_duration_gives_a_result_every_hundredth_of_a_second(videoray: VehicleModel) -> None:

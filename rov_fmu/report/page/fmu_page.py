@@ -78,7 +78,6 @@ def documentation_page(
     first = layout.axes[0].axis
     driven = [form.axis for form in layout.axes if layout.signs(form.axis)]
     start = layout.example(first)
-    rest = {**layout.usual_inputs, **layout.at_rest}
     shown = equations.of(layout)
     own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]
     return page(
@@ -112,7 +111,7 @@ def documentation_page(
         tolerance=f"{TOLERANCE:g}",
         first=first,
         moved=float(simulate(vehicle, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
-        moves_at_rest=any(vehicle.derivatives(rest, rest).values()),
+        moves_at_rest=any(vehicle.derivatives(layout.usual_inputs, layout.at_rest).values()),
         held=held,
         motions=[motion for axis in driven for motion in _motions(vehicle, axis, held)],
         frames=[image(label, path) for label, path in own],
