@@ -25,6 +25,9 @@ BETA, BETA_WITH_ADDED_MASS = (0.05, 1.2), (0.3, 3.0)
 """The range of a plausible β: without added mass, the inertia is between 20 times that of the vehicle and a little less
 than it, which wrong forces or masses may explain."""
 
+_LEAST = 1e-9
+"""The least size of a wanted V_ss or Tau. The relative errors of smaller ones overflow."""
+
 
 class TuningError(ValueError):
     """No tuning gives the wanted response. The message is one line."""
@@ -126,9 +129,9 @@ def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
         dead = all("c_0" in vehicle.layout.curve_of[t.name].keys for t in vehicle.layout.drivers(axis))
         return f"a command of {c:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"
     if point.quantity == "Tau":
-        return None if 0.0 < value < inf else f"Tau = {value:g} s must be above 0"
-    if not 0.0 < abs(value) < inf:
-        return f"V_ss = {value:g} {axis.unit} must be a number other than 0"
+        return None if _LEAST <= value < inf else f"Tau = {value:g} s must be at least {_LEAST:g} s"
+    if not _LEAST <= abs(value) < inf:
+        return f"V_ss = {value:g} {axis.unit} must have a size of at least {_LEAST:g} {axis.unit}"
     if _holding(vehicle, axis, value) * force > 0.0:
         return None
     form, allowed = vehicle.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"

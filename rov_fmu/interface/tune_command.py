@@ -48,7 +48,7 @@ def tune_vehicle(
     try:
         tuning = tune(vehicle, axis, wanted)
     except TuningError as error:
-        raise InputError(f"tune: {error}") from error
+        raise InputError(f"tune: {f'{points}: ' if points else ''}{error}") from error
     if output:
         write_tuned(
             path, output, {name: tuning.vehicle[name] for name in map(axis.coefficient, TUNING)}, source(wanted)

@@ -133,6 +133,7 @@ step = 0.01
 runs = 100000
 seed = 1
 vary = {{ m_rov.normal = {{ mean = 6.57, sd = 0.05 }} }}
+set = {{ u_l = 0.3 }}
 figures = {{ V = "u[-1]" }}
 """)
     arguments = ["-m", "rov_fmu", "study", str(plan), "-o", str(results), "--workers", "2"]

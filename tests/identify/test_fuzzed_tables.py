@@ -66,7 +66,11 @@ def check_line(text: str, folder: Path) -> None:
 
 
 def output_or_one_line(arguments: list[str], out: Path, folder: Path, capsys: Capsys) -> str:
-    """Run a command, and check for an output, which is then removed, or for one clear line. Return the line."""
+    """Run a command, and check for an output, which is then removed, or for one clear line. Return the line.
+
+    Only `tune` warns, about implausible results.
+    """
+    out.unlink(missing_ok=True)
     code = main([*arguments, str(out)])
     printed, err = capsys.readouterr()
     said = without_progress(err)
@@ -76,10 +80,11 @@ def output_or_one_line(arguments: list[str], out: Path, folder: Path, capsys: Ca
         check_line(said.removesuffix("\n"), folder)
         return said
     assert not re.search(r"\b(nan|inf)\b", printed)
-    assert said == ""
+    assert all(line.startswith(("rov-fmu: warning: ", " ")) for line in said.splitlines())
     if out.suffix == ".toml":
         assert all(isfinite(value) for value in load_vehicle(out).coefficients.values())
     out.unlink()
+    assert arguments[0] == "tune" or not said
     return ""
 
 

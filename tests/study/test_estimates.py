@@ -178,7 +178,10 @@ def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
     page = html.fromstring((done.results.folder / "study.html").read_text(encoding="utf-8"))
     items = [item.text_content() for item in page.xpath("//ul[@class='warnings']/li")]
     warnings = done.results.warnings
-    assert warnings[0] == "the plan gives no input: u_l, u_r, u_t, X_ext, Z_ext and 3 more keep their start values"
+    assert (
+        warnings[0]
+        == "the plan gives no input of the FMU (u_l, u_r, u_t, X_ext, Z_ext and 3 more): all keep their start values"
+    )
     assert warnings[1].startswith("the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.")
     assert warnings[2:] == ("what is correlated has one Sobol index together: a_d_u and b_d_u",)
     assert items == [f"{sentence(warning)}." for warning in warnings]

@@ -199,7 +199,8 @@ def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_do
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
     printed = capsys.readouterr()
     assert f"600 runs, {failed} failed, {600 - failed} incomplete" in printed.out.replace("\n", " ")
-    assert printed.err == f"rov-fmu: {done}: no run is complete with all its figures\n"
+    assert printed.err.endswith(f"\nrov-fmu: {done}: no run is complete with all its figures\n")
+    assert printed.err.startswith("rov-fmu: warning: the plan gives no input of the FMU (u): all keep their start ")
 
 
 def test_another_page_of_this_name_is_not_overwritten(

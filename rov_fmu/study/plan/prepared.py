@@ -78,7 +78,7 @@ def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
     if not names:
         yield f"{model.name} has no inputs: its parameters and start values alone determine its runs"
     elif not {*names} & {*given}:
-        yield f"the plan gives no input: {some_of(names)} keep their start values"
+        yield f"the plan gives no input of the FMU ({some_of(names)}): all keep their start values"
 
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
