@@ -20,11 +20,13 @@ from rov_fmu.identify.result import (
     MOST_UNKNOWN,
     Answer,
     Disturbance,
+    Point,
     Prediction,
     Slip,
     Verdict,
     Word,
     coverage_of,
+    relative_error,
 )
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL, NORMAL
@@ -55,6 +57,8 @@ GOOD, USABLE = 0.8, 0.6
 """The least coverage of the bands for each verdict."""
 _WIDEST = {"good": 0.15, "usable": 0.3}
 """The largest half-width of the best interval of V_ss for each verdict, relatively."""
+_FARTHEST: dict[Word, float] = {"do not use": 0.4, "usable": 0.2}
+"""The error of V_ss (RMS), predicted from the other commands of the tables, beyond which a verdict is given."""
 _MOVING = 3.0
 """A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
 
@@ -337,12 +341,15 @@ def verdict(
     slow: Sequence[Disturbance],
     difference: float,
     slips: Sequence[Slip] = (),
+    points: Sequence[Point] = (),
 ) -> Verdict:
     """Return whether the model of an axis may be trusted.
 
-    It is judged by its predictions, its intervals, what is unknown, two starts, and mistakes in the files of the axis.
+    It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, and
+    the rows of its tables, each predicted without those of the same command.
     """
     word, reasons = "good", []
+    to: Word
 
     def lower(to: Word, reason: str) -> None:
         nonlocal word
@@ -353,7 +360,7 @@ def verdict(
     judged = [p for p in found if p.is_judged]
     if judged:
         coverage = coverage_of(judged)
-        to: Word = "good" if coverage >= GOOD else "usable" if coverage >= USABLE else "do not use"
+        to = "good" if coverage >= GOOD else "usable" if coverage >= USABLE else "do not use"
         lower(to, f"The 95% bands contain {coverage:.0%} of the unseen samples.")
         moving = [p for p in judged if p.unchanged > _MOVING * p.noise]
         worse = [p for p in moving if p.error > p.unchanged]
@@ -378,6 +385,11 @@ def verdict(
         lower("do not use", f"The steady velocities are known to no better than {_WIDEST['usable']:.0%}.")
     elif min(widths) > 2.0 * _WIDEST["good"]:
         lower("usable", f"The steady velocities are known to no better than {_WIDEST['good']:.0%}.")
+    off = relative_error((p for p in points if p.quantity == "V_ss"), "held_out")
+    for to, most in _FARTHEST.items():
+        if off > most:
+            lower(to, f"The other commands predict a V_ss of the tables with an error of {off:.0%} (RMS).")
+            break
     for slip in slips:
         wrong = f"The {slip.quantity} in {slip.file} seems to have another unit or sign"
         lower("do not use", f"{wrong}, and all axes are fitted to this log.")

@@ -269,7 +269,7 @@ def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviati
     logged = {*tests.tested.logs}
     for form in layout.axes:
         axis = form.axis
-        if axis.name in logged:
+        if axis.name in logged or tests.tested.steady.get(axis.name):
             more |= {axis.coefficient(f"{key}{REVERSE}"): values[axis.coefficient(key)] for key in ("a_d", "b_d")}
             more[axis.coefficient("F_0")] = base.get(axis.coefficient("F_0"), 0.0)
     vehicle = _with_voltage(vehicle, base, tests)

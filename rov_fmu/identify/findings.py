@@ -5,7 +5,7 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from math import inf, isfinite, log, nan, sqrt
+from math import inf, isfinite, log
 from typing import Literal, get_args
 
 import numpy as np
@@ -23,8 +23,8 @@ from rov_fmu.identify.result import (
     Identification,
     Interval,
     Logging,
-    Point,
     Prediction,
+    relative_error,
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
@@ -413,13 +413,6 @@ def in_words(value: float, interval: Interval, unit: str) -> str:
 def unit_after(unit: str) -> str:
     """Return a unit as it follows a number: nothing for a ratio."""
     return "" if unit == "1" else f" {unit}"
-
-
-def relative_error(points: Iterable[Point], of: Literal["model", "held_out"]) -> float:
-    """Return the RMS of the relative errors of the points that count; NaN where there are none."""
-    off = [getattr(p, of) / p.measured - 1.0 for p in points if p.counts and p.measured]
-    off = [error for error in off if isfinite(error)]
-    return sqrt(sum(error**2 for error in off) / len(off)) if off else nan
 
 
 def answer_at(result: AxisResult, command: float) -> Answer | None:

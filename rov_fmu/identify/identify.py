@@ -109,7 +109,7 @@ def _axis(
     ]
     return AxisResult(
         axis=axis,
-        verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files]),
+        verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], points),
         answers=answers,
         known=_those_of(coefficients, names),
         predictions=own,

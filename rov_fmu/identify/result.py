@@ -5,7 +5,7 @@ Nothing here is computed: `identify` puts the result together, and the findings 
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, isfinite, nan, sqrt
 from typing import Literal
 
 import numpy as np
@@ -217,6 +217,13 @@ class Point:
     """The value by the information of all data but the rows of the same command. NaN where it is not determined."""
     counts: bool
     """False outside the window of rov.toml."""
+
+
+def relative_error(points: Iterable[Point], of: Literal["model", "held_out"]) -> float:
+    """Return the RMS of the relative errors of the points that count; NaN where there are none."""
+    off = [getattr(p, of) / p.measured - 1.0 for p in points if p.counts and p.measured]
+    off = [error for error in off if isfinite(error)]
+    return sqrt(sum(error**2 for error in off) / len(off)) if off else nan
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,12 @@ from rov_fmu.identify.findings import (
     by_heading,
     name_of,
     next_tests,
-    relative_error,
     repairs,
     size_in_words,
     verdict_in_words,
     with_error,
 )
-from rov_fmu.identify.result import Answer, AxisResult, Identification
+from rov_fmu.identify.result import Answer, AxisResult, Identification, relative_error
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
 from rov_fmu.vehicle.uncertainty import with_interval

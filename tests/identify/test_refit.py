@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import relative_error
 from rov_fmu.identify.likelihood.parameters import PRIORS
-from rov_fmu.identify.result import Identification, Point
+from rov_fmu.identify.result import Identification, Point, relative_error
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, TESTS
