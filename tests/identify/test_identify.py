@@ -11,11 +11,12 @@ from scipy.stats import binom
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.identify.assess import verdict
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
-from rov_fmu.identify.result import AxisResult, Identification
+from rov_fmu.identify.result import Answer, AxisResult, Identification, Point
 from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
@@ -96,6 +97,28 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
         assert p.held_out == pytest.approx(p.measured, rel=0.01)
         assert p.counts
     assert {p.quantity for p in heave.points} == {"V_ss", "Tau"}
+
+
+def test_tables_of_both_directions_tell_a_constant_load(tmp_path: Path) -> None:
+    """The steady velocities balance a_d V |V| + b_d V = F(c) + F_0 with F_0 = -0.2 N."""
+    rows, (a, b) = "", (TRUTH["a_d_w"], TRUTH["b_d_w"])
+    for c in (-0.9, -0.7, -0.5, -0.4, -0.3, 0.3, 0.4, 0.5, 0.7, 0.9):
+        force = c * (TRUTH["a_t_top"] * abs(c) + TRUTH["b_t_top"]) - 0.2
+        rows += f"{c},{np.sign(force) * (np.sqrt(b * b + 4.0 * a * abs(force)) - b) / (2.0 * a)}\n"
+    found = identify(read(tmp_path, KNOWN, {**FORCES, "steady_heave.csv": f"{SPEED}\n{rows}"}))
+    assert found.vehicle["F_0_w"] == pytest.approx(-0.2, rel=0.02)
+    low, high = found.vehicle.intervals["F_0_w"]
+    assert low <= -0.2 <= high
+
+
+@pytest.mark.parametrize(("off", "word"), [(0.1, "good"), (0.25, "usable"), (0.5, "do not use")])
+def test_a_verdict_counts_how_well_other_commands_predict_a_velocity(off: float, word: str) -> None:
+    answer = Answer(HEAVE, 0.3, (0.2, (0.19, 0.21)), (1.0, (0.9, 1.1)), (1.0, (0.9, 1.1)))
+    numbers = 0.3, 0.2, 0.2, 0.2 * (1.0 + off)
+    points = [Point("heave", "V_ss", "m/s", "steady_heave.csv", *numbers, counts=True)]
+    judged = verdict([], [answer], [], 0.0, (), points)
+    assert judged.word == word
+    assert (f"with an error of {off:.0%} (RMS)" in " ".join(judged.reasons)) == (word != "good")
 
 
 def test_rows_outside_the_window_do_not_count(tmp_path: Path) -> None:
