@@ -341,12 +341,12 @@ def verdict(
     slow: Sequence[Disturbance],
     difference: float,
     slips: Sequence[Slip] = (),
-    points: Sequence[Point] = (),
+    steady: Sequence[Point] = (),
 ) -> Verdict:
     """Return whether the model of an axis may be trusted.
 
     It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, and
-    the rows of its tables, each predicted without those of the same command.
+    the steady velocities of its tables, each predicted without the rows of the same command.
     """
     word, reasons = "good", []
     to: Word
@@ -385,7 +385,7 @@ def verdict(
         lower("do not use", f"The steady velocities are known to no better than {_WIDEST['usable']:.0%}.")
     elif min(widths) > 2.0 * _WIDEST["good"]:
         lower("usable", f"The steady velocities are known to no better than {_WIDEST['good']:.0%}.")
-    off = relative_error((p for p in points if p.quantity == "V_ss"), "held_out")
+    off = relative_error(steady, "held_out")
     for to, most in _FARTHEST.items():
         if off > most:
             lower(to, f"The other commands predict a V_ss of the tables with an error of {off:.0%} (RMS).")

@@ -103,17 +103,14 @@ def _axis(
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
-    points = [
-        *points_of(tests, held_out, vehicle, "steady", axis.name),
-        *points_of(tests, held_out, vehicle, "time_constant", axis.name),
-    ]
+    steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     return AxisResult(
         axis=axis,
-        verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], points),
+        verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady),
         answers=answers,
         known=_those_of(coefficients, names),
         predictions=own,
-        points=tuple(points),
+        points=(*steady, *times),
         next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits, answers),
     )
 
