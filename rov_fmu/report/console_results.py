@@ -82,7 +82,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")):
-        yield f"The report has {rest} more doubts and facts." if rest > 1 else "The report has one more doubt or fact."
+        yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))
 
 

@@ -99,6 +99,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "rows without command": "{files}: {count:#row} without a command left out",
     "torn rows": "{files}: {count:#row} with more cells than the header left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
+    "column without unit": "{files}: {column} is not read, because its header has no unit. Write for example {header}",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
     "beyond full thrust": "{files}: {count:#command} of {column} beyond full thrust taken as full thrust",
     "missing column": (

@@ -312,7 +312,7 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
         "Unseen data, RMS",
         "What else acts: lag of the thrusters (top 0.12 s)",
         *(f"- {warning}" for warning in made.warnings),
-        "The report has 4 more doubts and facts.",
+        "--report shows 4 more doubts and facts.",
         *(f"To measure next: {words}" for words in next_tests(example())),
     ]
     places = [text.index(part) for part in parts]

@@ -11,7 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from tests.tank.logs import Read, commanded, measured, read_log, used
 from tests.vehicles import VIDEORAY, thruster
 
@@ -63,6 +63,20 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     assert measured(log.log, "depth") == pytest.approx(expected)
     assert commanded(log.log, COMMAND, depth.time[depth.there]) == pytest.approx(
         [0.25 if n == 19 else STEP[n] for n in range(N)]
+    )
+
+
+def test_a_measurement_without_a_unit_is_told(tmp_path: Path) -> None:
+    log = read(
+        tmp_path,
+        "time [s],command [%],depth [m],heave speed,remark",
+        [f"{n / 10},30,{n},1,2" for n in range(40)],
+        HEAVE,
+    )
+    (finding,) = log.findings
+    assert finding.kind == "column without unit"
+    assert sentences([finding], SENTENCES) == (
+        "log.csv: 'heave speed' is not read, because its header has no unit. Write for example 'heave speed [m/s]'",
     )
 
 

@@ -116,6 +116,7 @@ def read_table(
     content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, commanding)
+    _tell_headers(content, table, known)
     if unlikely:
         content.findings.append(unlikely)
     return content, {header: entry for name, header in table.headers.items() if (entry := known[name].entry)}
@@ -233,6 +234,20 @@ def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> 
     for name in (name for name in commanding if table.units[name] in PULSES):
         count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
         content.count("no pulse", count, column=table.headers[name])
+
+
+def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:
+    """Add each header that would name a measurement if it had a unit."""
+    wanted = {
+        title.casefold(): one
+        for name, one in known.items()
+        if name not in table.values and one.entry and one.entry.quantity
+        for title in (name, *one.column.also)
+    }
+    for title in table.header:
+        if title not in table.headers.values() and (one := wanted.get(title.strip().casefold())):
+            better = shown(f"{title.strip()} [{next(iter(one.column.units))}]")
+            content.findings.append(about(table.path.name, "column without unit", column=shown(title), header=better))
 
 
 def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
