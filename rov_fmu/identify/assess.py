@@ -1,6 +1,6 @@
 """How far the model of each axis may be trusted: held-out predictions, answers and verdicts."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, log
 
@@ -57,8 +57,8 @@ GOOD, USABLE = 0.8, 0.6
 """The least coverage of the bands for each verdict."""
 _WIDEST = {"good": 0.15, "usable": 0.3}
 """The largest half-width of the best interval of V_ss for each verdict, relatively."""
-_FARTHEST: dict[Word, float] = {"do not use": 0.4, "usable": 0.2}
-"""The error of V_ss (RMS), predicted from the other commands of the tables, beyond which a verdict is given."""
+_FARTHEST = {"good": 0.2, "usable": 0.4}
+"""The largest error (RMS) of V_ss, predicted from the other commands of the tables, for each verdict, relatively."""
 _MOVING = 3.0
 """A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
 
@@ -335,6 +335,13 @@ def _response(motion: AxisAlone) -> tuple[float, float, float]:
 # ---- Verdicts --------------------------------------------------------------------------------------------------------
 
 
+def _exceeded(value: float, largest: Mapping[str, float]) -> tuple[Word, float] | None:
+    """Return the verdict for a value that exceeds the largest one for `good`, and the largest one that it exceeds."""
+    if value > largest["usable"]:
+        return "do not use", largest["usable"]
+    return ("usable", largest["good"]) if value > largest["good"] else None
+
+
 def verdict(
     found: Sequence[Prediction],
     given: Sequence[Answer],
@@ -349,7 +356,6 @@ def verdict(
     the steady velocities of its tables, each predicted without the rows of the same command.
     """
     word, reasons = "good", []
-    to: Word
 
     def lower(to: Word, reason: str) -> None:
         nonlocal word
@@ -360,7 +366,7 @@ def verdict(
     judged = [p for p in found if p.is_judged]
     if judged:
         coverage = coverage_of(judged)
-        to = "good" if coverage >= GOOD else "usable" if coverage >= USABLE else "do not use"
+        to: Word = "good" if coverage >= GOOD else "usable" if coverage >= USABLE else "do not use"
         lower(to, f"The 95% bands contain {coverage:.0%} of the unseen samples.")
         moving = [p for p in judged if p.unchanged > _MOVING * p.noise]
         worse = [p for p in moving if p.error > p.unchanged]
@@ -381,15 +387,11 @@ def verdict(
     widths = [(a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in given if a.command in COMMANDS]
     if not widths:
         lower("do not use", "No steady velocity is determined.")
-    elif min(widths) > 2.0 * _WIDEST["usable"]:
-        lower("do not use", f"The steady velocities are known to no better than {_WIDEST['usable']:.0%}.")
-    elif min(widths) > 2.0 * _WIDEST["good"]:
-        lower("usable", f"The steady velocities are known to no better than {_WIDEST['good']:.0%}.")
+    elif exceeded := _exceeded(0.5 * min(widths), _WIDEST):
+        lower(exceeded[0], f"The steady velocities are known to no better than {exceeded[1]:.0%}.")
     off = relative_error(steady, "held_out")
-    for to, most in _FARTHEST.items():
-        if off > most:
-            lower(to, f"The other commands predict a V_ss of the tables with an error of {off:.0%} (RMS).")
-            break
+    if exceeded := _exceeded(off, _FARTHEST):
+        lower(exceeded[0], f"The other commands predict a V_ss of the tables with an error of {off:.0%} (RMS).")
     for slip in slips:
         wrong = f"The {slip.quantity} in {slip.file} seems to have another unit or sign"
         lower("do not use", f"{wrong}, and all axes are fitted to this log.")

@@ -75,7 +75,7 @@ def checked_values(
     """
     arrays = {}
     for name in _names(what, given):
-        _check_name(what, name, declarations)
+        check_name(what, name, declarations)
         key = f"{what}[{name!r}]"
         values = _numbers(key, given[name])
         if values.ndim > many:
@@ -125,7 +125,7 @@ def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -
     for name in names:
         if name == TIME:
             continue
-        _check_name("inputs", name, layout.inputs, layout.kinds)
+        check_name("inputs", name, layout.inputs, layout.kinds)
         value = inputs[name]
         key = f"inputs[{name!r}]"
         if callable(value):
@@ -192,10 +192,10 @@ def _names(what: str, given: Any) -> list[str]:
     return list(given.keys())
 
 
-def _check_name(what: str, name: str, declarations: Mapping[str, Declaration], also: Collection[str] = ()) -> None:
+def check_name(what: str, name: str, declarations: Mapping[str, Declaration], also: Collection[str] = ()) -> None:
     """Raise InputError if no variable of this kind has the name, and it is not one of the others."""
     if name not in declarations and name not in also:
-        kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
+        kind = {"inputs": "input", "start": "state", "state": "state", "coefficients": "coefficient"}[what]
         names = [*declarations, *also]
         known = only(str(name), names) if len(names) < 20 else did_you_mean(str(name), names)
         raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{known}")

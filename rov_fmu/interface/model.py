@@ -21,6 +21,7 @@ from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
     Inputs,
+    check_name,
     checked_inputs,
     checked_record,
     checked_start,
@@ -236,14 +237,13 @@ class VehicleModel(Vehicle):
         layout = self.layout
         delayed = {name: value for name, value in inputs.items() if name in layout.delayed}
         given = {name: value for name, value in inputs.items() if name not in delayed}
-        _, values = checked_inputs(layout, np.array([0.0, 1.0]), given, many=False)
-        return {**layout.usual_inputs, **{name: float(value) for name, value in values.items()}, **delayed}
+        _, values = checked_inputs(layout, np.zeros(1), given, many=False)
+        return {**layout.usual_inputs, **{name: value.item() for name, value in values.items()}, **delayed}
 
     def _all_states(self, state: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all states, and the heading of a vehicle with an attitude if it is given."""
         for name in state:
-            if name not in self.layout.state and name not in self.layout.continued:
-                raise InputError(f"state[{name!r}]: the vehicle has no such state{only(name, [*self.layout.state])}")
+            check_name("state", name, self.layout.state, self.layout.continued)
         return {**self.layout.at_rest, **state}
 
     def build(

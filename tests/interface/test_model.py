@@ -249,6 +249,10 @@ WRONG: dict[str, tuple[Call, str]] = {
         r"inputs\['u_1'\]: .* no such input, only u_l, ",
     ),
     "step from an unknown state": (lambda v: v.step({}, {"q": 1}, 0.1), r"state\['q'\]: .* no such state, only u, w, "),
+    "step of several values": (
+        lambda v: v.step({"u_l": [0.1, 0.2]}, {}, 0.1),  # type: ignore[dict-item]
+        r"inputs\['u_l'\]: must be a number, or an array of the shape \(1,\)",
+    ),
     "step back": (lambda v: v.step({}, {}, -1.0), "h = -1.0: must be a time above 0, s"),
     "response of an unknown axis": (lambda v: v.response("sway", 0.3), "axis = 'sway': .* only surge, heave, yaw"),
     "derivatives of a step with missing inputs": (

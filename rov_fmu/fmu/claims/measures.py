@@ -260,7 +260,8 @@ def limits(subject: Subject) -> Evidence:
         words += f". Not refused: {listed(accepted)}."
     else:
         words += "." if changed else ", and the old values stay."
-    words += f" A refusal changes something: {listed(changed)}." * bool(changed)
+    if changed:
+        words += f" A refusal changes something: {listed(changed)}."
     if is_free := bool(accepted) and not subject.is_ours:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
     rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in answers]

@@ -217,10 +217,10 @@ class Objective:
                 elif earlier:
                     found[n].slopes[:, k] = earlier[n].slopes[:, k]
                     found[n].log_slopes[:, k] = earlier[n].log_slopes[:, k]
-            for places in chosen.values():
+            for frozen, places in chosen.items():
                 for first in range(0, len(places), _TOGETHER):
                     some = places[first : first + _TOGETHER]
-                    work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
+                    work.append(partial(self.differentiate, z, n, some, run, found[n], frozen=frozen, exact=exact))
         with ThreadPoolExecutor(usable_cores()) as pool:
             for job in [pool.submit(one) for one in work]:
                 job.result()
@@ -229,14 +229,22 @@ class Objective:
         return found
 
     def differentiate(
-        self, z: Array, n: int, places: Sequence[int], run: Run, into: Data, *, exact: bool = True
+        self,
+        z: Array,
+        n: int,
+        places: Sequence[int],
+        run: Run,
+        into: Data,
+        *,
+        frozen: bool = False,
+        exact: bool = True,
     ) -> None:
         """Compute the derivatives of the innovations of a log with respect to parameters, within their lower bounds.
 
-        Their gains are all frozen, or all change. The runs are those of many parameters at once.
+        The filter runs with the changes of all these parameters at once, and with `frozen` keeps the gains of the run.
+        Exact derivatives are differences to both sides.
         """
         parameters = [self.table.parameters[k] for k in places]
-        frozen = parameters[0].keeps_gains and not exact
         moves = [(k, own.step) for k, own in zip(places, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]

@@ -6,7 +6,7 @@ from math import isclose
 
 import numpy as np
 
-from rov_fmu.io.messages import listed
+from rov_fmu.io.messages import first_of, listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.model import Variable, unsettable
 from rov_fmu.study.plan.plan import Plan
@@ -102,7 +102,4 @@ class Estimates:
 
 def some_of(words: Sequence[str]) -> str:
     """Return the first words as a list in a sentence."""
-    some = [*words[:_SHOWN]]
-    if len(words) > _SHOWN:
-        some.append(f"{len(words) - _SHOWN} more")
-    return listed(some)
+    return listed(first_of(words, _SHOWN))
