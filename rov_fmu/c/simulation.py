@@ -50,6 +50,19 @@ def places_of(layout: Layout) -> dict[str, int]:
     return places | {f"der({name})": places[name] + len(layout.state) for name in layout.state}
 
 
+def numbers_of(vehicle: Vehicle, values: Mapping[str, float] = MappingProxyType({})) -> Array:
+    """Return the number of each variable in the arrays of the C code.
+
+    Inputs have their usual values, coefficients those of the vehicle, and states are 0, unless `values` has others.
+    """
+    places = places_of(vehicle.layout)
+    numbers = np.zeros(len(places))
+    for name, number in {**vehicle.layout.usual_inputs, **vehicle.coefficients, **values}.items():
+        if name in places:
+            numbers[places[name]] = number
+    return numbers
+
+
 def tables_of(numbers: Array) -> NDArray[np.void]:
     """Return a table for each number, which is the same for all vehicles and times. The array must stay alive."""
     tables = np.zeros(len(numbers), TABLE)
@@ -87,15 +100,10 @@ def simulate(
 
     Raises BuildError when the engine cannot be compiled. The arguments are not checked.
     """
-    layout = vehicle.layout
-    record = list(layout.state) if record is None else record
+    record = list(vehicle.layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
     shape = vehicles, len(times)
-    places = places_of(layout)
-    numbers = np.zeros(len(places))
-    for name, number in {**layout.usual_inputs, **vehicle.coefficients}.items():
-        if name in places:
-            numbers[places[name]] = number
+    places, numbers = places_of(vehicle.layout), numbers_of(vehicle)
     tables = tables_of(numbers)
     arrays = []  # keeps the arrays alive while C uses their addresses
     for name, value in values.items():

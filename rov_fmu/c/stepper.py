@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import places_of, tables_of
+from rov_fmu.c.simulation import numbers_of, places_of, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -31,12 +31,9 @@ class Stepper:
         # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
         vehicle = Vehicle(replace(layout, has_dead_time=False), vehicle.coefficients)
         places, states = places_of(vehicle.layout), [*vehicle.layout.state]
-        self._numbers = np.zeros(len(places))
+        self._numbers = numbers_of(vehicle, start)
         continued = [f"{name}_0" for name in vehicle.layout.continued]  # the heading of a vehicle with an attitude
         tables = tables_of(self._numbers)
-        for name, value in {**vehicle.coefficients, **vehicle.layout.usual_inputs, **start}.items():
-            if name in places:
-                self._numbers[places[name]] = value
         kept = [*states, *vehicle.layout.continued]
         recorded = np.array([places[name] for name in (*kept, *record)], np.intc)
         self._kept = np.array([places[name] for name in (*states, *continued)])
