@@ -40,9 +40,9 @@ RISE = 1.0 - 1.0 / e
 """The fraction of V_ss that is reached after Tau, (17)."""
 
 
-def closed_form(A: Expression, B: Expression, C: Expression) -> dict[str, Expression]:
+def closed_form() -> dict[str, Expression]:
     """Return the formulas of D, V_ss and Tau. Without drag, and where A drives the axis, V_ss and Tau are infinite."""
-    D = Name("D")
+    A, B, C, D = map(Name, "ABCD")
     without_drag = where(equal(C, 0.0), 0.0, directed(C, inf, -inf))
     return {
         "D": where(A < 0.0, 0.0, call("hypot", B, 2.0 * call("sqrt", A) * call("sqrt", call("abs", C)))),
@@ -87,20 +87,20 @@ def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """Return the formulas of V_ss and Tau of an axis alone, after those that they contain."""
     formulas = alone_formulas(layout, velocity)
     drag = {key: directed(Name("C"), formulas[key], formulas[key + REVERSE]) for key in POWERS.values()}
-    return {"C": formulas["C"], **drag, **closed_form(*map(Name, "ABC"))}
+    return {"C": formulas["C"], **drag, **closed_form()}
 
 
-_closed_form = compiled(closed_form(*map(Name, "ABC")))
+_closed_form = compiled(closed_form())
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:
     """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag."""
-    return float(_closed_form({"A": A, "B": B, "C": C})["V_ss"])
+    return AxisAlone(A, B, C).steady_velocity()
 
 
 def time_constant(A: float, B: float, C: float) -> float:
     """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag."""
-    return float(_closed_form({"A": A, "B": B, "C": C})["Tau"])
+    return AxisAlone(A, B, C).time_constant()
 
 
 @dataclass(frozen=True)
@@ -130,11 +130,16 @@ class AxisAlone:
 
     def steady_velocity(self) -> float:
         """Return V_ss."""
-        return steady_velocity(*self.drag(self.C), self.C)
+        return self._response("V_ss")
 
     def time_constant(self) -> float:
         """Return Tau of (17), from rest."""
-        return time_constant(*self.drag(self.C), self.C)
+        return self._response("Tau")
+
+    def _response(self, name: str) -> float:
+        """Return one of the numbers of `closed_form`."""
+        A, B = self.drag(self.C)
+        return float(_closed_form({"A": A, "B": B, "C": self.C})[name])
 
     def stopping_way(self, v: float, share: float) -> float:
         """Return the way from v until `share` of it without any force, m or rad: the integral of 1 / (A |v| + B)."""
