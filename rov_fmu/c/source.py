@@ -133,7 +133,7 @@ class EquationSource:
     def alone(self, velocity: str, number: int) -> list[str]:
         """Return statements that compute V_ss and Tau of an axis alone."""
         places = {"V_ss": f"marks[{number}][0]", "Tau": f"marks[{number}][1]"}
-        return _statements(response_formulas(self.layout, velocity), places, self._in_c)
+        return _statements(_needed(response_formulas(self.layout, velocity), map(Name, places)), places, self._in_c)
 
     @cached_property
     def blocks(self) -> list[tuple[str, ...]]:
