@@ -1,6 +1,6 @@
 """The forces and moments along the axes of a vehicle. Each is declared once, by a function that `forces_of` calls.
 
-The table of terms (equation.py), the motion of one axis alone (alone.py), the dependencies and derivatives, and the
+The table of terms (terms.py), the motion of one axis alone (alone.py), the dependencies and derivatives, and the
 equations on the page of an FMU follow from these declarations. So does what other simulators lack, and what the page
 lists as left out, from the effects.
 """
