@@ -5,7 +5,7 @@ equations on the page of an FMU follow from these declarations. So does what oth
 lists as left out, from the effects.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 
@@ -13,7 +13,6 @@ from .attitude import entry
 from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
 from .expression import Expression, Name, Names, call, directed, product, scaled, total
 from .layout import FAINT, Curve, Layout, effect_along
-from .thrust import steady_name
 
 
 @dataclass(frozen=True)
@@ -118,19 +117,21 @@ def _loads(layout: Layout, names: Names) -> Iterator[Force]:
 
 
 def thrusts(
-    layout: Layout, axis: Axis, names: Names, curve: Curve | None = None, *, arriving: bool = False
+    layout: Layout,
+    axis: Axis,
+    names: Names,
+    curve: Curve | None = None,
+    force_of: Callable[[str, Curve], Expression] = lambda thruster, _: Name(f"F_{thruster}"),
 ) -> list[Expression]:
     """Return the thrusts along an axis, or their moments about it: all of them, or only those of a curve.
 
-    `arriving` gives the changes of these thrusts until they are steady.
+    `force_of` gives another force of a thruster in place of its thrust, by its name and its curve.
     """
     parts = []
     for t in layout.drivers(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
-            force: Expression = Name(f"F_{t.name}")
-            if arriving:
-                force = steady_name(t.name, own, names) - force
+            force = force_of(t.name, own)
             if axis is YAW and t.position is None and t.arm:
                 force = names("arm") * force
             parts.append(scaled(t.effect(axis), force))

@@ -18,7 +18,7 @@ from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rat
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
 from .expression import Expression, Name, Names, call, directed, of, product, scaled, total, where
 from .forces import COUPLING, Effect, Force, forces_of, thrusts
-from .layout import EVERY_COMMAND, Layout, Range, ThrustTable
+from .layout import EVERY_COMMAND, Curve, Layout, Range, ThrustTable
 from .mass import MassMatrix
 from .thrust import steady_name, thrust_formulas
 
@@ -329,11 +329,15 @@ class _Table:
 
     def _arriving(self, v: str, inverse: Mapping[str, Name]) -> Iterator[Term]:
         """Yield, for each lag, the change of acceleration until the thrust is steady."""
+
+        def change_of(thruster: str, curve: Curve) -> Expression:
+            return steady_name(thruster, curve, self.names) - Name(f"F_{thruster}")
+
         for curve in (curve for curve in self.layout.curves if curve.has_lag):
             changes = []
             for other, gain in inverse.items():
                 axis = self.layout.by_velocity[other].axis
-                if arriving := thrusts(self.layout, axis, self.names, curve, arriving=True):
+                if arriving := thrusts(self.layout, axis, self.names, curve, change_of):
                     changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
             if changes:
                 change = self._named(total(changes), "arriving", v, curve.name)
