@@ -255,18 +255,21 @@ def limits(subject: Subject) -> Evidence:
     accepted = [what for what, answer in answers if answer.refused < answer.tried]
     changed = [what for what, answer in answers if answer.kept < answer.refused]
     share = f"{len(answers) - len(accepted)} of {len(answers)}"
-    words = f"{share} kinds of impossible values and steps are refused"
-    if accepted:
-        words += f". Not refused: {listed(accepted)}."
-    else:
-        words += "." if changed else ", and the old values stay."
-    if changed:
-        words += f" A refusal changes something: {listed(changed)}."
-    if is_free := bool(accepted) and not subject.is_ours:
+    is_free = bool(accepted) and not subject.is_ours
+    words = f"{share} kinds of impossible values and steps are refused{_exceptions(accepted, changed)}"
+    if is_free:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
     rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in answers]
     result: Result = "measured" if is_free and not changed else _is(not (accepted or changed))
     return Evidence(result, words, share, ("Asked for", "Refused", "Answer"), rows)
+
+
+def _exceptions(accepted: list[str], changed: list[str]) -> str:
+    """Return the end of the sentence about refusals: what is not refused, and what changes something."""
+    if not (accepted or changed):
+        return ", and the old values stay."
+    words = f". Not refused: {listed(accepted)}." if accepted else "."
+    return words + (f" A refusal changes something: {listed(changed)}." if changed else "")
 
 
 def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
