@@ -138,7 +138,7 @@ def _left_out_of_forces(layout: Layout) -> Iterator[str]:
         "a delay at the start": layout.has_dead_time,
     }
     static = listed(words for words, is_there in own_terms.items() if not is_there)
-    yield f"As terms of their own: {static}; β < 1 stands for a slow start."
+    yield f"Separate terms for {static}; β < 1 stands for a slow start."
     if "heave" in layout.kinds and not layout.restoring:
         load = "Beyond the constant load F_0_w, buoyancy" if "F_0_w" in layout.coefficients else "Buoyancy"
         yield f"{load} is neutral."
