@@ -233,7 +233,7 @@ def _first_sentence(words: str) -> str:
 
 def _equations(name: str) -> str:
     """The equations of a vehicle that ships, a line each; the number of the paper's equation behind."""
-    lines = [(str(line), line.reference) for line in equations.of(load_vehicle(SHIPPED[name]).layout)]
+    lines = [(str(line), line.reference) for line in equations.equations_of(load_vehicle(SHIPPED[name]).layout)]
     return "\n".join(f"{line:<96} {reference}".rstrip() for line, reference in lines)
 
 

@@ -550,7 +550,7 @@ def _prove(
 ) -> None:
     """Run the experiments that an FMU of any exporter contains (FMI-LS-REF), and compare the results.
 
-    Before, hashes in the FMU and a signature beside it are checked.
+    First, the hashes in the FMU and the signature beside it are checked, if there are any.
     """
     if str(fmu) in SHIPPED and not fmu.exists():
         raise FileError(f"{fmu}: must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")

@@ -27,8 +27,8 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     low, high = vehicle.command_range
     made = vehicle.provenance
     data = [f"Source of the coefficients: {vehicle.source}."]
-    trust = ["No errors on unseen data are known: the vehicle file does not say how it was identified."]
-    holds = ["Forces from outside drive it, its inputs; it has no thrusters."]
+    trust = ["Nothing was checked on unseen data: the vehicle file does not say how it was identified."]
+    holds = ["It has no thrusters: its inputs are forces from outside."]
     if vehicle.layout.driven:
         holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
     holds += [
@@ -112,7 +112,7 @@ def _left_out(layout: Layout) -> Iterator[str]:
     """Yield what the equation of the vehicle lacks, in sentences."""
     yield from _left_out_of_motion(layout)
     yield from _left_out_of_forces(layout)
-    yield "The tether pulls at nothing unless it is connected as loads."
+    yield "A tether: it acts only if its force is connected as a load."
     yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.kinds else ''}"
     level = "" if layout.has_attitude else ", horizontal"
     yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
@@ -138,7 +138,7 @@ def _left_out_of_forces(layout: Layout) -> Iterator[str]:
         "a delay at the start": layout.has_dead_time,
     }
     static = listed(words for words, is_there in own_terms.items() if not is_there)
-    yield f"As terms of their own: {static}; β < 1 stands for a slow start."
+    yield f"Separate terms for {static}; β < 1 stands for a slow start."
     if "heave" in layout.kinds and not layout.restoring:
         load = "Beyond the constant load F_0_w, buoyancy" if "F_0_w" in layout.coefficients else "Buoyancy"
         yield f"{load} is neutral."

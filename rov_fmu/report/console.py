@@ -177,12 +177,11 @@ def print_evidence(evidence: "MetaData") -> None:
 
 
 def print_claims(proof: "Proof") -> None:
-    """Print the result and the figure of every claim about an FMU."""
-    found = table("", "claim", ())
-    for column in ("result", "figure"):
-        found.add_column(column)
+    """Print the result and the figure of every claim about an FMU, and why a claim was not checked."""
+    found = table("", "claim", (), ("result", "figure"))
     for claim, evidence in proof.evidence:
-        found.add_row(claim.name.lower(), evidence.result, evidence.figure)
+        reason = evidence.sentence if evidence.result in ("not checked", "does not apply") else ""
+        found.add_row(claim.name.lower(), evidence.result, evidence.figure or reason)
     print_table(found)
 
 

@@ -86,11 +86,6 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     yield from (f"To measure next: {test}" for test in next_tests(identification))
 
 
-def _against(value: float, measured: float) -> tuple[str, str]:
-    """Return the cells for a value of a model and its deviation from the measured value."""
-    return text(value, ".4f"), text(value / measured - 1.0, DEVIATION)
-
-
 def print_tuning(tuning: Tuning) -> None:
     """Print α and β, the response at the wanted points, and the inputs of these commands."""
     out = console()
@@ -101,9 +96,9 @@ def print_tuning(tuning: Tuning) -> None:
         out.print(f"{name} = {value}" + (f"   95 %: {low} ... {high}" if interval else ""))
     result = table("", "command", ("quantity", "wanted", "model", "dev."))
     for p in tuning.points:
-        result.add_row(
-            f"{p.command:.0%}", p.quantity, f"{p.value:.4g}", *_against(p.by(tuning.vehicle, tuning.axis), p.value)
-        )
+        model = p.by(tuning.vehicle, tuning.axis)
+        deviation = text(model / p.value - 1.0, DEVIATION)
+        result.add_row(f"{p.command:.0%}", p.quantity, f"{p.value:.4g}", text(model, ".4f"), deviation)
     print_table(result)
     layout = tuning.vehicle.layout
     for command in dict.fromkeys(p.command for p in tuning.points):

@@ -46,22 +46,10 @@ def proof_page(proof: Proof, *, made: date | None = None) -> str:
         draw = with_even_text(partial(_PLOTS[claim.name], **evidence.curve))
         return inline_svg(f"{claim.name}: {evidence.sentence}", draw, _SIZE, salt=claim.name)
 
-    description = proof.description
     return page(
         "proof.html.j2",
         proof=proof,
         made=made or today(),
-        name=description.modelName,
-        about=description.description or "",
-        tool=description.generationTool or "an unknown tool",
-        interfaces=[
-            words
-            for words, has in (
-                ("Co-Simulation", description.coSimulation),
-                ("Model Exchange", description.modelExchange),
-            )
-            if has
-        ],
         machine=f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors, "
         f"Python {platform.python_version()}, FMPy {fmpy.__version__}, rov-fmu {__version__}",
         command=shell_words("rov-fmu", "prove", proof.fmu.name, "--report", "report.html"),

@@ -22,7 +22,7 @@ def test_figures_are_as_exact_as_the_docs_say() -> None:
     """Of 1 - exp(-t), with steps that begin anywhere to the point that is sought."""
     told = [
         (float(percent) / 100.0, 1.0 / float(parts or 1))
-        for percent, parts in re.findall(r"([\d.]+) % with\s(?:a\sstep\sof\s)?Tau(?:/(\d+))?", DOCS)
+        for percent, parts in re.findall(r"([\d.]+)\s%\swith\s(?:a\sstep\sof\s)?Tau(?:/(\d+))?", DOCS)
     ]
     assert [step for _, step in told] == [0.1, 0.2, 0.5, 1.0]
     for most, longest in told:

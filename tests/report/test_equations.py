@@ -91,7 +91,7 @@ def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> 
 
 def check(rov: Vehicle, rng: random.Random, times: int) -> set[str]:
     """Check the equations at random inputs and states, and return the names that they give."""
-    shown = equations.of(rov.layout)
+    shown = equations.equations_of(rov.layout)
     for _ in range(times):
         inputs, state = random_inputs(rng, rov), random_state(rng, rov)
         exact = exactly(rov, inputs, state)
@@ -123,7 +123,7 @@ def test_the_equations_shown_are_those_of_any_vehicle(vehicles: int) -> None:
 
 
 def _text(layout: Layout) -> list[str]:
-    return [f"{line}  {line.reference}".strip() for line in equations.of(layout)]
+    return [f"{line}  {line.reference}".strip() for line in equations.equations_of(layout)]
 
 
 def test_the_equations_of_the_paper_are_those_of_the_paper() -> None:
@@ -175,7 +175,7 @@ def test_every_effect_is_shown_as_in_a_book(layout: Layout, lines: list[str]) ->
 @pytest.mark.parametrize("kind", ROVS)
 def test_mathml_says_what_the_text_says(kind: str) -> None:
     """Letters, numbers and signs stand in the same order; in MathML a coefficient's marks are above its indices."""
-    for line in equations.of(ROVS[kind].layout):
+    for line in equations.equations_of(ROVS[kind].layout):
         sides = f"<math>{mathml(line.left)}<mo>=</mo>{mathml(line.right)}</math>"
         written = html.fromstring(sides).text_content()
         plain = str(line)

@@ -71,7 +71,7 @@ def test_a_vehicle_with_every_option_joins_the_importers_that_set_inputs_in_even
     assert "voltage" in layout.inputs
     assert any(curve.tables for curve in layout.curves)
     left_out = [importer for importer in IMPORTERS if not importer.suits(layout)]
-    assert {importer.title for importer in left_out} == {"CasADi", "PathSim", "fmi-sim", "fmi-rs"}
+    assert {importer.title for importer in left_out} == {"CasADi", "PathSim-FMI", "fmi-sim", "fmi-rs"}
     assert {i.name for i in left_out if i.interface == "CS"} == {"fmi-sim-cs", "fmi-sim-cs-fmi3"}
 
 

@@ -19,7 +19,7 @@ from rov_fmu.fmu.proof import SHARE_OF_NOMINAL, Finding, compare, nominal
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import brief, listed
 
-Result = Literal["holds", "fails", "measured", "does not apply"]
+Result = Literal["holds", "fails", "measured", "not checked", "does not apply"]
 """`measured` is a fact without a promise: what a step costs, or what an FMU accepts that promised nothing."""
 _STEPS = (2, 5, 10, 50)
 """The numbers of communication steps in each piece of a simulation that are compared with one step."""
@@ -340,8 +340,7 @@ def unseen(subject: Subject) -> Evidence:
     paragraphs = card_of(subject).get("How far to trust it", [])
     errors, verdicts = (kind.findall("\n".join(paragraphs)) for kind in (_UNSEEN, _VERDICT))
     if not (errors or verdicts):
-        known = f": {paragraphs[0].rstrip('.')}" if paragraphs else ""
-        return _not(f"the FMU says nothing about errors on unseen data{known}")
+        return Evidence("not checked", paragraphs[0] if paragraphs else "The FMU says nothing about unseen data.")
     bad = {axis: reasons for axis, word, reasons in verdicts if word == _BAD}
     words = f"The model card has the errors of {len(errors)} predictions."
     figure = f"{_BAD} {listed(bad)}" if bad else ""

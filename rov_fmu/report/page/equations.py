@@ -89,7 +89,7 @@ class Equations:
         yield from (*self.pose, *self.rotation, *self.angles)
 
 
-def of(layout: Layout) -> Equations:
+def equations_of(layout: Layout) -> Equations:
     """Return the equations of a vehicle."""
     equation = equation_of(layout)
     names = equation.names

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from rov_fmu.c.compile import INTERFACES
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import ARM, Axis
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.fmu.archive import REPORT
 from rov_fmu.fmu.card import card, card_text, reversing
 from rov_fmu.fmu.reference_results import TOLERANCE
@@ -78,8 +78,6 @@ def documentation_page(
     first = layout.axes[0].axis
     driven = [form.axis for form in layout.axes if layout.signs(form.axis)]
     start = layout.example(first)
-    shown = equations.of(layout)
-    own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]
     return page(
         "index.html.j2",
         vehicle=vehicle,
@@ -98,13 +96,11 @@ def documentation_page(
         card=card(vehicle),
         ballast=[n for n, one in layout.coefficients.items() if one.tunable and n not in layout.tuning],
         coupled=listed(equations.coupled(layout)),
-        has_full_mass=shown.has_full_mass,
-        equations=shown,
+        equations=equations.equations_of(layout),
         mathml=equations.mathml,
         parts=equations.parts_in_mathml,
         choices=equations.choices,
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
-        arm=[vehicle[name] for name in ARM] if layout.has_arm else None,
         live=live([Flown(vehicle, module)]) if module and layout.driven else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
@@ -114,7 +110,7 @@ def documentation_page(
         moves_at_rest=any(vehicle.derivatives(layout.usual_inputs, layout.at_rest).values()),
         held=held,
         motions=[motion for axis in driven for motion in _motions(vehicle, axis, held)],
-        frames=[image(label, path) for label, path in own],
+        frames=[image(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))],
         thrusters=[
             _plot(f"Thrusters {view}", partial(draw_thrusters, vehicle=vehicle, scene=scene), scene.inches)
             for view, scene in scenes(vehicle).items()

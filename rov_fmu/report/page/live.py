@@ -3,6 +3,7 @@
 import base64
 import json
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
@@ -90,7 +91,7 @@ def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> 
         script=script.text,
         policy=f"{script.policy} 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
-        keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
+        keys=_keys(pilot.layout),
         places=_places(pilot),
         start=start,
         loads=list(_loads(pilot, start)),
@@ -129,7 +130,7 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mappin
 
 def _data(flown: Flown) -> dict[str, Any]:
     """Return the data of a vehicle for the scripts."""
-    vehicle, layout = flown.vehicle, flown.vehicle.layout
+    vehicle, layout, labels = flown.vehicle, flown.vehicle.layout, _labels(flown.vehicle)
     return {
         "identifier": vehicle.identifier,
         "name": vehicle.name,
@@ -141,11 +142,8 @@ def _data(flown: Flown) -> dict[str, Any]:
         "commands": list(layout.commands),
         "columns": list(_columns(layout)),
         "csv": rules_of_page(),
-        "axes": [_axis(vehicle, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
-        "thrusters": [
-            _thruster(vehicle, thruster, label)
-            for thruster, label in zip(layout.thrusters, _labels(vehicle), strict=True)
-        ],
+        "axes": [_axis(vehicle, axis, keys) for axis, keys in _keys(layout)],
+        "thrusters": [_thruster(vehicle, thruster, labels[thruster.name]) for thruster in layout.thrusters],
         "fins": [{"at": fin.place, "along": fin.direction.value} for fin in layout.fins],
         "tests": list(_tests(vehicle)),
         "size": size_of(vehicle),
@@ -174,10 +172,10 @@ def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
             yield {"name": name, "also": one.column.also, "kind": kind, "gains": row, "shares": by_command}
 
 
-def _keys(layout: Layout) -> list[str]:
-    """Return the letters of the keys of each axis. Axes without their own letters get the spare ones."""
+def _keys(layout: Layout) -> list[tuple[Axis, str]]:
+    """Return each axis with the letters of its keys. Axes without their own letters get the spare ones."""
     spare = iter(_SPARE_KEYS)
-    return [_KEYS[form.axis.name] if form.axis.name in _KEYS else next(spare) for form in layout.axes]
+    return [(form.axis, _KEYS.get(form.axis.name) or next(spare)) for form in layout.axes]
 
 
 def _axis(vehicle: Vehicle, axis: Axis, keys: str) -> dict[str, Any]:
@@ -246,16 +244,14 @@ def _places(vehicle: Vehicle) -> dict[str, str]:
     """Return the label of the thruster for each command that drives only one."""
     if vehicle.layout.mix:
         return {}
-    return {f"u_{one.name}": label for one, label in zip(vehicle.layout.thrusters, _labels(vehicle), strict=True)}
+    return {f"u_{name}": label for name, label in _labels(vehicle).items()}
 
 
-def _labels(vehicle: Vehicle) -> list[str]:
-    """Return where each thruster is ("left rear"). Thrusters at the same place also have their names."""
-    found = [_label(vehicle, thruster) for thruster in vehicle.layout.thrusters]
-    return [
-        label if found.count(label) == 1 else f"{thruster.name} {label}".rstrip()
-        for label, thruster in zip(found, vehicle.layout.thrusters, strict=True)
-    ]
+def _labels(vehicle: Vehicle) -> dict[str, str]:
+    """Return where each thruster is ("left rear"), by its name. Labels of thrusters at the same place have the name."""
+    places = {thruster.name: _label(vehicle, thruster) for thruster in vehicle.layout.thrusters}
+    same = Counter(places.values())
+    return {name: label if same[label] == 1 else f"{name} {label}".rstrip() for name, label in places.items()}
 
 
 def _label(vehicle: Vehicle, thruster: Thruster) -> str:

@@ -1,4 +1,4 @@
-"""PathSim: the FMU is a block between step sources and a scope.
+"""PathSim-FMI, with PathSim: the FMU is a block between step sources and a scope.
 
 cs: Co-Simulation; me: Model Exchange with one of PathSim's solvers.
 """
