@@ -27,7 +27,7 @@ from tests.damage import (
     changed_toml,
     fuzz,
 )
-from tests.recordings import clean, write_log
+from tests.recordings import run, write_log
 
 Capsys = pytest.CaptureFixture[str]
 LOG = "log_heave_a.csv"
@@ -42,7 +42,7 @@ def tests(tmp_path: Path) -> Path:
     (folder / "thrust_top.csv").write_text(
         "command [%],force [N]\n20,0.27\n50,1.65\n70,3.2\n-50,-1.6\n", encoding="utf-8"
     )
-    recording = clean(load_vehicle(VIDEORAY), HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
+    recording = run(load_vehicle(VIDEORAY), HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
     write_log(folder, "a", recording.noisy(np.random.default_rng(1)))
     return folder
 

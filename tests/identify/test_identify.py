@@ -23,7 +23,7 @@ from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import without_progress
 from tests.folders import ARM, BLUEROV2, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read, responses
 from tests.identify.conftest import Identified
-from tests.recordings import PLANS, Measured, clean, write_log
+from tests.recordings import PLANS, Measured, run, write_log
 from tests.vehicles import VIDEORAY
 
 TRUTH = VIDEORAY.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta_u": 0.8})
@@ -38,7 +38,7 @@ def with_logs(folder: Path, axis: Axis, count: int, rov: str = KNOWN, tables: Ma
     """Write a folder with the first logs of an axis at 5 Hz, with noise."""
     path, random = folder_of(folder, rov, tables), np.random.default_rng(0)
     for n, plan in enumerate(PLANS[axis.name][:count]):
-        write_log(path, str(n), clean(TRUTH, axis, plan, 5.0).noisy(random))
+        write_log(path, str(n), run(TRUTH, axis, plan, 5.0).noisy(random))
     return path
 
 
@@ -294,7 +294,7 @@ def with_an_early_stamp(log: Measured, _: np.random.Generator) -> Measured:
 )
 def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_path: Path) -> None:
     path, random = folder_of(tmp_path / "tests", KNOWN, FORCES), np.random.default_rng(3)
-    write_log(path, "0", change(clean(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
+    write_log(path, "0", change(run(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
     (heave,) = identify(load_tests(path)).axes
     check_answers(heave, near)
 

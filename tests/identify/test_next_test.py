@@ -14,8 +14,7 @@ from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import NextTest
 from rov_fmu.tank.description import TankLimits
 from tests.folders import ARM, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read
-from tests.pool import run
-from tests.recordings import clean, write_log
+from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
 TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
@@ -29,7 +28,7 @@ def fitted(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]
     """Fit logs at 10 Hz by their axes, names and plans."""
     path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
     for axis, name, plan in logs:
-        write_log(path, name, clean(TRUTH, axis, plan, 10.0).noisy(random))
+        write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
     tests = load_tests(path)
     known, recorded, rows = begin(tests)
     return fit_all(tests.folder.path, known, recorded, rows)

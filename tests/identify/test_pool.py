@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.pool import with_more
+from tests.recordings import with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
 from verification.references import pool, rigid_pool
 from verification.references.pool import Array, Commands, Conditions, Tilt, swim

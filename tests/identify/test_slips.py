@@ -17,8 +17,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.identify.scenarios.catalogue import COMPLETE
-from tests.pool import run
-from tests.recordings import PLANS, Measured
+from tests.recordings import PLANS, Measured, run
 from tests.vehicles import VIDEORAY
 
 SENSOR = {"surge": "distance", "heave": "depth", "yaw": "heading"}
@@ -58,7 +57,7 @@ def recordings(axis: Axis) -> tuple[Measured, ...]:
     """Return three logs of about 40 s."""
     random = np.random.default_rng(0)
     return tuple(
-        run(VIDEORAY, axis, plan[:4], RATE).recorded(random, SENSOR[axis.name], f"log_{axis.name}_{n}.csv")
+        run(VIDEORAY, axis, plan[:4], RATE).noisy(random, SENSOR[axis.name], file=f"log_{axis.name}_{n}.csv")
         for n, plan in enumerate(PLANS[axis.name])
     )
 

@@ -32,7 +32,7 @@ from tests.folders import (
     read,
     responses,
 )
-from tests.recordings import clean, write_log
+from tests.recordings import run, write_log
 from tests.vehicles import sources_of
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -87,7 +87,7 @@ def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "tests", BLUEROV2, {})
     true = base.replaced({"F_0_w": 0.0, "a_d_w": 50.0, "b_d_w": 8.0, "beta_w": 0.9})
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
-    write_log(folder, "a", clean(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
+    write_log(folder, "a", run(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
     tests = load_tests(folder)
     assert tests.given.vehicle.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
     assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.given.known}
@@ -164,7 +164,7 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TOP}", {})
     k = load_vehicle(VIDEORAY).replaced({"alpha_w": 1.0})
     plan = ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0), (0.7, 6.0))
-    write_log(folder, "a", clean(k, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
+    write_log(folder, "a", run(k, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
     tests = load_tests(folder)
     layout = tests.given.vehicle.layout
     assert [*layout.kinds] == ["heave"]
@@ -221,7 +221,7 @@ def test_a_number_of_rov_toml_is_in_the_vehicle_as_it_is(name: str, tmp_path: Pa
     known = f'[known]\n{name} = {{ value = {GIVEN[name]}, unit = "{unit}", source = "s" }}\n'
     folder = folder_of(tmp_path / "tests", f"{BLUEROV2}{known}", {})
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
-    write_log(folder, "a", clean(base, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
+    write_log(folder, "a", run(base, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
     vehicle = identify(load_tests(folder)).vehicle
     assert (vehicle[name], vehicle.sources[name]) == (GIVEN[name], "s")
     assert name not in vehicle.estimates
