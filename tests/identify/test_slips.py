@@ -111,14 +111,6 @@ def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> No
 
 
 @pytest.mark.long
-def test_nothing_is_asked_of_a_sensor_that_tells_of_no_motion(tmp_path: Path) -> None:
-    """The log of another depth gauge has noise alone."""
-    first, second, _ = recordings(HEAVE)
-    noise = 0.01 * np.random.default_rng(1).standard_normal(len(second.time))
-    assert not told(write_folder(tmp_path, [first, replace(second, values=noise)]))
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("column", ["surge velocity [m/s]", "depth [m]", "heading [deg]"])
 def test_a_mirrored_column_of_a_dive_in_all_axes_is_the_only_one_named(column: str, tmp_path: Path) -> None:
     """The other columns of the file are right, though all thrusters move the vehicle at once."""

@@ -267,8 +267,6 @@ MOMENT = {
     ("changes", "header", "line"),
     [
         ({_UP: _UP.replace("0.98006657784124163", "0")}, HEADER, "axes.heave: no thruster drives it: give one a dir"),
-        ({CURVE: "[curves.all]\n"}, HEADER, "curves.all.a_t: this key is missing"),
-        ({'curve = "all"': 'curve = "al"'}, HEADER, "thruster.l.curve = 'al': there is no such curve, only all"),
         ({"[logs]": "[inputs]\nahead = { q = 1 }\n[logs]"}, HEADER, "inputs.ahead.q: there is no such thruster"),
         ({CURVE: f"{CURVE}{_LOSS}\n"}, HEADER, "curves.all.d"),
         ({"[vehicle]": 'base = "bluerov2"\n[vehicle]'}, HEADER, "logs.wrench = True: is not allowed with base"),

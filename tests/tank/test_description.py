@@ -15,7 +15,7 @@ from rov_fmu.identify.result import Identification
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
 from tests.folders import (
@@ -33,52 +33,17 @@ from tests.folders import (
     responses,
 )
 from tests.recordings import run, write_log
-from tests.vehicles import sources_of
 
 DOCS = Path(__file__).parents[2] / "docs"
-
-
-def sources_by_name(vehicle: Vehicle) -> dict[str, dict[str, str]]:
-    """The sources of the direction and the position of each thruster."""
-    return {thruster.name: sources_of(thruster) for thruster in vehicle.layout.thrusters}
 
 
 def read_again(found: Identification, path: Path) -> None:
     """Check that the vehicle can be written to a file and read again."""
     write_vehicle(found.vehicle, path)
     assert load_vehicle(path).layout == found.vehicle.layout
-    assert sources_by_name(load_vehicle(path)) == sources_by_name(found.vehicle)
 
 
 # ---- A vehicle to begin from -----------------------------------------------------------------------------------------
-
-
-def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
-    base = load_vehicle(SHIPPED["bluerov2"])
-    k = base.replaced({"a_d_v": 30.0, "b_d_v": 9.0, "beta_v": 0.8})
-    tests = read(tmp_path / "tests", BLUEROV2, responses(k, SWAY))
-    assert tests.given.vehicle.layout == base.layout
-    assert {*base.layout.coefficients} - {*tests.given.known} == {
-        "a_d_v",
-        "b_d_v",
-        *(f"{kind}_{v}" for kind in ("alpha", "beta") for v in "uvwr"),
-    }
-    assert tests.inputs.keys() == {ROV_FILE, "bluerov2", "steady_sway.csv", "time_constant_sway.csv"}
-    found = identify(tests)
-    assert [found.vehicle[name] for name in ("a_d_v", "b_d_v", "beta_v")] == pytest.approx([30.0, 9.0, 0.8], rel=0.03)
-    for command in (0.2, 0.6, -0.4):
-        assert found.vehicle.response(SWAY, command) == pytest.approx(k.response(SWAY, command), rel=1e-3)
-    curve = {name for name in base.layout.coefficients if name.endswith("_t200") or "_t200_" in name}
-    same = {*base.layout.coefficients} - {"a_d_v", "b_d_v", "beta_v", "alpha_v"} - curve
-    assert {name: found.vehicle[name] for name in same} == {name: base[name] for name in same}
-    assert {name: found.vehicle.sources[name] for name in same} == {name: base.sources[name] for name in same}
-    for name in curve:  # thrust and drag have a common scale, which velocities do not tell
-        assert found.vehicle[name] == pytest.approx(base[name], rel=0.03)
-    assert sources_by_name(found.vehicle) == sources_by_name(base)
-    assert not by_heading(found.findings)["Warnings"], (
-        "untested axes are as they were, which is no shortcoming of the data"
-    )
-    read_again(found, tmp_path / "mine.toml")
 
 
 def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:

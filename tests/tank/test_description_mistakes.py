@@ -11,6 +11,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.vehicle.geometry import check_layout
+from tests import damage
 from tests.commands import ROOT
 from tests.damage import changed_toml, fuzz
 from tests.folders import (
@@ -39,6 +40,7 @@ def given(name: str, value: float, unit: str) -> str:
 HEAVE_ALONE = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
 WITH_THRUST = HEAVE_ALONE | {"thrust_t200.csv": pulled(30.0, 20.0)}
 WRONG: list[tuple[str, Mapping[str, str], str]] = [
+    (f'against = "videoray2"\n{BLUEROV2}', HEAVE_ALONE, "/rov.toml: against = 'videoray2': must be a vehicle file"),
     (
         f'base = "bluerov3"\n{HEAD}',
         HEAVE_ALONE,
@@ -250,9 +252,7 @@ def check_lines(text: str, folder: Path) -> None:
     assert all(line.startswith(str(folder)) and line.isprintable() for line in text.splitlines())
 
 
-@pytest.mark.parametrize(
-    "examples", [5, pytest.param(60, marks=pytest.mark.long), pytest.param(2000, marks=pytest.mark.weekly)]
-)
+@damage.examples(5, 60, 2000)
 @pytest.mark.parametrize("rov", [f"{BLUEROV2}[known]\n{given('m_a_w', 1.0, 'kg')}", VECTORED])
 def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int, tmp_path: Path) -> None:
     tables = {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n", "steady_surge.csv": f"{SPEED}\n0.3,0.2\n"}

@@ -12,57 +12,53 @@ import click
 import numpy as np
 
 from tests.identify.scenarios.catalogue import SCENARIOS
-from tests.identify.scenarios.judge import band_widths, broken, by_number, promises, ratios_to_gate
-from tests.identify.scenarios.outcome import Outcome, Row, outcome, read_gate, rows, write_rows
+from tests.identify.scenarios.judge import band_widths, broken, promises, ratios_to_gate, read_gate
+from tests.identify.scenarios.outcome import Outcome, outcome
 from tests.identify.scenarios.scenario import Expected
 
-_HEADER = (
-    f"{'scenario':40} {'covered':>9} {'bias':>7} {'/gate':>6} {'bands':>6} {'width':>6} {'false':>5} {'alarms':>6} "
-    f"{'unusable':>8} {'refused':>7} {'CPU s':>6}"
-)
+_HEADER = ("covered", "/gate", "bands", "width", "false", "alarms", "unusable", "refused", "CPU s")
 
 
 @click.command(help=__doc__)
 @click.argument("names", nargs=-1)
 @click.option("--seeds", default=2, show_default=True, help="The number of seeds.")
-@click.option("--csv", "table", type=click.Path(path_type=Path), help="Write the numbers of all seeds to this file.")
-def main(names: tuple[str, ...], seeds: int, table: Path | None) -> None:
+def main(names: tuple[str, ...], seeds: int) -> None:
     """Run the scenarios whose names contain one of the words; a whole name runs that scenario alone."""
-    chosen = {
-        name: scenario
-        for name, scenario in SCENARIOS.items()
-        if not names or any(word == name or (word not in SCENARIOS and word in name) for word in names)
-    }
+    chosen = [n for n in SCENARIOS if not names or any(w == n or (w not in SCENARIOS and w in n) for w in names)]
     if not chosen:
         raise click.UsageError(f"no such scenario, only: {', '.join(SCENARIOS)}")
-    gate, all_rows, all_promises = read_gate(), list[Row](), []
-    click.echo(_HEADER)
-    for name, scenario in chosen.items():
+    gate, found = read_gate(), []
+    click.echo(row("scenario", _HEADER))
+    for name in chosen:
+        scenario = SCENARIOS[name]
         with TemporaryDirectory() as folder:
             outcomes = [outcome(scenario, seed, Path(folder) / str(seed)) for seed in range(seeds)]
-        click.echo(line(name, outcomes, scenario.expected, ratios_to_gate(name, outcomes, gate)))
-        all_promises += [(name, promise) for promise in promises(name, outcomes, scenario.expected, gate)]
-        all_rows += [row for n, o in enumerate(outcomes) for row in rows(name, n, o, scenario.expected.effects)]
-        if table:  # after each scenario, so that a long run may be stopped
-            write_rows(table, all_rows)
-    failed = broken([each.within(name) for name, each in all_promises])
-    click.echo("\n".join(["", *failed, f"{len(failed)} of {len(all_promises)} promises are broken"]))
+        click.echo(row(name, cells(outcomes, scenario.expected, ratios_to_gate(name, outcomes, gate))))
+        found += [each.within(name) for each in promises(name, outcomes, scenario.expected, gate)]
+    failed = broken(found)
+    click.echo("\n".join(["", *failed, f"{len(failed)} of {len(found)} promises are broken"]))
 
 
-def line(name: str, outcomes: Sequence[Outcome], expected: Expected, ratios: dict[str, float]) -> str:
-    """Return the row of a scenario. Bias, width and the ratio to the gate are the largest ones over the numbers."""
-    estimates = [e for o in outcomes for e in o.estimates]
-    means = [float(np.mean([e.error for e in some])) for some in by_number(outcomes).values() if some[0].truth]
+def row(name: str, cells: Sequence[str]) -> str:
+    """Return a row of the table."""
+    return f"{name:40}" + "".join(f"{cell:>10}" for cell in cells)
+
+
+def cells(outcomes: Sequence[Outcome], expected: Expected, ratios: dict[str, float]) -> Sequence[str]:
+    """Return the cells of a scenario. The widths are the largest ones over its axes and quantities."""
+    covered = [e.covered for o in outcomes for e in o.estimates]
     bands = [band.coverage for o in outcomes for band in o.bands]
-    return (
-        f"{name:40} {f'{sum(e.covered for e in estimates)}/{len(estimates)}':>9} "
-        f"{100.0 * max(means, key=abs, default=nan):+6.1f}% {max(ratios.values(), default=nan):6.2f} "
-        f"{100.0 * float(np.mean(bands)) if bands else nan:5.0f}% "
-        f"{max(band_widths(outcomes).values(), default=nan):6.2f} "
-        f"{sum(bool(o.false_effects(expected.effects)) for o in outcomes):5} {sum(bool(o.alarms) for o in outcomes):6} "
-        f"{sum(bool(o.unusable) for o in outcomes):8} {sum(bool(o.error) for o in outcomes):7} "
-        f"{float(np.mean([o.seconds for o in outcomes])):6.1f}"
+    counts = (
+        [bool(o.false_effects(expected.effects)), bool(o.alarms), bool(o.unusable), bool(o.error)] for o in outcomes
     )
+    return [
+        f"{sum(covered)}/{len(covered)}",
+        f"{max(ratios.values(), default=nan):.2f}",
+        f"{float(np.mean(bands)) if bands else nan:.0%}",
+        f"{max(band_widths(outcomes).values(), default=nan):.2f}",
+        *(str(sum(some)) for some in zip(*counts, strict=True)),
+        f"{float(np.mean([o.seconds for o in outcomes])):.1f}",
+    ]
 
 
 if __name__ == "__main__":
