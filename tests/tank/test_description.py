@@ -20,7 +20,6 @@ from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
 from tests.folders import (
     BLUEROV2,
-    DOWN,
     FORCE,
     HEAD,
     MASS,
@@ -145,32 +144,12 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     read_again(found, tmp_path / "mine.toml")
 
 
-@pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",)), ("[]", ())])
+@pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",))])
 def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> None:
     tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
     with (tests / ROV_FILE).open("a", encoding="utf-8") as file:
         file.write(f"\n[fit]\nlag = {lag}\n")
     assert load_tests(tests).given.requests.lag == curves
-
-
-def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
-    """The force begins at a command of 10 %."""
-    curve = "".join(
-        f'{key} = {{ value = {value}, unit = "{unit}", source = "s" }}\n'
-        for key, value, unit in (("a_t_reverse", 20.0, "N"), ("b_t_reverse", 15.0, "N"), ("c_0", 0.1, "1"))
-    )
-    rows = "".join(f"{c},{(30.0 * (c - 0.1) + 20.0) * (c - 0.1):.6f}\n" for c in (0.2, 0.5, 0.8))
-    rov = DOWN.replace("[curves.t200]\n", f"[curves.t200]\n{curve}")
-    heave = f"{SPEED}\n0.3,0.2\n0.6,0.4\n0.8,0.5\n"
-    tables = {"thrust_t200.csv": f"{FORCE}\n{rows}", "steady_heave.csv": heave}
-    found = identify(read(tmp_path / "tests", rov, tables))
-    assert [*found.vehicle.layout.kinds] == ["heave"]
-    read_again(found, tmp_path / "mine.toml")
-    identified = found.vehicle
-    (of_file,) = identified.layout.curves
-    for c in (0.2, 0.5, 0.8):
-        assert identified.curve_force(of_file, c) == pytest.approx((30.0 * (c - 0.1) + 20.0) * (c - 0.1), rel=0.03)
-    assert [identified[name] for name in ("a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")] == [20.0, 15.0, 0.1]
 
 
 GIVEN = {"a_d_w": 40.0, "F_0_w": -1.0, "T_t200": 0.3, "c_0_t200": 0.02}

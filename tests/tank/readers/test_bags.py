@@ -196,16 +196,3 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
     assert commanded(log.log, "2") == pytest.approx(motion.THRUSTERS["2"])
     assert log.log.names >= table.keys()
-
-
-@pytest.mark.parametrize(("version", "suffix"), [(1, ".bag"), (2, ".db3"), (2, ".mcap")])
-@pytest.mark.parametrize("kept", [0, 100, -300])
-def test_a_bag_that_is_cut_short_is_one_line(version: int, suffix: str, kept: int, tmp_path: Path) -> None:
-    ros = Ros(version)
-    path = ros.write(tmp_path, dive(ros), suffix)
-    path.write_bytes(path.read_bytes()[:kept])
-    with pytest.raises(DataFileError) as error:
-        read_log(path, BLUEROV2)
-    assert str(error.value).startswith(f"{path}: {'begins as a' if kept else 'the file is empty'}")
-    assert not kept or "damaged or was cut short, and cannot be read" in str(error.value)
-    assert len(str(error.value).splitlines()) == 1

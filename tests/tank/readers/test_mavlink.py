@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
@@ -95,22 +94,6 @@ def test_a_clock_of_servos_that_begins_anew(tmp_path: Path) -> None:
     since = log.commands.rows - log.commands.rows[0]
     assert used(log, "depth").time[-1] - log.commands.rows[0] == pytest.approx(0.1 * (N - 1) + 0.03, abs=2e-3)
     assert since[np.flatnonzero(commanded(log, "5"))[0]] == pytest.approx(1.0, abs=2e-3)
-
-
-def test_depth_of_messages_without_a_time(tmp_path: Path) -> None:
-    """VFR_HUD has no time; it arrives with the delay of the other messages."""
-    messages = []
-    for n in range(N):
-        hud = mavlink.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, -0.5 - 0.01 * n, 0.0)
-        messages += [servos(0.1 * n, *[1500] * 4, *[1500 + 4 * n] * 2), attitude(0.1 * n, 0.0), (0.1 * n + 0.02, hud)]
-    log = read_log(tlog(tmp_path / "dive.tlog", messages), BLUEROV2, HEAVE)
-    assert log.log.commands is not None
-    since = used(log.log, "depth").time - log.log.commands.rows[0]
-    assert since == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
-    assert measured(log.log, "depth") == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
-    assert (
-        Finding("time of arrival", file="dive.tlog", names={"topics": "VFR_HUD"}, numbers={"count": N}) in log.findings
-    )
 
 
 def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
