@@ -21,7 +21,7 @@ from rov_fmu.identify.findings import by_heading, findings_of
 from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.tank.readers.test_bags import Ros
+from tests.tank.readers.writers import Ros
 
 MASS, BALLAST = 20.0, 1.5
 INERTIA = {"u": 26.0, "w": 34.0}

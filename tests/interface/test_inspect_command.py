@@ -15,22 +15,13 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.tank.arrays import Array
 from tests.tank.logs import commanded, measured
-from tests.tank.readers import motion, test_mavlink, test_ulog
-from tests.tank.readers.motion import TIME
-from tests.tank.readers.test_bags import Ros, dive
-from tests.tank.test_several_files import table
+from tests.tank.readers import motion
+from tests.tank.readers.motion import DIVE, TIME
+from tests.tank.readers.writers import LOGS, table
 
 Capsys = pytest.CaptureFixture[str]
 
 DEPTH: Array = motion.DEPTH
-
-
-def bag(version: int, suffix: str) -> Callable[[Path], Path]:
-    return lambda folder: Ros(version).write(folder, dive(Ros(version)), suffix)
-
-
-def ulog(folder: Path) -> Path:
-    return test_ulog.dive().write(folder / "dive.ulg")
 
 
 def three_files(folder: Path) -> Path:
@@ -48,19 +39,12 @@ def one_file(folder: Path) -> Path:
     return folder / "log_a.csv"
 
 
-def telemetry(folder: Path) -> Path:
-    return test_mavlink.tlog(folder / "dive.tlog", test_mavlink.dive())
-
-
 THRUSTERS = [*motion.THRUSTERS.values()]
-LOGS: dict[str, tuple[Callable[[Path], Path], set[str]]] = {
-    "ROS 1": (bag(1, ".bag"), {"surge", "sway", "heave", "yaw"}),
-    "ROS 2": (bag(2, ".db3"), {"surge", "sway", "heave", "yaw"}),
-    "MCAP": (bag(2, ".mcap"), {"surge", "sway", "heave", "yaw"}),
-    "ULog": (ulog, {"surge", "sway", "heave", "yaw"}),
+ALL = {"surge", "sway", "heave", "yaw"}
+FILES: dict[str, tuple[Callable[[Path], object], set[str]]] = {
+    **{suffix: (lambda folder, write=write: write(folder, DIVE), ALL) for suffix, write in LOGS.items()},
     "three files": (three_files, {"heave", "yaw"}),
     "one file": (one_file, {"heave"}),
-    "telemetry": (telemetry, {"heave"}),
 }
 
 
@@ -84,19 +68,19 @@ def parsed(draft: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name in ("ROS 1", "MCAP") else ()) for name in LOGS]
+    "name", [pytest.param(name, marks=pytest.mark.long if name in (".bag", ".db3") else ()) for name in FILES]
 )
 def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, inspect: Inspect) -> None:
-    write, axes = LOGS[name]
-    out, draft = inspect(write(tmp_path))
+    write, axes = FILES[name]
+    write(tmp_path)
+    out, draft = inspect()
     assert out.endswith(f"Wrote {tmp_path / 'rov.toml'}. Next: edit this draft, then rov-fmu identify {tmp_path}\n")
     assert 'base = "bluerov2"' in draft
     tests = load_tests(tmp_path)
     assert axes <= {*tests.tested.logs}
     (log,) = tests.folder.logs
-    if name != "telemetry":
-        assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
-        assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
+    assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
+    assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
     if name == "three files":
         assert "aligned clock" in {finding.kind for finding in log.findings}
         assert measured(log, "voltage") == pytest.approx(motion.VOLTAGE, abs=1e-6)

@@ -15,9 +15,9 @@ from rov_fmu.tank.quality import checked
 from tests.folders import rows_of
 from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log
 from tests.tank.readers import motion
-from tests.tank.readers.good_logs import SUFFIXES, good_log
-from tests.tank.readers.motion import BLUEROV2, TIME
-from tests.tank.test_several_files import ROV, table
+from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
+from tests.tank.readers.writers import LOGS, csv, table
+from tests.tank.test_several_files import ROV
 
 FOLDER = ROV.replace("Dive of May", "x")
 
@@ -37,9 +37,9 @@ def dive(path: Path) -> Path:
 # ---- Formats ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", [*SUFFIXES, ".csv"])
+@pytest.mark.parametrize("suffix", [*LOGS, ".csv"])
 def test_a_log_is_read_under_any_name(suffix: str, tmp_path: Path) -> None:
-    path = dive(tmp_path / "a") if suffix == ".csv" else good_log(suffix, tmp_path)
+    path = {**LOGS, ".csv": csv}[suffix](tmp_path, DIVE)
     other = tmp_path / "any.log"
     shutil.copy(path, other)
     assert axes(read_log(other, BLUEROV2).log)

@@ -17,6 +17,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.tank.logs import commanded, measured, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import TIME
+from tests.tank.readers.writers import table
 
 ROV = """base = "bluerov2"
 [vehicle]
@@ -27,11 +28,6 @@ description = "An ROV"
 source = "Dive of May"
 """
 FILES = 'files = ["commands.csv", "depth.csv", "heading.csv"]'
-
-
-def table(path: Path, titles: str, *columns: Array) -> None:
-    rows = (",".join(f"{value:.6f}" for value in row) for row in zip(*columns, strict=True))
-    path.write_text("\n".join([titles, *rows]) + "\n", encoding="utf-8")
 
 
 @pytest.fixture

@@ -12,8 +12,9 @@ from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.log import Log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import TIME
-from tests.tank.readers.test_mavlink import N, altitude, parameter, servos, tlog
-from tests.tank.readers.test_sources import ROS, numbers, one, outputs, told
+from tests.tank.readers.test_mavlink import N
+from tests.tank.readers.test_sources import ROS, numbers, one, pulses, told
+from tests.tank.readers.writers import altitude, parameter, servos, write_tlog
 
 
 def dive(path: Path, pulse: int, *parameters: tuple[float, Any]) -> Log:
@@ -22,7 +23,7 @@ def dive(path: Path, pulse: int, *parameters: tuple[float, Any]) -> Log:
     for n in range(N):
         time = 2.0 + 0.1 * n
         messages += [servos(time, *[1500] * 4, *[pulse if n >= 10 else 1500] * 2), altitude(time, -1.0 - 0.01 * n)]
-    return one(tlog(path, messages))
+    return one(write_tlog(path, messages))
 
 
 def command(log: Log, thruster: int = 5) -> Array:
@@ -85,7 +86,7 @@ def test_rov_toml_states_neutral_and_span(tmp_path: Path) -> None:
     pulse = np.where(np.arange(N) > 9, 1645, 1520)
     assert command(one(csv(tmp_path, "us", pulse), keys), 5)[-1] == pytest.approx(0.5)
     assert command(one(csv(tmp_path, "us 1500 290", pulse), keys), 5)[-1] == pytest.approx(0.5), "the header counts"
-    bag = one(ROS.write(tmp_path, [*outputs(), *numbers("/depth", motion.DEPTH)]), keys)
+    bag = one(ROS.write(tmp_path, [*pulses(), *numbers("/depth", motion.DEPTH)]), keys)
     assert command(bag)[-1] == pytest.approx((1500.0 + 400.0 * 0.5 - 1520.0) / 250.0)
 
 
