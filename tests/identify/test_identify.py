@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
 from rov_fmu.identify import beginning
 from rov_fmu.identify.assess import verdict
 from rov_fmu.identify.beginning import load_tests
@@ -18,7 +18,6 @@ from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import Answer, AxisResult, Identification, Point
-from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
@@ -105,18 +104,6 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
     assert (outside.command, outside.measured, np.isnan(outside.held_out)) == (0.9, 2.5, True)
 
 
-def test_tables_of_both_directions_tell_a_constant_load(tmp_path: Path) -> None:
-    """The steady velocities balance a_d V |V| + b_d V = F(c) + F_0 with F_0 = -0.2 N."""
-    rows, (a, b) = "", (TRUTH["a_d_w"], TRUTH["b_d_w"])
-    for c in (-0.9, -0.7, -0.5, -0.4, -0.3, 0.3, 0.4, 0.5, 0.7, 0.9):
-        force = c * (TRUTH["a_t_top"] * abs(c) + TRUTH["b_t_top"]) - 0.2
-        rows += f"{c},{np.sign(force) * (np.sqrt(b * b + 4.0 * a * abs(force)) - b) / (2.0 * a)}\n"
-    found = identify(read(tmp_path, KNOWN, {**FORCES, "steady_heave.csv": f"{SPEED}\n{rows}"}))
-    assert found.vehicle["F_0_w"] == pytest.approx(-0.2, rel=0.02)
-    low, high = found.vehicle.intervals["F_0_w"]
-    assert low <= -0.2 <= high
-
-
 @pytest.mark.parametrize(("off", "word"), [(0.1, "good"), (0.25, "usable"), (0.5, "do not use")])
 def test_a_verdict_counts_how_well_other_commands_predict_a_velocity(off: float, word: str) -> None:
     answer = Answer(HEAVE, 0.3, (0.2, (0.19, 0.21)), (1.0, (0.9, 1.1)), (1.0, (0.9, 1.1)))
@@ -157,28 +144,6 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
     assert of_tables.vehicle.measured_from == "tank tests"
     assert (made.warnings, made.facts) == (warnings(of_tables.findings), facts(of_tables.findings))
     assert vehicle.command_range == (0.2, 0.8)
-
-
-@pytest.mark.long
-def test_axes_that_share_a_curve_are_correlated_in_the_file(tmp_path: Path) -> None:
-    """Drag of surge and of yaw inherit the error of the curve's scale, so that V_ss is known much better than drag."""
-    random, rows = np.random.default_rng(1), {**FORCES, **responses(TRUTH, SURGE), **responses(TRUTH, YAW)}
-    lines = [line.split(",") for line in rows["thrust_rear.csv"].splitlines()[1:]]
-    noisy = [f"{c},{float(F) + 0.3 * random.standard_normal()}" for c, F in lines]
-    rows["thrust_rear.csv"] = "\n".join([FORCE, *noisy, ""])
-    found = identify(read(tmp_path / "tests", KNOWN, rows))
-    told = check_file(found, tmp_path / "made.toml").uncertainty
-    at = {name: n for n, name in enumerate(told.names)}
-    assert told.correlation[at["b_d_u"], at["a_d_r"]] > 0.5
-    uniform = random.random((400, len(told.names)))
-
-    def spread(of: Uncertainty) -> float:
-        """The relative standard deviation of V_ss in yaw at half command."""
-        drawn = [found.vehicle.replaced(dict(zip(of.names, row, strict=True))) for row in of.drawn(uniform).tolist()]
-        V_ss = [k.response(YAW, 0.5)[0] for k in drawn]
-        return float(np.std(V_ss) / np.mean(V_ss))
-
-    assert spread(told) < 0.7 * spread(replace(told, correlation=np.eye(len(told.names))))
 
 
 def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> None:
@@ -294,16 +259,6 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_pa
     write_log(path, "0", change(run(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
     (heave,) = identify(load_tests(path)).axes
     check_answers(heave, near)
-
-
-@pytest.mark.long
-def test_a_table_joins_the_logs_and_contradictions_are_told(tmp_path: Path) -> None:
-    doubled = "".join(f"{c},{2.0 * TRUTH.response(HEAVE, c)[0]:.6f}\n" for c in (0.3, 0.5, 0.7))
-    tables = {**FORCES, "steady_heave.csv": f"{SPEED}\n{doubled}"}
-    found = identify(load_tests(with_logs(tmp_path, HEAVE, 1, tables=tables)))
-    assert ("points differ", "heave") in kinds(found)
-    V_ss = {answer.command: answer.steady[0] for answer in of_axis(found, HEAVE).answers}
-    assert V_ss[0.5] == pytest.approx(TRUTH.response(HEAVE, 0.5)[0], rel=0.05), "rows that are far off have more noise"
 
 
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------

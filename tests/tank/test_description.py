@@ -14,7 +14,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
@@ -22,9 +22,7 @@ from tests.folders import (
     BLUEROV2,
     FORCE,
     HEAD,
-    MASS,
     SPEED,
-    TOP,
     VECTORED,
     folder_of,
     pulled,
@@ -121,27 +119,7 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     )
 
 
-# ---- The paper's form ------------------------------------------------------------------------------------------------
-
-
-def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TOP}", {})
-    k = load_vehicle(VIDEORAY).replaced({"alpha_w": 1.0})
-    plan = ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0), (0.7, 6.0))
-    write_log(folder, "a", run(k, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
-    tests = load_tests(folder)
-    layout = tests.given.vehicle.layout
-    assert [*layout.kinds] == ["heave"]
-    assert [t.name for t in layout.thrusters] == ["t"]
-    assert [curve.name for curve in layout.curves] == ["top"]
-    assert set(layout.coefficients) == {"m_rov", "a_t_top", "b_t_top", "a_d_w", "b_d_w", "alpha_w", "beta_w"}
-    assert [(finding.kind, finding.axis) for finding in tests.findings] == [
-        ("axis left out", "surge"),
-        ("axis left out", "yaw"),
-    ]
-    found = identify(tests)
-    assert found.vehicle["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
-    read_again(found, tmp_path / "mine.toml")
+# ---- Requests and numbers that are given ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",))])

@@ -3,7 +3,7 @@
 import hashlib
 import re
 import shutil
-from math import pi, radians
+from math import radians
 from pathlib import Path
 
 import pytest
@@ -86,23 +86,6 @@ def test_the_table_columns_of_rov_toml_serves_tables_too(folder: Path) -> None:
     rov.write_text(f'{rov.read_text(encoding="utf-8")}"Pul" = "force [kgf]"\n', encoding="utf-8")
     with pytest.raises(VehicleFileError, match=r"columns.Pul = 'force \[kgf\]': no CSV file has such a column"):
         load_tests(folder)
-
-
-def test_columns_in_any_order_and_unit(folder: Path) -> None:
-    (folder / "steady_yaw.csv").write_text("velocity [deg/s],command [1]\n90,0.2\n-180,-.4\n", encoding="utf-8")
-    (folder / "thrust_rear_a.csv").write_text("command [%],force [N]\n50,12.5\n0,0\n", encoding="utf-8")
-    (folder / "thrust_rear_b.csv").write_text("force [N],command [%]\n-3,-20\n", encoding="utf-8")
-    (folder / "time_constant_yaw.csv").write_text("command [%],time constant [ms]\n20,3050\n", encoding="utf-8")
-    without_curve(folder, "rear")
-    found = load_tests(folder)
-    yaw = rows_of(found, "steady")["yaw"]
-    assert [(row.command, row.value) for row in yaw] == [(0.2, pytest.approx(pi / 2)), (-0.4, -pi)]
-    assert rows_of(found, "thrust")["rear"] == [
-        Row("thrust_rear_a.csv", 2, 0.5, 12.5),
-        Row("thrust_rear_a.csv", 3, 0.0, 0.0),
-        Row("thrust_rear_b.csv", 2, -0.2, -3.0),
-    ]
-    assert rows_of(found, "time_constant")["yaw"][0].value == pytest.approx(3.05)
 
 
 def without_curve(folder: Path, name: str) -> None:

@@ -29,17 +29,6 @@ def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
     assert best.x[0] == pytest.approx(0.06, abs=0.015)
 
 
-def test_thrust_begins_at_the_dead_band_whatever_the_shape() -> None:
-    k = load_vehicle(SHIPPED["bluerov2"]).replaced({"c_0_t200": 0.07})
-    (curve,) = k.layout.curves
-    for seed, size in ((0, 0.1), (1, 0.1), (2, 10.0)):
-        deviation = size * np.random.default_rng(seed).standard_normal(COUNT)
-        shape = Shapes({curve.name: deviation}, {curve.name: (0.07, 0.07)})
-        assert not shape.forces(k, curve, np.array([0.0, 0.069, -0.069])).any()
-        ahead, astern = shape.forces(k, curve, np.array([0.071, -0.071]))
-        assert ahead > 0.0 > astern
-
-
 def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:
     """The force deviates by 10 % at weak commands, less towards full command, smoothly, and half alike astern."""
     random = np.random.default_rng(2)
