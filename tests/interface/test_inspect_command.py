@@ -40,9 +40,13 @@ def one_file(folder: Path) -> Path:
 
 
 THRUSTERS = [*motion.THRUSTERS.values()]
+def of_format(suffix: str) -> Callable[[Path], object]:
+    return lambda folder: LOGS[suffix](folder, DIVE)
+
+
 ALL = {"surge", "sway", "heave", "yaw"}
 FILES: dict[str, tuple[Callable[[Path], object], set[str]]] = {
-    **{suffix: (lambda folder, write=write: write(folder, DIVE), ALL) for suffix, write in LOGS.items()},
+    **{suffix: (of_format(suffix), ALL) for suffix in LOGS},
     "three files": (three_files, {"heave", "yaw"}),
     "one file": (one_file, {"heave"}),
 }

@@ -119,7 +119,7 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     )
 
 
-# ---- Requests and numbers that are given ------------------------------------------------------------------------------
+# ---- Requests and numbers that are given -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",))])

@@ -152,7 +152,7 @@ def _damaged(content: bytes, count: int) -> Iterator[bytes]:
         yield bytes(piece)
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(2000, marks=pytest.mark.weekly)], ids=["a few", "many"])
+@pytest.mark.parametrize("count", [6, pytest.param(2000, marks=pytest.mark.weekly)], ids=["a few", "many"])
 @pytest.mark.parametrize("suffix", LOGS)
 def test_a_damaged_log_is_read_or_is_one_line(
     suffix: str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
