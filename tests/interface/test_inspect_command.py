@@ -40,6 +40,8 @@ def one_file(folder: Path) -> Path:
 
 
 THRUSTERS = [*motion.THRUSTERS.values()]
+
+
 def of_format(suffix: str) -> Callable[[Path], object]:
     return lambda folder: LOGS[suffix](folder, DIVE)
 
