@@ -1,21 +1,22 @@
-"""Recordings of a vehicle with known coefficients: the exact motion with noise."""
+"""Recordings of a vehicle with known coefficients: the motion by the integrator of the pool, with noise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import AXIS, CURVE, HEAVE, SURGE, YAW, Axis, coefficient_name
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
-from verification.references.reference import Motion
+from verification.references.pool import swim
 
-NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
-"""The standard deviations of depth (m), heading (rad) and the velocity of a camera (m/s)."""
+Plan = Sequence[tuple[float, float]]
+"""Commands with their durations, s."""
 
-PLANS: dict[str, Sequence[Sequence[tuple[float, float]]]] = {
+PLANS: dict[str, Sequence[Plan]] = {
     "heave": (
         ((0.0, 4.0), (0.3, 16.0), (-0.3, 16.0), (0.5, 12.0), (-0.5, 12.0)),
         ((0.0, 4.0), (0.2, 18.0), (-0.2, 18.0), (0.4, 10.0), (-0.4, 10.0)),
@@ -34,6 +35,22 @@ PLANS: dict[str, Sequence[Sequence[tuple[float, float]]]] = {
 }
 """Three plans of 60 s for each axis: commands with their durations (s), in both directions, not always from rest."""
 AXES = (SURGE, HEAVE, YAW)
+NOISE = {"depth": 0.005, "heading": radians(0.5), "distance": 0.02, "velocity": 0.02}
+"""The standard deviations of the sensors: m, rad, m, m/s."""
+
+
+def with_more(k: Vehicle, **values: float) -> Vehicle:
+    """Return the vehicle with other coefficients, including new ones such as F_0_w, T_top or a_t_rear_reverse."""
+    axes, curves = [], []
+    for form in k.layout.axes:
+        more = [key for key in AXIS if coefficient_name(key, form.axis.velocity) in values and key not in form.keys]
+        axes.append(replace(form, keys=(*form.keys, *more)))
+    for curve in k.layout.curves:
+        more = [key for key in CURVE if coefficient_name(key, curve.name) in values and key not in curve.keys]
+        curves.append(replace(curve, keys=(*curve.keys, *more)))
+    layout = replace(k.layout, axes=tuple(axes), curves=tuple(curves))
+    assert values.keys() <= layout.coefficients.keys()
+    return Vehicle(layout, {**k.coefficients, **values})
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +71,8 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class Clean:
-    """A recording without noise."""
+class Run:
+    """n samples of the motion along one axis without noise, SI units."""
 
     axis: Axis
     time: Array
@@ -63,12 +80,28 @@ class Clean:
     velocity: Array
     position: Array
 
-    def noisy(self, random: np.random.Generator, file: str = "log.csv", noise: float | None = None) -> Measured:
-        """Return the recording of the axis's sensor: depth, heading, or the velocity in surge."""
-        quantity = "velocity" if self.axis is SURGE else self.axis.position
+    def noisy(
+        self,
+        random: np.random.Generator,
+        quantity: str = "",
+        *,
+        file: str = "log.csv",
+        noise: float | None = None,
+        colour: float = 0.0,
+        jitter: float = 0.0,
+    ) -> Measured:
+        """Return the recording of a sensor; the usual one of the axis is that of depth, heading, or surge velocity.
+
+        `colour` is the correlation of the noise of successive samples, `jitter` the error of time stamps (s).
+        """
+        quantity = quantity or ("velocity" if self.axis is SURGE else self.axis.position)
         values = self.velocity if quantity == "velocity" else self.position
-        spread = NOISE[self.axis.name] if noise is None else noise
-        values = values + spread * random.standard_normal(len(values))
+        if jitter:
+            values = np.interp(self.time + jitter * random.standard_normal(len(values)), self.time, values)
+        errors = random.standard_normal(len(values))
+        if colour:
+            errors = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], errors)
+        values = values + (NOISE[quantity] if noise is None else noise) * errors
         return Measured(file, self.axis, quantity, self.time, self.command, values)
 
 
@@ -87,18 +120,11 @@ def write_log(folder: Path, name: str, recording: Measured) -> Path:
     return path
 
 
-def clean(k: Vehicle, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
-    """Run a plan from rest, one exact motion per command."""
+def run(k: Vehicle, axis: Axis, plan: Plan, rate: float) -> Run:
+    """Run a plan from rest along one axis."""
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
-    v, s = 0.0, 0.0
-    points: list[tuple[float, float]] = []
-    for c, hold in plan:
-        held = k.held(axis, c)
-        motion = Motion(held.A, held.B, held.C, v, hold, held.reverse)
-        *part, (v, end) = (
-            (float(v), s + float(d)) for v, d in map(motion.at, np.arange(round(hold * rate) + 1) / rate)
-        )
-        points += part
-        s = end
-    velocity, position = np.array(points).T
-    return Clean(axis, np.arange(len(command)) / rate, command, velocity, position)
+    time = np.arange(len(command)) / rate
+    thrusters = {name.removeprefix("u_"): sign * command for name, sign in k.layout.signs(axis).items()}
+    motion = swim(k, time, thrusters)
+    place = {"surge": "x", "sway": "y", "heave": "z", "yaw": "psi"}[axis.name]
+    return Run(axis, time, command, motion[axis.velocity], motion[place])

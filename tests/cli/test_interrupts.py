@@ -20,7 +20,7 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress
-from tests.recordings import PLANS, clean, write_log
+from tests.recordings import PLANS, run, write_log
 
 fcntl = pytest.importorskip("fcntl", reason="terminals and signals are POSIX")
 termios = pytest.importorskip("termios", reason="terminals and signals are POSIX")
@@ -169,7 +169,7 @@ def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_pat
     folder, output = Path(shutil.copytree(TESTS, tmp_path / "tests")), tmp_path / "out" / "rov.toml"
     rov, random = load_vehicle(VIDEORAY), np.random.default_rng(0)
     for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
-        write_log(folder, str(n), clean(rov, HEAVE, plan, 10.0).noisy(random))
+        write_log(folder, str(n), run(rov, HEAVE, plan, 10.0).noisy(random))
     output.parent.mkdir()
     output.write_bytes(b"the old one")
     report = str(output.with_name("report.html"))

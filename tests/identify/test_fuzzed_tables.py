@@ -16,18 +16,10 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from tests import damage
 from tests.commands import TESTS, without_progress
-from tests.damage import (
-    CELLS,
-    NUMBERS,
-    changed_bytes,
-    changed_cells,
-    changed_course,
-    changed_lines,
-    changed_toml,
-    fuzz,
-)
-from tests.recordings import clean, write_log
+from tests.damage import changed_bytes, changed_cells, changed_course, changed_lines, changed_toml, fuzz
+from tests.recordings import run, write_log
 
 Capsys = pytest.CaptureFixture[str]
 LOG = "log_heave_a.csv"
@@ -42,7 +34,7 @@ def tests(tmp_path: Path) -> Path:
     (folder / "thrust_top.csv").write_text(
         "command [%],force [N]\n20,0.27\n50,1.65\n70,3.2\n-50,-1.6\n", encoding="utf-8"
     )
-    recording = clean(load_vehicle(VIDEORAY), HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
+    recording = run(load_vehicle(VIDEORAY), HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
     write_log(folder, "a", recording.noisy(np.random.default_rng(1)))
     return folder
 
@@ -88,9 +80,7 @@ def output_or_one_line(arguments: list[str], out: Path, folder: Path, capsys: Ca
     return ""
 
 
-@pytest.mark.parametrize(
-    "examples", [20, pytest.param(100, marks=pytest.mark.long), pytest.param(2000, marks=pytest.mark.weekly)]
-)
+@damage.examples(10, 100, 2000)
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 
@@ -111,16 +101,8 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize(
-    "examples", [2, pytest.param(8, marks=pytest.mark.long), pytest.param(30, marks=pytest.mark.weekly)]
-)
-@pytest.mark.parametrize(
-    "only",
-    [
-        *("rov.toml", "steady_heave_down.csv", "time_constant_heave.csv", "thrust_top.csv"),
-        pytest.param(LOG, marks=pytest.mark.long),
-    ],
-)
+@damage.examples(2, 5, 30)
+@pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", pytest.param(LOG, marks=pytest.mark.long)])
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
@@ -165,9 +147,7 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
     assert not said or LOG in said
 
 
-@pytest.mark.parametrize(
-    "examples", [10, pytest.param(50, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
-)
+@damage.examples(10, 40, 1000)
 def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
     content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
@@ -181,12 +161,10 @@ def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize(
-    "examples", [30, pytest.param(200, marks=pytest.mark.long), pytest.param(2000, marks=pytest.mark.weekly)]
-)
+@damage.examples(20, 60, 2000)
 def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     tuned = tmp_path / "tuned.toml"
-    words = st.one_of(NUMBERS.filter(lambda x: abs(x) < 10**400), CELLS, st.floats(0.0, 10.0)).map(str)
+    words = st.one_of(damage.NUMBERS.filter(lambda x: abs(x) < 10**400), damage.CELLS, st.floats(0.0, 10.0)).map(str)
 
     def check(data: st.DataObject) -> None:
         axis, vehicle = data.draw(st.sampled_from(sorted(AXES))), data.draw(st.sampled_from(sorted(SHIPPED)))
@@ -198,9 +176,7 @@ def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize(
-    "examples", [10, pytest.param(50, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
-)
+@damage.examples(10, 40, 1000)
 def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     original = VIDEORAY.parent / "tables"
     vehicle = tmp_path / "videoray.toml"
@@ -225,31 +201,14 @@ def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_pat
     fuzz(check, examples)
 
 
-HARDLY = [
-    "20,0;50,0",
-    "20,-0.001;50,0.01;70,3",
-    "20,1;50,1;70,0.5;100,-0.02",
-    "20,0;50,0;70,0;-50,-1.6",
-    "20,0;50,0;70,0;-50,0",
-    "20,0;50,1e-200",
-]
+HARDLY = ("20,-0.001;50,0.01;70,3", "20,1;50,1;70,0.5;100,-0.02", "20,0;50,0;-50,-1.6", "20,0;50,1e-200")
 
 
-@pytest.mark.parametrize(
-    ("forces", "recorded"),
-    [
-        (HARDLY[0], False),
-        *(pytest.param(forces, False, marks=pytest.mark.long) for forces in HARDLY[1:]),
-        *(pytest.param(forces, True, marks=pytest.mark.long) for forces in HARDLY),
-    ],
-)
+@pytest.mark.parametrize("forces", ["20,0;50,0", *(pytest.param(forces, marks=pytest.mark.long) for forces in HARDLY)])
 def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
-    forces: str, recorded: bool, tests: Path, tmp_path: Path, capsys: Capsys
+    forces: str, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
     rows = forces.replace(";", "\n")
     (tests / "thrust_top.csv").write_text(f"command [%],force [N]\n{rows}\n", encoding="utf-8")
-    if not recorded:
-        (tests / LOG).unlink()
     said = output_or_one_line(["identify", str(tests), "-o"], tmp_path / "rov.toml", tests, capsys)
-    told = ("the thrust curve of top gives", "thrust_top*.csv: must give a force above 0")
-    assert not said or any(words in said for words in told)
+    assert not said or "the thrust curve of top gives" in said or "thrust_top*.csv: must give a force above 0" in said

@@ -14,8 +14,7 @@ from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import NextTest
 from rov_fmu.tank.description import TankLimits
 from tests.folders import ARM, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read
-from tests.pool import run
-from tests.recordings import clean, write_log
+from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
 TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
@@ -29,7 +28,7 @@ def fitted(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]
     """Fit logs at 10 Hz by their axes, names and plans."""
     path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
     for axis, name, plan in logs:
-        write_log(path, name, clean(TRUTH, axis, plan, 10.0).noisy(random))
+        write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
     tests = load_tests(path)
     known, recorded, rows = begin(tests)
     return fit_all(tests.folder.path, known, recorded, rows)
@@ -64,25 +63,19 @@ def test_a_test_narrows_the_least_certain_velocity(fit: Fit) -> None:
         assert test.is_useful == (test.then < 0.9 * test.now)
 
 
-@pytest.mark.parametrize("length", [3.0, 1.0])
-def test_the_vehicle_stays_in_the_tank(length: float, fit: Fit) -> None:
+def test_the_vehicle_stays_in_the_tank(fit: Fit) -> None:
     """The integrator of the tests flies the proposed test, and a minute of coasting after it."""
-    free, within = proposed(fit), proposed(fit, tank_length=length)
+    free, within = proposed(fit), proposed(fit, tank_length=1.0)
     assert free
     assert within
     covered = [float(np.ptp(run(TRUTH, HEAVE, [*plan(t), (0.0, 60.0)], 10.0).position)) for t in (free, within)]
-    assert covered[1] <= length
-    assert plan(within) == plan(free) or covered[0] > length
+    assert covered[1] <= 1.0 < covered[0]
 
 
-@pytest.mark.parametrize("most", [0.25, 0.6])
-def test_no_command_is_above_the_strongest(most: float, fit: Fit) -> None:
-    test = proposed(fit, command_max=most)
+def test_no_command_is_above_the_strongest(fit: Fit) -> None:
+    test = proposed(fit, command_max=0.25)
     assert test
-    assert max(abs(command) for command, _ in plan(test)) <= most
-
-
-def test_nothing_is_proposed_where_no_command_is_allowed(fit: Fit) -> None:
+    assert max(abs(command) for command, _ in plan(test)) <= 0.25
     assert proposed(fit, command_max=0.1) is None
 
 
@@ -112,14 +105,9 @@ TABLES = {
     ("line", "message"),
     [
         ("tank_length = 0", "limits.tank_length = 0: must be the length of the tank in m, above 0"),
-        ('tank_length = "4 m"', "limits.tank_length = '4 m': must be a number"),
-        (
-            "command_max = 50",
-            "limits.command_max = 50: must be above 0 and at most 1, a fraction of the full command: half is",
-        ),
+        ("command_max = 50", "limits.command_max = 50: must be above 0 and at most 1, a fraction of the full command"),
         ('command_max = "120 %"', "limits.command_max = '120 %': must be above 0 and at most 1"),
         ("duration = -1.0", "limits.duration = -1.0: must be the duration of a test in s, above 0"),
-        ("tank_lenght = 3.0", "limits.tank_lenght"),
     ],
 )
 def test_a_wrong_limit_is_one_line(line: str, message: str, tmp_path: Path) -> None:

@@ -2,18 +2,15 @@
 
 import random
 from collections.abc import Callable
-from math import radians
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.pool import with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
 from verification.references import pool, rigid_pool
-from verification.references.pool import Array, Commands, Conditions, Tilt, swim
+from verification.references.pool import Array, Commands, Conditions, swim
 
 STEP = 0.25
 
@@ -60,41 +57,3 @@ def test_conditions_of_thrust(simulate: Simulate, k: Vehicle) -> None:
         expected = simulate(other, commands, TIME)
         for name in (*k.layout.velocities, "x", "y", "z", "psi"):
             assert motion[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-8), (conditions, name)
-
-
-def test_the_thrust_of_a_rotor_is_the_square_of_its_speed_which_lags() -> None:
-    """From rest, it is a thrust without lag times (1 - exp(-t/T))^2. The curve is twice that of the vehicle."""
-    force, T = VIDEORAY.curve_force(VIDEORAY.layout.curves[1], 0.6), 0.3
-    commands = Commands(np.zeros(1), {"t": np.array([0.6])})
-    risen = Conditions(thrust=lambda time: 2.0 * (1.0 - np.exp(-time / T)) ** 2)
-    rotors = Conditions(curves={"top": lambda command: 2.0 * force * command / 0.6}, has_rotors=True)
-    expected = pool.motion(VIDEORAY, commands, TIME, risen)["w"]
-    found = pool.motion(with_more(VIDEORAY, T_top=T, T_rear=T), commands, TIME, rotors)["w"]
-    assert found == pytest.approx(expected, rel=1e-6)
-    assert found[-1] > 0.01
-
-
-def test_a_tether_holds_the_vehicle_where_it_pulls_as_the_thrusters_push() -> None:
-    commands = Commands(np.zeros(1), {"l": np.array([0.3]), "r": np.array([0.3])})
-    motion = pool.motion(VIDEORAY, commands, np.array([0.0, 300.0]), Conditions(tether=(0.5, 0.5, 0.5)))
-    thrust = VIDEORAY["alpha_u"] * (VIDEORAY["a_t_rear"] * 0.3 + VIDEORAY["b_t_rear"]) * 0.3
-    assert motion["x"][-1] == pytest.approx(thrust / 0.5, rel=1e-6)
-    assert motion["u"][-1] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_a_tilted_vehicle_turns_about_its_own_axis_and_moves_along_its_own_axes() -> None:
-    """Pose and velocities fit together by differences of the attitude and of the place."""
-    tilt, h = Tilt(radians(10.0)), 1e-4
-    k = with_more(VIDEORAY, F_0_w=0.5)
-    at = np.array([1.0, 2.7])
-    time = np.sort(np.concatenate([at - h, at, at + h]))
-    commands = Commands(np.zeros(1), {"l": np.array([0.6]), "r": np.array([0.4]), "t": np.array([0.3])})
-    motion = pool.motion(k, commands, time, Conditions(tilt=tilt))
-    angles = np.array([[psi, *tilt.at(t)[1::-1]] for t, psi in zip(time.tolist(), motion["psi"], strict=True)])
-    attitude = Rotation.from_euler("ZYX", angles)
-    for n in (1, 4):
-        turned = (attitude[n - 1].inv() * attitude[n + 1]).as_rotvec() / (2.0 * h)
-        assert turned[2] == pytest.approx(motion["r"][n], rel=1e-5)
-        moved = [(motion[name][n + 1] - motion[name][n - 1]) / (2.0 * h) for name in "xyz"]
-        velocity = attitude[n].apply([motion["u"][n], 0.0, motion["w"][n]])
-        assert moved == pytest.approx(velocity.tolist(), rel=1e-5, abs=1e-7)

@@ -1,13 +1,12 @@
 """The refit of the VideoRay that ships: the result of the command from the paper's measurements, and its errors."""
 
 import re
-from math import hypot, isnan, nan, sqrt
+from math import isnan, nan, sqrt
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.likelihood.parameters import PRIORS
 from rov_fmu.identify.result import Identification, Point, relative_error
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
@@ -92,22 +91,3 @@ def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identifica
     assert "beta_u" not in refit.vehicle.intervals
     (told,) = (f for f in refit.findings if f.kind == "not identified" and f.axis == "surge")
     assert told.names["coefficients"] == "beta_u"
-
-
-def test_the_curves_of_the_paper_are_fitted_too(refit: Identification, vehicle: Vehicle) -> None:
-    """They begin at those of the paper, and change by at most two standard errors of scale and shape together."""
-    most = 2.0 * hypot(0.1, PRIORS["thrust_shape"].deviation)
-    for curve in refit.vehicle.layout.curves:
-        for command in (0.3, 0.5, 0.7):
-            ratio = refit.vehicle.curve_force(curve, command) / vehicle.curve_force(curve, command)
-            assert abs(ratio - 1.0) < most, (curve.name, command)
-        for key in ("a_t", "b_t"):
-            name = curve.coefficient(key)
-            assert refit.vehicle[name] != vehicle[name]
-            assert refit.vehicle.sources[name] != vehicle.sources[name]
-
-
-def test_the_papers_vehicle_stays_the_papers(vehicle: Vehicle) -> None:
-    assert all("Table 9" in source for source in vehicle.sources.values())
-    assert vehicle.intervals == {}
-    assert vehicle.provenance is None

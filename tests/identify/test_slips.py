@@ -17,8 +17,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.identify.scenarios.catalogue import COMPLETE
-from tests.pool import run
-from tests.recordings import PLANS, Measured
+from tests.recordings import PLANS, Measured, run
 from tests.vehicles import VIDEORAY
 
 SENSOR = {"surge": "distance", "heave": "depth", "yaw": "heading"}
@@ -58,7 +57,7 @@ def recordings(axis: Axis) -> tuple[Measured, ...]:
     """Return three logs of about 40 s."""
     random = np.random.default_rng(0)
     return tuple(
-        run(VIDEORAY, axis, plan[:4], RATE).recorded(random, SENSOR[axis.name], f"log_{axis.name}_{n}.csv")
+        run(VIDEORAY, axis, plan[:4], RATE).noisy(random, SENSOR[axis.name], file=f"log_{axis.name}_{n}.csv")
         for n, plan in enumerate(PLANS[axis.name])
     )
 
@@ -109,14 +108,6 @@ def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) ->
 @pytest.mark.parametrize("axis", [HEAVE, *(pytest.param(axis, marks=pytest.mark.long) for axis in (SURGE, YAW))])
 def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> None:
     assert not told(write_folder(tmp_path, recordings(axis)[:2]))
-
-
-@pytest.mark.long
-def test_nothing_is_asked_of_a_sensor_that_tells_of_no_motion(tmp_path: Path) -> None:
-    """The log of another depth gauge has noise alone."""
-    first, second, _ = recordings(HEAVE)
-    noise = 0.01 * np.random.default_rng(1).standard_normal(len(second.time))
-    assert not told(write_folder(tmp_path, [first, replace(second, values=noise)]))
 
 
 @pytest.mark.long

@@ -38,40 +38,17 @@ def test_the_printout_names_the_inputs_that_are_held(capsys: pytest.CaptureFixtu
     assert "A command of 30% of yaw: u_l = 0.3, u_r = -0.3\n" in said
     assert "A command of -40% of yaw: u_l = -0.4, u_r = 0.4\n" in said
     print_tuning(tune(pulsed(k, (1100.0, 1500.0, 1900.0)), YAW, points))
-    of_pulses = capsys.readouterr().out
-    assert "A command of 30% of yaw: u_l = 1620, u_r = 1380\n" in of_pulses
-    assert of_pulses.partition("A command")[0] == said.partition("A command")[0]
+    assert "A command of 30% of yaw: u_l = 1620, u_r = 1380\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
-@pytest.mark.parametrize("command", [0.2, 0.7, -0.4])
-@pytest.mark.parametrize(("V_ss", "Tau"), [(0.1, 0.2), (0.5, 3.0), (2.0, 20.0)])
+@pytest.mark.parametrize(("command", "V_ss", "Tau"), [(0.2, 0.1, 0.2), (0.7, 2.0, 20.0), (-0.4, -0.5, 3.0)])
 def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: float, Tau: float) -> None:
-    V_ss = V_ss if command > 0.0 else -V_ss
     tuned = tuned_to(k, axis, command, V_ss, Tau)
     assert tuned.response(axis, command) == pytest.approx((V_ss, Tau), rel=1e-12)
 
 
-def test_scattered_points_have_intervals_and_the_least_error() -> None:
-    measured = {"V_ss": {0.2: 1.34, 0.3: 1.51, 0.5: 2.61, 0.7: 4.06}, "Tau": {0.2: 3.05, 0.3: 1.95, 0.5: 1.41}}
-    points = [Target(q, c, value) for q, values in measured.items() for c, value in values.items()]
-    tuning = tune(k, YAW, points)
-    low, high = tuning.intervals["alpha_r"] or (nan, nan)
-    alpha, beta = tuning.vehicle["alpha_r"], tuning.vehicle["beta_r"]
-    assert 0.8 < low < alpha < high < 1.6
-
-    def error(a: float, b: float) -> float:
-        tuned = k.replaced({"alpha_r": a, "beta_r": b})
-        return sum((tuned.response(YAW, p.command)[p.quantity == "Tau"] / p.value - 1.0) ** 2 for p in points)
-
-    least = error(alpha, beta)
-    assert least < error(1.2, 0.12)
-    for a, b in ((1.01, 1.0), (0.99, 1.0), (1.0, 1.01), (1.0, 0.99)):
-        assert least < error(a * alpha, b * beta)
-
-
 def test_steady_velocities_alone_leave_beta() -> None:
-    assert tuned_to(k, YAW, 0.3, 1.5)["beta_r"] == k["beta_r"]
     tuning = tune(k, SURGE, [Target("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
     assert tuning.vehicle["beta_u"] == k["beta_u"]
     assert [*tuning.intervals] == ["alpha_u"]
@@ -100,8 +77,6 @@ def test_intervals_are_those_of_linear_regression() -> None:
         (0.0, 0.2, 2.0, "not 0"),
         (30, 0.2, 2.0, "of 30 must"),
         (0.3, 0.2, 0.0, "at least 1e-09 s"),
-        (0.3, 0.2, -1.0, "at least 1e-09 s"),
-        (0.3, nan, 2.0, "V_ss"),
         (0.3, inf, 2.0, "V_ss"),
         (nan, 0.2, 2.0, "command"),
         (0.3, 0.2, nan, "Tau"),
@@ -118,11 +93,8 @@ def test_what_no_tuning_gives(
 @pytest.mark.parametrize(
     ("alpha", "beta", "told"),
     [
-        (0.5, 0.05, {}),
-        (2.0, 1.2, {}),
+        (0.5, 1.2, {}),
         (0.49, 0.6, {"alpha": {"value": 0.49, "low": 0.5, "high": 2.0}}),
-        (2.01, 0.6, {"alpha": {"value": 2.01, "low": 0.5, "high": 2.0}}),
-        (1.0, 0.049, {"beta": {"value": 0.049, "low": 0.05, "high": 1.2}}),
         (1.0, 1.21, {"beta": {"value": 1.21, "low": 0.05, "high": 1.2}}),
     ],
 )
@@ -189,8 +161,6 @@ def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float
     ("axis", "command", "V_ss", "reason"),
     [
         (HEAVE, 0.08, 0.1, "heave: a command of 0.08 gives no thrust, it is within the dead band"),
-        (HEAVE, -0.09, -0.1, "heave: a command of -0.09 gives no thrust, it is within the dead band"),
-        (SWAY, -0.07, -0.1, "sway: a command of -0.07 gives no thrust, it is within the dead band"),
         (
             HEAVE,
             -0.5,
@@ -249,14 +219,11 @@ def test_points_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     ("options", "content", "named"),
     [
         ([], "", "--points"),
-        (["--command", "0.3"], "", "--v-ss"),
         (["--points", "POINTS", "--tau", "3"], "", "use either --points, or"),
         (["--axis", "sway", *HEAVE_AT_30[2:]], "", "sway: the vehicle has only surge, heave, yaw"),
         (["--points", "nowhere.csv"], "", "nowhere.csv: there is no such file"),
         ([*HEAVE_AT_30[2:], "-o", "nowhere/tuned.toml"], "", "no folder"),
         (["--points", "POINTS"], "velocity [m/s]\n20,-0.1\n", "line 2, column 'velocity [m/s]' = -0.1"),
-        (["--points", "POINTS"], "time constant [s]\n20,0\n", "line 2, column 'time constant [s]' = 0"),
-        (["--points", "POINTS"], "time constant [s]\n20,3\n", "no row has a velocity"),
         (["--points", "POINTS"], "velocity [m/s]\n0,0.1\n", "line 2"),
         (["--points", "POINTS"], "velocity [m/s],time constant [s]\n20,,\n", "no row has a velocity"),
     ],

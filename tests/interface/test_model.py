@@ -19,7 +19,6 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.messages import FileError, InputError
-from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
 from tests.vehicles import SIX, a_vehicle, pulsed
@@ -47,7 +46,7 @@ def test_a_vehicle_is_loaded_by_its_name_or_path(videoray: VehicleModel) -> None
     assert repr(videoray) == "<VehicleModel videoray: VideoRay Pro 4; axes surge, heave, yaw; inputs u_l, u_r, u_t>"
 
 
-def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleModel) -> None:
+def test_a_coefficient_that_is_set_by_hand_says_so(videoray: VehicleModel) -> None:
     changed = videoray.with_(a_d_u=10, beta_w=np.float64(0.5))
     assert (changed["a_d_u"], changed["beta_w"]) == (10.0, 0.5)
     assert {name for name, source in changed.sources.items() if source == BY_HAND} == {"a_d_u", "beta_w"}
@@ -55,9 +54,6 @@ def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleM
     assert repr(changed).endswith(f"; {expected}>")
     described = native_content(changed).files["modelDescription.xml"].decode()
     assert f'description="{videoray.description} ({expected})"' in described
-    page = documentation_page(changed)
-    assert page.count(expected) == 3, "the card has it, too"
-    assert page.count("<td>set by hand</td>") == 2
     assert videoray["a_d_u"] != 10.0
     assert "set by hand" not in videoray.summary
 
@@ -189,22 +185,15 @@ WRONG: dict[str, tuple[Call, str]] = {
         "videorey: there is no such file, .*; did you mean videoray?",
     ),
     "no name": (lambda _: rov_fmu.load(5), "vehicle = 5: must be the name of a vehicle"),  # type: ignore[arg-type]
-    "name for a vehicle": (
-        lambda _: build("videoray", "x.fmu"),  # type: ignore[arg-type]
-        r"vehicle = 'videoray': must be a vehicle, as rov_fmu\.load\('videoray'\) returns it",
-    ),
     "no variable for a plot": (lambda v: v.simulate(TIMES).plot([]), "names: must name a variable$"),
     "unknown coefficient": (
         lambda v: v.with_(a_du=1),
         "a_du: there is no such coefficient of this .*; did you mean a_d_u?",
     ),
     "out of bounds": (lambda v: v.with_(a_d_u=-1), r"a_d_u = -1\.0: must be within 0 \.\.\. 1000000 N\.s2/m2"),
-    "text": (lambda v: v.with_(a_d_u="3"), "a_d_u = '3': must be a finite number"),  # type: ignore[arg-type]
     "no thrust": (lambda v: v.with_(a_t_rear=-100), "curve rear: must give a force above 0 at full command, "),
-    "no arm": (lambda v: v.with_(gamma=0), "R, gamma: must both be more than 0"),
     "time stands": (lambda v: v.simulate([0, 1, 1]), r"time\[2\] = 1: must be greater than the time before it, 1"),
     "times in words": (lambda v: v.simulate(["a"]), r"time = \['a'\]: must be a number, or an array of numbers"),
-    "endless time": (lambda v: v.simulate([0, np.inf]), r"time\[1\] = inf: must be a finite number"),
     "unknown input": (
         lambda v: v.simulate(TIMES, {"ul": 1}),
         r"inputs\['ul'\]: .* no such input, .*; did you mean u_l?",
@@ -213,7 +202,6 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda v: v.simulate(TIMES, {"u_l": [0, None, 1]}),
         r"inputs\['u_l'\]\[1\] = nan: must be a finite",
     ),
-    "a list of inputs": (lambda v: v.simulate(TIMES, [1]), r"inputs = \[1\]: must be a mapping from names"),  # type: ignore[arg-type]
     "an axis and its thruster": (
         lambda v: v.simulate(TIMES, {"surge": 0.3, "u_l": 0.1}),
         r"inputs\['u_l'\]: surge drives this input, too$",
@@ -232,28 +220,17 @@ WRONG: dict[str, tuple[Call, str]] = {
         "record: the vehicle has no variable 'U'; did you mean u?",
     ),
     "too fast": (
-        lambda v: v.simulate(TIMES, start={"r": 1e300, "u": 1}),
+        lambda v: v.simulate(TIMES, start={"u": 1e200}),
         r"the motion cannot be computed up to time\[1\] = 1 s: it overflows, or never settles and needs shorter steps",
     ),
     "unequal numbers": (
         lambda v: v.simulate_many(TIMES, {"u_l": [[1], [0.5]]}, coefficients={"a_d_u": [1, 2, 3]}),
         "a_d_u: has values for 3 vehicles, but u_l has values for 2",
     ),
-    "none at all": (lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": []}), "a_d_u: has values for 0 vehicles"),
-    "one out of bounds": (
-        lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": [1, -3]}),
-        r"coefficients\['a_d_u'\] = -3: must be within 0 \.\.\. 1000000 N\.s2/m2",
-    ),
     "step of an unknown input": (
         lambda v: v.step({"u_1": 1}, {}, 0.1),
         r"inputs\['u_1'\]: .* no such input, only u_l, ",
     ),
-    "step from an unknown state": (lambda v: v.step({}, {"q": 1}, 0.1), r"state\['q'\]: .* no such state, only u, w, "),
-    "step of several values": (
-        lambda v: v.step({"u_l": [0.1, 0.2]}, {}, 0.1),  # type: ignore[dict-item]
-        r"inputs\['u_l'\]: must be a number, or an array of the shape \(1,\)",
-    ),
-    "step back": (lambda v: v.step({}, {}, -1.0), "h = -1.0: must be a time above 0, s"),
     "response of an unknown axis": (lambda v: v.response("sway", 0.3), "axis = 'sway': .* only surge, heave, yaw"),
     "derivatives of a step with missing inputs": (
         lambda v: step_jacobian(v, {"u_l": 0.3}, v.layout.at_rest, 1.0),

@@ -6,7 +6,6 @@ import pytest
 
 import rov_fmu
 from rov_fmu.cli import main
-from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 
@@ -47,13 +46,6 @@ def test_it_moves_under_its_load_and_is_written_again(path: Path) -> None:
     assert result["u"][-1] == pytest.approx((5.0 / 20.0) ** 0.5)
     write_vehicle(rov, path.with_name("again.toml"))
     assert load_vehicle(path.with_name("again.toml")).coefficients == rov.coefficients
-
-
-def test_its_page_speaks_of_loads(path: Path) -> None:
-    page = documentation_page(load_vehicle(path))
-    assert "A step of 5 N forward with FMPy" in page
-    assert "no thrusters" in page
-    assert "Thrust curve" not in page
 
 
 def test_a_part_of_thrusters_needs_the_rest(path: Path) -> None:

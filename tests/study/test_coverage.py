@@ -22,8 +22,7 @@ from rov_fmu.study import Results, study
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.folders import FORCE, HEAD, MASS, SPEED, TAU, beside
-from tests.pool import run
-from tests.recordings import write_log
+from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 from verification.references.pool import Array
 
@@ -71,7 +70,7 @@ def pulls(folder: Path, k: Vehicle, random: Random) -> None:
 def recordings(folder: Path, k: Vehicle, random: Random) -> None:
     """Write two logs of the distance at 10 Hz: correlated errors of 2 cm, rounded to cm; time stamps with 5 ms."""
     for number, plan in enumerate(PLANS):
-        found = run(k, SURGE, plan, 10.0).recorded(random, "distance", colour=0.5, jitter=0.005)
+        found = run(k, SURGE, plan, 10.0).noisy(random, "distance", colour=0.5, jitter=0.005)
         write_log(folder, str(number), replace(found, values=np.round(found.values, 2)))
 
 

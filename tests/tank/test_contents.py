@@ -15,9 +15,9 @@ from rov_fmu.tank.quality import checked
 from tests.folders import rows_of
 from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log
 from tests.tank.readers import motion
-from tests.tank.readers.good_logs import SUFFIXES, good_log
-from tests.tank.readers.motion import BLUEROV2, TIME
-from tests.tank.test_several_files import ROV, table
+from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
+from tests.tank.readers.writers import LOGS, csv, table
+from tests.tank.test_several_files import ROV
 
 FOLDER = ROV.replace("Dive of May", "x")
 
@@ -37,9 +37,9 @@ def dive(path: Path) -> Path:
 # ---- Formats ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", [*SUFFIXES, ".csv"])
+@pytest.mark.parametrize("suffix", [*LOGS, ".csv"])
 def test_a_log_is_read_under_any_name(suffix: str, tmp_path: Path) -> None:
-    path = dive(tmp_path / "a") if suffix == ".csv" else good_log(suffix, tmp_path)
+    path = {**LOGS, ".csv": csv}[suffix](tmp_path, DIVE)
     other = tmp_path / "any.log"
     shutil.copy(path, other)
     assert axes(read_log(other, BLUEROV2).log)
@@ -62,7 +62,7 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
     assert commanded(one, "6") == pytest.approx(motion.THRUSTERS["6"])
 
 
-@pytest.mark.parametrize("name", ["thrust_main.csv", "thrust_t200_dive.csv", "steady_surge.csv"])
+@pytest.mark.parametrize("name", ["thrust_t200_dive.csv", "steady_surge.csv"])
 def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> None:
     if "surge" in name:  # a log of the axis in its name
         table(tmp_path / name, "time [s],command [1],distance [m]", TIME, motion.THRUSTERS["5"], TIME)
@@ -76,42 +76,24 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
 # ---- Tables and vehicles ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "titles", ["PWM (µs),RPM,Force (Kg f),Current (A)", "command [us],RPM,force [kgf],Current (A)"]
-)
-def test_a_table_of_thrust_in_pulses_as_a_maker_publishes_it(titles: str, tmp_path: Path) -> None:
-    rows = [
-        f"{1500 + 400 * c:.0f},{2000 * c:.0f},{5.0 * c * abs(c):.3f},{9 * c * c:.2f}" for c in np.linspace(-1, 1, 21)
-    ]
-    (tmp_path / "thrust_t200.csv").write_text("\n".join([titles, *rows]), encoding="utf-8")
-    columns = '[columns]\n"PWM (µs)" = "command [us]"\n"Force (Kg f)" = "force [kgf]"\n' if "PWM" in titles else ""
-    thrust = rows_of(load_tests(folder(tmp_path, columns)), "thrust")["t200"]
-    assert [row.command for row in thrust] == pytest.approx(np.linspace(-1, 1, 21))
-    assert thrust[-1].value == pytest.approx(5.0 * 9.80665)
-
-
 # ---- Jumps -----------------------------------------------------------------------------------------------------------
 
 
-def jumps(quantity: str, values: Array) -> list[str]:
-    down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
-    found = checked(log(down, channel(quantity, TIME, values))).findings
-    return [line for line in sentences(found, SENTENCES) if "jump" in line]
-
-
 @pytest.mark.parametrize(
-    "values",
+    ("values", "told"),
     [
-        motion.DEPTH + 0.7 * (np.arange(len(TIME)) == 50),
-        10.0 * TIME,
-        motion.DEPTH + 0.5 * np.random.default_rng(2).standard_normal(len(TIME)),
-        0.25 * np.round(4.0 * motion.DEPTH),
-        np.where(TIME < 5.0, motion.DEPTH, motion.DEPTH + 1.5 * (TIME - 5.0)),
+        (motion.DEPTH + 1.5 * (TIME > 5.0), 1),
+        (motion.DEPTH + 0.7 * (np.arange(len(TIME)) == 50), 0),
+        (10.0 * TIME, 0),
+        (motion.DEPTH + 0.5 * np.random.default_rng(2).standard_normal(len(TIME)), 0),
+        (0.25 * np.round(4.0 * motion.DEPTH), 0),
     ],
-    ids=["an outlier", "a fast motion", "noise", "a coarse sensor", "a dive that begins"],
+    ids=["a jump", "an outlier", "a fast motion", "noise", "a coarse sensor"],
 )
-def test_what_is_no_jump(values: Array) -> None:
-    assert not jumps("depth", values)
+def test_a_jump_of_a_sensor_is_told(values: Array, told: int) -> None:
+    down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
+    found = checked(log(down, channel("depth", TIME, values))).findings
+    assert sum("jump" in line for line in sentences(found, SENTENCES)) == told
 
 
 TOE = """[vehicle]

@@ -80,13 +80,6 @@ def test_a_measurement_without_a_unit_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_rows_in_no_order_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back and does not return"
-    ):
-        read(tmp_path, "time [s],command [%],depth [cm]", [f"{59 - n},30,{n}" for n in range(60)], HEAVE)
-
-
 def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     """After 30 s the clock is set back by 5 s, so the times of a twelfth of the rows come again."""
     times = [*np.arange(0.0, 30.0, 0.05), *np.arange(25.0, 55.0, 0.05)]
@@ -98,12 +91,11 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
 
 
-@pytest.mark.parametrize("late", [slice(20, 21), slice(20, 28), slice(20, 60)])
-def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
+def test_rows_that_arrive_late_are_sorted(tmp_path: Path) -> None:
     """They fill a hole in the rows before them."""
     times: list[float] = [n / 10 for n in range(300)]
-    moved = times[late]
-    del times[late]
+    moved = times[20:60]
+    del times[20:60]
     rows = [f"{time},{30 * (time > 1)},{10 * time}" for time in [*times[:100], *moved, *times[100:]]]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
     assert [(found.kind, found.numbers["count"]) for found in log.findings] == [("rows sorted", len(moved))]
@@ -113,6 +105,7 @@ def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
     ("rows", "told"),
     [
         ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
+        ([f"{59 - n},30,{n}" for n in range(60)], r"line 3, column 'time \[s\]' = 58: the time goes back and does not"),
         (
             [f"12.5.2026,30,{n}" for n in range(N)],
             r"line 2, column 'time \[s\]' = 12.5.2026: is no time, and no row",
@@ -173,10 +166,8 @@ def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) ->
     [
         ("us", 1700, 0.5),
         ("µs", 1300, -0.5),
-        ("US", 1500, 0.0),
         ("us 1520 500", 1770, 0.5),
         ("us 1500 -400", 1700, -0.5),
-        ("us", 1100, -1.0),
     ],
 )
 def test_a_pulse_is_a_command_by_neutral_and_span(unit: str, pulse: float, command: float, tmp_path: Path) -> None:
@@ -206,17 +197,9 @@ REFUSED = {
         "0,1500,1",
         "each in [%], [1] or [us]; is it the column 'PWM (us)'? Units stand in square brackets.",
     ),
-    "a unit in other brackets": (
-        "time [s],u_t (us),depth [m]",
-        "0,1500,1",
-        "each in [%], [1] or [us]; is it the column 'u_t (us)'? Units stand in square brackets.",
-    ),
     "no motion": ("time [s],u_t [%]", "0,1", "line 1: column 'surge distance [m]' or 'surge velocity [m/s]' or 'depth"),
     "no such unit": ("time [s],u_t [V],depth [m]", "0,1,1", "'u_t [V]': must be 'u_t [%]' or 'u_t [1]' or 'u_t [us]'"),
     "span of none": ("time [s],u_t [us 1500 0],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),
-    "neutral alone": ("time [s],u_t [us 1500],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),
-    "span in words": ("time [s],u_t [us 1500 wide],depth [m]", "0,1,1", "only numbers may follow us"),
-    "a number behind %": ("time [s],u_t [% 100],depth [m]", "0,1,1", "must be [%] alone"),
     "two kinds": (
         "time [s],command [%],u_t [%],depth [m]",
         "0,0,0,0",
@@ -224,7 +207,6 @@ REFUSED = {
     ),
     "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "this column occurs twice"),
     "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),
-    "fractions as pulses": ("time [s],u_t [us],depth [m]", "0,0.5,1", "no pulse beyond 1 us: fractions under [us]?"),
     "percent as pulses": ("time [s],u_t [us],depth [m]", "0,50,1", "no pulse beyond 100 us: percent under [us]?"),
 }
 

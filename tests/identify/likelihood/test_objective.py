@@ -9,12 +9,12 @@ import pytest
 from rov_fmu.c.filter import Filter, Parameters, Record, Run
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.likelihood.objective import Data, Objective, cost
+from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, total
 from rov_fmu.tank.arrays import Array
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled, responses
-from tests.recordings import Measured, clean, write_log
+from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
 PLAN = ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0), (0.2, 2.0))
@@ -27,7 +27,7 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     path = folder_of(tmp_path_factory.mktemp("tests"), f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", tables)
     random = np.random.default_rng(0)
     for n, axis in enumerate((HEAVE, YAW, YAW)):
-        write_log(path, str(n), clean(VIDEORAY, axis, PLAN, 5.0).noisy(random))
+        write_log(path, str(n), run(VIDEORAY, axis, PLAN, 5.0).noisy(random))
     known, logs, rows = begin(load_tests(path))
     return Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
 
@@ -40,7 +40,7 @@ def place(objective: Objective) -> Array:
     root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
     z = found.z + 0.3 * root @ np.random.default_rng(1).standard_normal(len(root))
     z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
-    assert all(np.abs(run.innovations / np.sqrt(run.variances)).max() < 3.9 for run in objective.runs(z))
+    assert all(np.abs(one.innovations / np.sqrt(one.variances)).max() < 3.9 for one in objective.runs(z))
     return np.asarray(z, float)
 
 
@@ -102,9 +102,7 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     """
     path = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", {"thrust_rear.csv": pulled(43.0, 2.7)})
     stronger = VIDEORAY.replaced({name: 3.0 * VIDEORAY[name] for name in ("a_t_rear", "b_t_rear")})
-    c = clean(stronger, SURGE, PLAN, 5.0)
-    noise = 0.02 * np.random.default_rng(0).standard_normal(len(c.time))
-    log = write_log(path, "0", Measured("log.csv", SURGE, "distance", c.time, c.command, c.position + noise))
+    log = write_log(path, "0", run(stronger, SURGE, PLAN, 5.0).noisy(np.random.default_rng(0), "distance"))
     head, *lines = log.read_text().splitlines()
     volts = [f"{line},{16.0 - 0.03 * n:.2f}" for n, line in enumerate(lines)]
     log.write_text("\n".join([f"{head},voltage [V]", *volts]) + "\n")
@@ -118,66 +116,13 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     check_gradient(objective, z)
 
 
-def test_a_common_scale_of_all_forces_changes_nothing(objective: Objective, place: Array) -> None:
-    """Thrust, drag, load and inertia times a factor: only the prior and measured forces tell.
-
-    The information says so too, although it is a sum of large numbers that cancel, if slow forces are scaled as well.
-    """
-    runs, factor, scale = objective.runs(place), 1e-3, np.zeros(len(place))
-    for n, p in enumerate(objective.table.parameters):
-        if p.kind in ("thrust scale", "inertia", "quadratic drag", "linear drag"):
-            scale[n] = 1.0
-        elif p.kind == "load":
-            scale[n] = place[n]
-    for n, run in enumerate(runs):
-        moved = objective.run(place + factor * scale, n, repeated=run, frozen=True)
-        assert np.abs((moved.innovations - run.innovations) / np.sqrt(run.variances)).max() < 1e-6
-    scale += [p.kind == "slow force" for p in objective.table.parameters]
-    of_logs = [one.information()[1] for one in objective.data(place, runs)[: len(runs)]]
-    told = sum(scale @ H @ scale for H in of_logs)
-    parts = [(scale @ np.sqrt(np.diag(H))) ** 2 for H in of_logs]
-    assert told < 10.0 < 1e-4 * sum(parts), "a prior of 10 % is an information of 200"
-
-
-# ---- The parts of J --------------------------------------------------------------------------------------------------
-
-
 def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
     """The prior, each sample of each log, and each row of a table, by the formula."""
     runs, parameters = objective.runs(place), objective.table.parameters
     expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(place.tolist(), parameters, strict=True))
-    for off, S in [*((run.innovations, run.variances) for run in runs), objective.row_values(place)]:
+    for off, S in [*((one.innovations, one.variances) for one in runs), objective.row_values(place)]:
         u = np.abs(off) / np.sqrt(S)
         expected += float(
             np.sum(np.log(S) + np.where(u > 3.0, 9.0 + 9.0 * np.log(np.maximum(u, 3.0) ** 2 / 9.0), u * u))
         )
     assert objective.value(place, runs) == pytest.approx(expected, rel=1e-12)
-
-
-# ---- Heavy tails -----------------------------------------------------------------------------------------------------
-
-
-def one_sample(u: float) -> Data:
-    return Data(np.array([u]), np.ones(1), np.ones((1, 1)), np.zeros((1, 1)))
-
-
-def test_innovations_count_hardly_more_beyond_three_standard_deviations() -> None:
-    sizes = np.array([0.0, 1.0, 2.999, 3.001, 30.0, 300.0])
-    costs = [cost(np.array([u]), np.ones(1)) for u in sizes]
-    assert costs[:2] == [0.0, 1.0]
-    assert costs[3] - costs[2] == pytest.approx(0.012, rel=1e-3)
-    assert costs[5] - costs[4] == pytest.approx(9.0 * np.log(100.0))
-    for u in (-50.0, -2.0, 0.5, 3.5, 7.0, 50.0):
-        above, below = (cost(np.array([u + h]), np.ones(1)) for h in (1e-6, -1e-6))
-        gradient, information = one_sample(u).information()
-        assert gradient[0] == pytest.approx((above - below) / 2e-6, rel=1e-5)
-        assert information[0, 0] == pytest.approx(2.0 * min(1.0, 9.0 / u**2)), "an outlier tells less"
-
-
-def test_a_tenth_of_outliers_leaves_the_noise_of_the_others() -> None:
-    """The variance at which the costs of normal samples and of far outliers balance is below that of the samples."""
-    random = np.random.default_rng(1)
-    off = np.where(np.arange(4000) % 20 == 0, 500.0, 1.0) * random.standard_normal(4000)
-    sizes = np.geomspace(0.5, 20.0, 200)
-    best = sizes[np.argmin([cost(off, np.full(4000, size**2)) for size in sizes])]
-    assert 1.0 < best < 1.6

@@ -33,7 +33,6 @@ def few(values: Array) -> Array:
 
 CASES: Mapping[str, tuple[Log, list[str], list[str]]] = {
     "all axes": (dive(STEP, 0.0 * STEP, STEP, *moving(*MOTION)), ["surge", "heave", "yaw"], []),
-    "nothing measured": (dive(STEP, STEP, STEP), [], []),
     "thrusters that cancel": (
         dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)),
         ["surge"],
@@ -47,11 +46,6 @@ CASES: Mapping[str, tuple[Log, list[str], list[str]]] = {
         [],
         ["nothing is learnt about heave: the thrust along it never changes"],
     ),
-    "rounded commands": (
-        dive(0.0 * STEP, 0.0 * STEP, 0.01 * STEP, *moving("depth")),
-        [],
-        ["nothing is learnt about heave: the thrust along it never changes"],
-    ),
     "a sensor that stands still": (
         dive(STEP, STEP, STEP, channel("depth", TIME, 0.0 * TIME + 1.5), *moving("surge velocity")),
         ["surge"],
@@ -60,11 +54,6 @@ CASES: Mapping[str, tuple[Log, list[str], list[str]]] = {
     "too few samples": (
         dive(STEP, STEP, STEP, channel("depth", TIME, few(MOTION["depth"])), *moving("surge velocity")),
         ["surge"],
-        ["the depth has 19 samples and needs at least 20, so it is left out"],
-    ),
-    "one of two sensors of an axis": (
-        dive(STEP, STEP, STEP, channel("depth", TIME, few(MOTION["depth"])), channel("heave velocity", TIME, STEP)),
-        ["heave"],
         ["the depth has 19 samples and needs at least 20, so it is left out"],
     ),
     "a gap": (

@@ -5,9 +5,11 @@ Holm's correction, they fail by chance once in 1,000 cases. A promise that chanc
 where it is broken.
 """
 
+import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, log, sqrt
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import binomtest, norm
@@ -41,8 +43,9 @@ _LEAST_SPREAD = 0.03
 _BAND_WIDTH = 2.5
 """The widest bands, relative to what the actual errors imply."""
 
-Gate = Mapping[tuple[str, int, str, str], tuple[bool, float]]
-"""Whether an interval of the gate covers, and its width, by scenario, seed, axis and quantity."""
+Gate = Mapping[tuple[str, str, str], float]
+"""The widths of the gate's intervals by scenario, axis and quantity."""
+_WIDTHS = Path(__file__).with_name("gate.csv")
 
 
 @dataclass(frozen=True)
@@ -149,35 +152,27 @@ def _of_bias(outcomes: Sequence[Outcome]) -> Iterator[Promise]:
         yield Promise(f"{name}: a bias of {mean:.1%} with a standard error of {error:.1%}", p_value)
 
 
-def ratios_to_gate(name: str, outcomes: Sequence[Outcome], gate: Gate) -> dict[str, float]:
-    """Return the mean width of the coefficients of each axis relative to the gate's, where the gate covered.
+def read_gate() -> Gate:
+    """Return the mean widths of intervals of the identification before this one, over the seeds where they cover.
 
-    The mean is that of the logarithms, over the same seeds. An axis whose intervals cover too seldom in the gate is
-    left out, and V_ss too, which is never claimed to better than 1 %.
+    Axes whose intervals cover too seldom are left out, and V_ss too, which is never claimed to better than 1 %.
     """
-    ours = [
-        (e.axis, (name, seed, e.axis, e.quantity), e.width)
-        for seed, o in enumerate(outcomes)
-        for e in o.estimates
-        if not e.quantity.startswith("V_ss")
-    ]
-    found = {}
-    for axis in dict.fromkeys(axis for axis, _, _ in ours):
-        in_gate = [covered for (n, _, a, q), (covered, _) in gate.items() if (n, a) == (name, axis) and q[:4] != "V_ss"]
-        if not in_gate or binomtest(sum(in_gate), len(in_gate), LEVEL, "less").pvalue < 0.05:
-            continue
-        pairs = [(width, *gate[key]) for other, key, width in ours if other == axis and key in gate]
-        logs = [log(width / theirs) for width, covered, theirs in pairs if covered and width > 0.0 and theirs > 0.0]
-        if logs:
-            found[axis or "curves"] = exp(float(np.mean(logs)))
-    return found
+    with _WIDTHS.open(encoding="utf-8") as file:
+        return {(row["scenario"], row["axis"], row["quantity"]): float(row["width"]) for row in csv.DictReader(file)}
+
+
+def ratios_to_gate(name: str, outcomes: Sequence[Outcome], gate: Gate) -> dict[str, float]:
+    """Return the mean width of the coefficients of each axis relative to the gate's, by the mean of logarithms."""
+    logs: dict[str, list[float]] = {}
+    for e in (e for o in outcomes for e in o.estimates if (name, e.axis, e.quantity) in gate and e.width > 0.0):
+        logs.setdefault(e.axis or "curves", []).append(log(e.width / gate[name, e.axis, e.quantity]))
+    return {axis: exp(float(np.mean(some))) for axis, some in logs.items()}
 
 
 def _of_widths(name: str, outcomes: Sequence[Outcome], expected: Expected, gate: Gate) -> Iterator[Promise]:
     for axis, ratio in ratios_to_gate(name, outcomes, gate).items():
-        yield Promise(
-            f"{axis}: intervals are {ratio:.2f} times as wide as the gate's", float(ratio <= expected.wider_than_gate)
-        )
+        words = f"{axis}: intervals are {ratio:.2f} times as wide as the gate's"
+        yield Promise(words, float(ratio <= expected.wider_than_gate))
 
 
 # ---- Effects, causes and bands ---------------------------------------------------------------------------------------

@@ -1,11 +1,10 @@
 """Identify the vehicle of a scenario, and keep what is judged: all of it is read from the result object."""
 
-import csv
 import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf, isfinite, nan
+from math import inf, nan
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,6 @@ from rov_fmu.identify.result import Identification, Interval, Prediction, Word
 from rov_fmu.io.messages import FileError
 from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, steady_name
 
-GATE = Path(__file__).with_name("gate.csv")
-"""The outcomes of the identification before this one, which the widths of intervals are compared with."""
 _POSSIBLE = {
     "lag": (0.0, 2.0),
     "dead time": (0.0, 1.0),
@@ -191,43 +188,3 @@ def _band(prediction: Prediction) -> Band:
         float(np.mean(error**2)),
         float(np.mean(deviation**2)),
     )
-
-
-# ---- Tables ----------------------------------------------------------------------------------------------------------
-
-Row = Mapping[str, str]
-
-
-def rows(name: str, seed: int, found: Outcome, true_effects: Sequence[str]) -> Iterator[Row]:
-    """Yield the rows of a table for an outcome."""
-    which = {"scenario": name, "seed": str(seed)}
-    for e in found.estimates:
-        numbers = {"error": e.error, "width": e.width}
-        texts = {key: f"{value:.4g}" if isfinite(value) else "" for key, value in numbers.items()}
-        yield {**which, "axis": e.axis, "quantity": e.quantity, "covered": str(int(e.covered)), **texts}
-    alarms = f"refused: {found.error.splitlines()[0]}" if found.error else str(len(found.alarms))
-    false = "; ".join(found.false_effects(true_effects))
-    causes = "; ".join(f"{axis}: {cause or 'unknown'}" for axis, cause in found.disturbances)
-    yield {**which, "alarms": alarms, "false_effects": false, "causes": causes, "cpu": f"{found.seconds:.1f}"}
-
-
-def write_rows(path: Path, table: Sequence[Row]) -> None:
-    """Write a table of outcomes. A row without a quantity is about a whole identification."""
-    fields = dict.fromkeys(field for row in table for field in row)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fields, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
-
-
-def read_gate(path: Path = GATE) -> dict[tuple[str, int, str, str], tuple[bool, float]]:
-    """Return whether each interval of the gate covers, and its width, by scenario, seed, axis and quantity."""
-    with path.open(encoding="utf-8") as file:
-        return {
-            (row["scenario"], int(row["seed"]), row["axis"], row["quantity"]): (
-                row["covered"] == "1",
-                float(row["width"] or "nan"),
-            )
-            for row in csv.DictReader(file)
-            if row["quantity"]
-        }

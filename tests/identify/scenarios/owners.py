@@ -30,7 +30,7 @@ from tests.identify.scenarios.scenario import (
     write_folder,
 )
 from tests.identify.scenarios.tank import driven, moved, tilted
-from tests.pool import with_more
+from tests.recordings import with_more
 from verification.references.pool import NOTHING, Array, Commands, Conditions
 
 Plan = Sequence[tuple[float, Mapping[str, float]]]

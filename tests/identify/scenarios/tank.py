@@ -24,8 +24,7 @@ from tests.identify.scenarios.scenario import (
     voltage,
     write_folder,
 )
-from tests.pool import with_more
-from tests.recordings import PLANS
+from tests.recordings import PLANS, with_more
 from verification.references import pool, rigid_pool
 from verification.references.pool import NOTHING, Array, Commands, Conditions
 

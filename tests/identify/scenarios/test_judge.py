@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binom
 
-from tests.identify.scenarios.judge import BY_CHANCE, Gate, Promise, at_least, at_most, broken, promises
+from tests.identify.scenarios.judge import Gate, Promise, broken, promises
 from tests.identify.scenarios.outcome import Band, Estimate, Outcome
 from tests.identify.scenarios.scenario import Expected
 
@@ -56,28 +55,9 @@ def test_kept_promises_pass(n: int, expected: Expected) -> None:
 # ---- Chance ----------------------------------------------------------------------------------------------------------
 
 
-def test_exact_binomial_limits() -> None:
-    """Of 200 intervals, 179 to 198 pass at 0.1 % on each side; the limit of rare things is that of binom.ppf."""
-
-    def passing(limit: Callable[[str, int, int, float], Promise], share: float) -> list[int]:
-        return [k for k in range(201) if limit("", k, 200, share).p_value > BY_CHANCE]
-
-    assert passing(at_least, 0.95)[0] == 179
-    assert passing(at_most, 0.95)[-1] == 198
-    assert passing(at_most, 0.02)[-1] == binom.ppf(1 - BY_CHANCE, 200, 0.02)
-    assert (at_least("", 0, 0, 0.95).p_value, at_most("", 0, 0, 0.02).p_value) == (0.0, 1.0)
-
-
 @pytest.mark.parametrize(
     ("p_values", "family", "failed"),
-    [
-        ((0.0004, 0.0004, 0.5), 0, ""),
-        ((0.0003, 0.0004, 0.5), 0, "ab"),
-        ((0.0003, 0.0006, 0.5), 0, "a"),
-        ((0.0009,), 0, "a"),
-        ((0.0009,), 10, ""),
-        ((0.0,), 10**9, "a"),
-    ],
+    [((0.0003, 0.0004, 0.5), 0, "ab"), ((0.0003, 0.0006, 0.5), 0, "a"), ((0.0009,), 10, ""), ((0.0,), 10**9, "a")],
 )
 def test_holms_correction(p_values: Sequence[float], family: int, failed: str) -> None:
     """The smallest of m probabilities is compared with 0.1 %/m, the next with 0.1 %/(m - 1) ..."""
@@ -102,23 +82,16 @@ def of_bands(coverage: float) -> dict[str, object]:
     [
         (200, CURRENT, COMPLETE, 9, 20, "20 of 200 runs report a false effect: current of log.csv"),
         (100, CURRENT, OWNER, 15, 30, "30 of 200 axes have a false effect: current of log.csv"),
-        (20, {"effects": (("load", "surge", 0.3),)}, COMPLETE, 0, 20, "20 of 20 runs report a false effect: load of"),
         (200, CURRENT, replace(COMPLETE, effects=("current",)), 200, 0, ""),
         (200, FORCE, COMPLETE, 9, 20, "20 of 200 runs raise an alarm"),
         (200, UNUSABLE, COMPLETE, 9, 20, "20 of 200 runs raise an alarm"),
         (20, FORCE, INCOMPLETE, 20, 0, ""),
-        (20, UNUSABLE, INCOMPLETE, 20, 0, ""),
         (100, TETHER, INCOMPLETE, 15, 25, "25 of 100 runs name a wrong cause: the distance"),
-        (100, {"disturbances": (("surge", "the voltage"),)}, INCOMPLETE, 100, 0, ""),
         (100, UNUSABLE, replace(INCOMPLETE, unusable=("surge",)), 100, 0, ""),
         (100, {}, replace(INCOMPLETE, unusable=("surge",)), -1, 1, "only 0 of 100 runs say `do not use` of surge"),
-        (20, REFUSED, COMPLETE, 0, 1, "seed 0: refused: log.csv: no"),
         (20, REFUSED, INCOMPLETE, 0, 1, "seed 0: refused: log.csv: no"),
-        (100, of_bands(0.9), COMPLETE, 100, 0, ""),
         (100, of_bands(0.75), COMPLETE, 0, 100, "bands contain 75.0% of the held-out samples"),
-        (100, of_bands(0.85), INCOMPLETE, 100, 0, ""),
         (100, of_bands(0.7), INCOMPLETE, 0, 100, "bands contain 70.0% of the held-out samples"),
-        (100, of_bands(0.98), OWNER, 100, 0, ""),
         (100, of_bands(1.1), OWNER, 0, 100, "bands contain 110.0% of the held-out samples"),
         (20, {"bands": ()}, COMPLETE, 0, 20, "bands contain 0.0% of the held-out samples"),
         (2, {"seconds": 9.0}, replace(COMPLETE, seconds=8.0), 0, 2, "9.0 s of processor time, at most 8 s"),
@@ -127,10 +100,7 @@ def of_bands(coverage: float) -> dict[str, object]:
 def test_some_runs_may_be_wrong_and_no_more(
     total: int, changed: dict[str, object], expected: Expected, passes: int, fails: int, words: str
 ) -> None:
-    """Chance allows a few wrong runs; more of them break one promise, which says what is wrong.
-
-    Causes that are unknown are never wrong. For owners, bands that contain too many samples are wrong as well.
-    """
+    """Chance allows a few wrong runs; more of them break one promise, which says what is wrong."""
 
     def with_changes(count: int) -> list[str]:
         good = seeds(total)
@@ -142,9 +112,9 @@ def test_some_runs_may_be_wrong_and_no_more(
         assert any(found.startswith(words) for found in with_changes(fails))
 
 
-@pytest.mark.parametrize(("n", "share"), [(2, 1.0), (20, 0.3), (200, 0.2)])
+@pytest.mark.parametrize(("n", "share"), [(2, 1.0), (5, 0.6), (200, 0.2)])
 def test_intervals_that_cover_too_seldom_fail(n: int, share: float) -> None:
-    found = wrong(seeds(n, lambda seed, _: seed % 20 < 20 * share), family=300)
+    found = wrong(seeds(n, lambda seed, _: seed % 20 < min(n, 20) * share), family=300)
     assert found
     assert all("intervals cover" in words for words in found)
 
@@ -167,24 +137,8 @@ def test_a_bias_fails() -> None:
     assert wrong(seeds(2, offset=0.04, half=0.01))
 
 
-@pytest.mark.parametrize(
-    ("half", "covers", "scenario", "names", "axes"),
-    [
-        (0.1 / 2.49, True, "a", ("a_d", "beta", "V_ss"), ()),
-        (0.1 / 2.51, True, "a", ("a_d", "beta", "V_ss"), ("surge", "heave")),
-        (0.01, False, "a", ("a_d", "beta", "V_ss"), ()),
-        (0.01, True, "b", ("a_d", "beta", "V_ss"), ()),
-        (0.01, True, "a", ("V_ss",), ()),
-    ],
-)
-def test_intervals_that_are_wider_than_those_of_the_gate_fail(
-    half: float, covers: bool, scenario: str, names: tuple[str, ...], axes: Sequence[str]
-) -> None:
-    """Those of V_ss, of another scenario, and of an axis that the gate did not cover do not count."""
-    gate = {
-        (scenario, seed, axis, name): (covers, 2.0 * half * truth)
-        for seed in range(20)
-        for (axis, name), truth in TRUTHS.items()
-        if name.startswith(names)
-    }
-    assert wrong(seeds(20), gate=gate) == [f"{axis}: intervals are 2.51 times as wide as the gate's" for axis in axes]
+@pytest.mark.parametrize(("half", "axes"), [(0.1 / 2.49, []), (0.1 / 2.51, ["surge", "heave"])])
+def test_intervals_that_are_wider_than_those_of_the_gate_fail(half: float, axes: Sequence[str]) -> None:
+    gate = {("a", axis, name): 2.0 * half * truth for (axis, name), truth in TRUTHS.items() if name[0] != "V"}
+    found = wrong(seeds(20, lambda *_: False), gate=gate)
+    assert found == [f"{axis}: intervals are 2.51 times as wide as the gate's" for axis in axes]

@@ -12,7 +12,8 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.conftest import get, until
 from tests.report.test_live import a_recording
-from tests.tank.readers import test_bags, test_mavlink, test_ulog
+from tests.tank.readers.motion import DIVE
+from tests.tank.readers.writers import LOGS
 
 
 @pytest.fixture
@@ -118,18 +119,11 @@ def test_forces_on_the_body_are_flown_as_loads(tmp_path: Path, replay: Callable[
     assert get(page, "X_ext", "Z_ext", "N_ext") == [0.0, 0.0, 0.0]
 
 
-FORMATS: dict[str, Callable[[Path], Path]] = {
-    "tlog": lambda folder: test_mavlink.tlog(folder / "dive.tlog", test_mavlink.dive()),
-    "ulg": lambda folder: test_ulog.dive().write(folder / "dive.ulg"),
-    "mcap": lambda folder: test_bags.Ros(2).write(folder, test_bags.dive(test_bags.Ros(2)), ".mcap"),
-}
-
-
 @pytest.mark.interop
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("kind", FORMATS)
-def test_a_log_of_each_format_is_flown_to_its_end(kind: str, tmp_path: Path, replay: Callable[..., Any]) -> None:
-    log = FORMATS[kind](tmp_path)
+@pytest.mark.parametrize("suffix", [".tlog", ".ulg", ".mcap"])
+def test_a_log_of_each_format_is_flown_to_its_end(suffix: str, tmp_path: Path, replay: Callable[..., Any]) -> None:
+    log = LOGS[suffix](tmp_path, DIVE)
     page = replay(log, vehicle="bluerov2")
     recording = recording_of(log, load_vehicle(SHIPPED["bluerov2"]))
     end = max(recording["times"][-1], *(signal["times"][-1] for signal in recording["signals"]))

@@ -1,15 +1,14 @@
-"""The motion that the tests of log formats write, and what must be read of it."""
-
-from collections.abc import Iterator
+"""The dive that most tests of log formats write, and what must be read of it."""
 
 import numpy as np
 import pytest
 
 from rov_fmu.equation.layout import Layout
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.tank.logs import Read, commanded, measured, used
+from tests.tank.readers.writers import Dive
 
 BLUEROV2: Layout = load_vehicle(SHIPPED["bluerov2"]).layout
 TIME: Array = np.linspace(0.0, 9.9, 100)
@@ -18,50 +17,49 @@ THRUSTERS = {"1": COMMAND, "2": -COMMAND, "3": 0.5 * COMMAND, "4": COMMAND, "5":
 ROLL, PITCH, HEADING = 0.1 + 0.01 * TIME, -0.2 + 0.02 * TIME, 2.0 + 0.3 * TIME
 DEPTH = 1.0 + 0.1 * TIME
 U, V = 0.3 + 0.02 * TIME, -0.1 + 0.01 * TIME
-VOLTAGE = 16.0 - 0.05 * TIME
-
-
-def rotations() -> Iterator[Array]:
-    """Yield the rotation from the body (forward, starboard, down) to north, east, down at each time."""
-    for phi, theta, psi in zip(ROLL, PITCH, HEADING, strict=True):
-        (cf, ct, cs), (sf, st, ss) = np.cos([phi, theta, psi]), np.sin([phi, theta, psi])
-        yaw = np.array([[cs, -ss, 0.0], [ss, cs, 0.0], [0.0, 0.0, 1.0]])
-        pitch = np.array([[ct, 0.0, st], [0.0, 1.0, 0.0], [-st, 0.0, ct]])
-        yield yaw @ pitch @ np.array([[1.0, 0.0, 0.0], [0.0, cf, -sf], [0.0, sf, cf]])
-
-
-_DOWN = np.array([R[2] for R in rotations()])
-W = (0.1 - _DOWN[:, 0] * U - _DOWN[:, 1] * V) / _DOWN[:, 2]
+W = (0.1 + np.sin(PITCH) * U - np.sin(ROLL) * np.cos(PITCH) * V) / (np.cos(ROLL) * np.cos(PITCH))
 """The velocity in heave with which the depth grows by 0.1 m/s, whatever roll and pitch are."""
-OVER_GROUND: Array = np.array(
-    [R @ velocity for R, velocity in zip(rotations(), zip(U, V, W, strict=True), strict=True)]
+VOLTAGE = 16.0 - 0.05 * TIME
+DIVE = Dive(
+    start=50.0,
+    pulses=1500.0 + 400.0 * np.column_stack([*THRUSTERS.values()]),
+    euler=np.column_stack([ROLL, PITCH, HEADING]),
+    velocity=np.column_stack([U, V, W]),
+    voltage=VOLTAGE,
+    time=TIME,
+    origin=(5.0, 7.0, 1.0),
 )
-"""The velocity to the north, to the east and down."""
-NORTH, EAST = (
-    start + np.append(0.0, np.cumsum(0.5 * np.diff(TIME) * (rate[1:] + rate[:-1])))
-    for start, rate in zip((5.0, 7.0), OVER_GROUND.T[:2], strict=True)
-)
 
 
-def quaternion(R: Array) -> tuple[float, float, float, float]:
-    """Return w, x, y, z of a rotation of less than half a turn."""
-    w = 0.5 * np.sqrt(1.0 + np.trace(R))
-    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    return float(w), float(x / (4.0 * w)), float(y / (4.0 * w)), float(z / (4.0 * w))
-
-
-def check(read: Read, *, distance: bool = True, within: float = 1e-6) -> None:
-    """Check that a log of the BlueROV2 gives this motion again, in SI units."""
-    log = read.log
-    assert log.commands is not None
-    start = log.commands.rows[0]
-    expected = {"surge velocity": U, "sway velocity": V, "depth": DEPTH, "heading": HEADING}
-    expected |= {"roll angle": ROLL, "pitch angle": PITCH, "voltage": VOLTAGE}
-    expected |= {"distance": np.hypot(NORTH - NORTH[0], EAST - EAST[0])} if distance else {}
-    for quantity, values in expected.items():
-        channel = used(log, quantity)
-        assert channel.count == (11 if quantity == "voltage" else len(TIME))
-        at = channel.time[channel.there] - start
-        assert measured(log, quantity) == pytest.approx(np.interp(at, TIME, values), abs=within), quantity
-    for thruster, command in THRUSTERS.items():
-        assert commanded(log, thruster) == pytest.approx(command, abs=2e-3)
+def check(log: Log, dive: Dive = DIVE, *, has_distance: bool = False) -> None:
+    """Check the log within the resolution of the formats: 1 ms, 0.01 degrees, 1 mV, and numbers of 32 bits."""
+    commands = log.commands
+    assert commands is not None
+    start = commands.rows[0]
+    assert commands.rows - start == pytest.approx(dive.time, abs=1e-3)
+    assert commands.thrusters == tuple("123456")
+    fractions = (dive.pulses - 1500.0) / 400.0
+    row, thruster = np.nonzero(np.vstack([np.ones((1, 6), bool), np.diff(fractions, axis=0) != 0.0]))
+    assert commands.thruster.tolist() == thruster.tolist()
+    assert commands.time - start == pytest.approx(dive.time[row], abs=1e-3)
+    assert commands.since - start == pytest.approx(dive.time[np.maximum(row - 1, 0)], abs=1e-3)
+    assert commands.value == pytest.approx(fractions[row, thruster], abs=1e-6)
+    expected = {
+        "depth": (dive.position[:, 2], 1e-5),
+        "roll angle": (dive.euler[:, 0], 1e-4),
+        "pitch angle": (dive.euler[:, 1], 1e-4),
+        "heading": (dive.euler[:, 2], 1e-4),
+        "surge velocity": (dive.velocity[:, 0], 4e-4),
+        "sway velocity": (dive.velocity[:, 1], 4e-4),
+        "voltage": (dive.voltage, 1e-3),
+    }
+    if has_distance:
+        expected["distance"] = (np.hypot(*(dive.position[:, :2] - dive.position[0, :2]).T), 1e-5)
+    for name, (values, within) in expected.items():
+        channel = log.used(name)
+        assert channel is not None, name
+        assert channel.time - start == pytest.approx(dive.time, abs=1e-3), name
+        difference = channel.values - values
+        if channel.quantity.wraps:
+            difference = (difference + np.pi) % (2.0 * np.pi) - np.pi
+        assert np.abs(difference).max() < within, name

@@ -11,15 +11,15 @@ from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import measured, read_log
 from tests.tank.readers import motion, test_mavlink
-from tests.tank.readers.motion import BLUEROV2, TIME
-from tests.tank.readers.test_bags import START, Ros, pulses
-from tests.tank.readers.test_mavlink import BOOT, N, tlog
+from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
+from tests.tank.readers.test_mavlink import N
+from tests.tank.readers.writers import BOOT, START, Ros, outputs, write_tlog
 
 
 def test_two_boots_in_a_telemetry_log_are_two_logs(tmp_path: Path) -> None:
     """The second boot begins 60 s later, at a time since boot that occurs in the first one."""
-    path = tlog(tmp_path / "a.tlog", test_mavlink.dive(20.0))
-    again = tlog(tmp_path / "b.tlog", test_mavlink.dive(18.0)).read_bytes()
+    path = write_tlog(tmp_path / "a.tlog", test_mavlink.dive(20.0))
+    again = write_tlog(tmp_path / "b.tlog", test_mavlink.dive(18.0)).read_bytes()
     first, later = struct.pack(">Q", round((BOOT + 18.05) * 1e6))[:3], b""
     assert again.startswith(first)
     with path.open("ab") as file:
@@ -44,11 +44,11 @@ def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
     for n, time in enumerate(TIME):
         simulated = time if time < 4.95 else time - 5.0
         header = ros.header(simulated - START + 100.0)
-        outputs = pulses(ros, n)
-        outputs.header = header
+        commands = outputs(ros, DIVE, n)
+        commands.header = header
         place = ros.vector("Point", [0.0, 0.0, -motion.DEPTH[n]])
         pose = ros.message("geometry_msgs/msg/Pose", position=place)
-        messages += [("/rc/out", time, outputs)]
+        messages += [("/rc/out", time, commands)]
         messages += [("/pose", time, ros.message("geometry_msgs/msg/PoseStamped", header=header, pose=pose))]
     logs = read_logs(ros.write(tmp_path, messages), BLUEROV2, Names())
     assert [one.file for one in logs] == ["dive.db3", "dive.db3 (from 5 s)"]

@@ -20,11 +20,8 @@ from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.parsers import budget, format_of, one_parser, read_parsed
 from tests.tank.logs import read_log
-from tests.tank.readers import test_bags, test_mavlink
-from tests.tank.readers.good_logs import SUFFIXES, good_log
-from tests.tank.readers.motion import BLUEROV2
-from tests.tank.readers.test_bags import Ros
-from tests.tank.readers.test_mavlink import att, ctun, dataflash, packed, rcou
+from tests.tank.readers.motion import BLUEROV2, DIVE
+from tests.tank.readers.writers import LOGS, Ros, att, bag, ctun, dataflash, flash, packed, rcou
 
 
 def read(path: Path) -> Content:
@@ -49,15 +46,15 @@ def _nested_ulog(folder: Path) -> Path:
 
 def _endless_database(folder: Path) -> Path:
     """Write a bag whose definitions of messages are a view without an end, which SQLite sorts on the disk."""
-    path = Ros(2).write(folder, test_bags.dive(Ros(2)))
-    with sqlite3.connect(path) as bag:
-        bag.execute("DROP TABLE message_definitions")
-        bag.execute(
+    path = bag(".db3")(folder, DIVE)
+    with sqlite3.connect(path) as base:
+        base.execute("DROP TABLE message_definitions")
+        base.execute(
             "CREATE VIEW message_definitions AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT "
             "x AS id, 'a/msg/B' AS topic_type, 'ros2msg' AS encoding, 'uint8 a' AS encoded_message_definition, "
             "'' AS type_description_hash FROM c"
         )
-    bag.close()
+    base.close()
     return path
 
 
@@ -88,7 +85,7 @@ def test_a_small_file_that_exhausts_the_machine_is_one_line(
     limits = r"needs more than (10 s|0\.45 GB of memory|0\.02 GB of disk space) to be read"
     with pytest.raises(DataFileError, match=limits):
         read(path)
-    good = Ros(2).write(tmp_path / "good", test_bags.dive(Ros(2)))
+    good = bag(".db3")(tmp_path / "good", DIVE)
     assert read(good).pieces
     assert not [*temporary.iterdir()]
 
@@ -97,7 +94,7 @@ def test_the_budget_of_a_large_log_grows_with_its_size(tmp_path: Path) -> None:
     assert (budget(0).memory, budget(50_000_000).memory) == (10**9, 10**9)
     assert budget(200_000_000) == Limits(time=430.0, memory=2_200_000_000, disk=10**9)
     with one_parser():
-        path = dataflash(tmp_path / "a.bin", test_mavlink.turn())
+        path = flash(tmp_path, DIVE)
         assert len({id(parsers._PARSER._child) for _ in range(2) if read(path).pieces}) == 1
 
 
@@ -155,13 +152,13 @@ def _damaged(content: bytes, count: int) -> Iterator[bytes]:
         yield bytes(piece)
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(2000, marks=pytest.mark.weekly)], ids=["a few", "many"])
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("count", [6, pytest.param(2000, marks=pytest.mark.weekly)], ids=["a few", "many"])
+@pytest.mark.parametrize("suffix", LOGS)
 def test_a_damaged_log_is_read_or_is_one_line(
     suffix: str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(parsers, "budget", lambda _: Limits(20.0, 700_000_000, 100_000_000))
-    path = good_log(suffix, tmp_path)
+    path = LOGS[suffix](tmp_path, DIVE)
     content = path.read_bytes()
     read = 0
     for damaged in _damaged(content, count):

@@ -1,8 +1,6 @@
 """Logs of ArduSub, which the tests write with pymavlink (.tlog) and in the DataFlash format (.bin)."""
 
-import struct
 import sys
-from collections.abc import Iterable
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
@@ -11,56 +9,17 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.readers import parsers
 from tests.tank.logs import commanded, measured, read_log, used
-from tests.tank.readers.motion import BLUEROV2
+from tests.tank.readers.motion import BLUEROV2, DIVE
+from tests.tank.readers.writers import altitude, attitude, flash, parameter, pulse, servos, write_tlog
 
-BOOT = 1_700_000_000.0  # s since 1970: when the vehicle began to count
-LATE = 0.05  # s, from the vehicle to the ground station
 N = 60
 
 
-def pulse(command: float) -> int:
-    return round(1500.0 + 400.0 * command)
-
-
 # ---- .tlog -----------------------------------------------------------------------------------------------------------
-
-
-def tlog(path: Path, messages: Iterable[tuple[float, Any]], system: int = 1) -> Path:
-    """Write messages with the times of their arrival: eight bytes, big-endian µs, then the message."""
-    writer = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
-    with path.open("ab") as file:
-        for time, message in messages:
-            file.write(struct.pack(">Q", round((BOOT + LATE + time) * 1e6)) + message.pack(writer))
-    return path
-
-
-def servos(time: float, *pulses: int, port: int = 0) -> tuple[float, Any]:
-    outputs = [*pulses, *[0] * (16 - len(pulses))]
-    stamp = round(time * 1e6) % 2**32
-    return time, mavlink.MAVLink_servo_output_raw_message(stamp, port, *outputs)
-
-
-def altitude(time: float, metres: float) -> tuple[float, Any]:
-    return time, mavlink.MAVLink_global_position_int_message(
-        round(time * 1e3), 0, 0, 0, round(metres * 1e3), 0, 0, 0, 0
-    )
-
-
-def attitude(time: float, yaw: float) -> tuple[float, Any]:
-    return time, mavlink.MAVLink_attitude_message(round(time * 1e3), 0.1, -0.2, yaw, 0.0, 0.0, 0.0)
-
-
-def battery(time: float, millivolts: int) -> tuple[float, Any]:
-    return time, mavlink.MAVLink_sys_status_message(0, 0, 0, 0, millivolts, -1, -1, *[0] * 6)
-
-
-def parameter(name: str, value: float) -> tuple[float, Any]:
-    return 1.0, mavlink.MAVLink_param_value_message(name.encode(), value, 9, 1, 0)
 
 
 def dive(start: float = 100.0) -> list[tuple[float, Any]]:
@@ -83,34 +42,18 @@ def test_thrusters_by_the_parameters_of_the_autopilot(tmp_path: Path) -> None:
         down = 0.5 * (n >= 10)
         messages += [servos(0.1 * n, 1500, 1500, 1500, 1500, pulse(down), 1100, 1500, 1500, pulse(-down))]
         messages += [altitude(0.1 * n, -0.01 * n)]
-    log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), BLUEROV2)
+    log = read_log(write_tlog(tmp_path / "dive.tlog", [*parameters, *messages]), BLUEROV2)
     assert commanded(log.log, "6")[-1] == 0.5
     assert log.findings == [Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"})]
 
 
 def test_a_clock_of_servos_that_begins_anew(tmp_path: Path) -> None:
     start = 2.0**32 * 1e-6 - 3.0
-    log = read_log(tlog(tmp_path / "dive.tlog", dive(start)), BLUEROV2).log
+    log = read_log(write_tlog(tmp_path / "dive.tlog", dive(start)), BLUEROV2).log
     assert log.commands is not None
     since = log.commands.rows - log.commands.rows[0]
     assert used(log, "depth").time[-1] - log.commands.rows[0] == pytest.approx(0.1 * (N - 1) + 0.03, abs=2e-3)
     assert since[np.flatnonzero(commanded(log, "5"))[0]] == pytest.approx(1.0, abs=2e-3)
-
-
-def test_depth_of_messages_without_a_time(tmp_path: Path) -> None:
-    """VFR_HUD has no time; it arrives with the delay of the other messages."""
-    messages = []
-    for n in range(N):
-        hud = mavlink.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, -0.5 - 0.01 * n, 0.0)
-        messages += [servos(0.1 * n, *[1500] * 4, *[1500 + 4 * n] * 2), attitude(0.1 * n, 0.0), (0.1 * n + 0.02, hud)]
-    log = read_log(tlog(tmp_path / "dive.tlog", messages), BLUEROV2, HEAVE)
-    assert log.log.commands is not None
-    since = used(log.log, "depth").time - log.log.commands.rows[0]
-    assert since == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
-    assert measured(log.log, "depth") == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
-    assert (
-        Finding("time of arrival", file="dive.tlog", names={"topics": "VFR_HUD"}, numbers={"count": N}) in log.findings
-    )
 
 
 def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
@@ -125,7 +68,7 @@ def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
         local = mavlink.MAVLink_local_position_ned_message(100 * n, 0, 0, 0, V * cos(psi), V * sin(psi), 0)
         flags = mavlink.MAVLink_ekf_status_report_message(831 if n >= 10 else 165, 0, 0, 0, 0, 0)
         messages += [(0.1 * n - 0.01, flags), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
-    read = read_log(tlog(tmp_path / "dive.tlog", messages), BLUEROV2)
+    read = read_log(write_tlog(tmp_path / "dive.tlog", messages), BLUEROV2)
     log, speed = read.log, 0.01 * np.arange(10, N)
     assert measured(log, "surge velocity") == pytest.approx(cos(-0.2) * speed, abs=1e-6)
     assert measured(log, "sway velocity") == pytest.approx(sin(0.1) * sin(-0.2) * speed, abs=1e-6)
@@ -134,9 +77,9 @@ def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
 
 
 def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) -> None:
-    path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
-    tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
-    tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
+    path = write_tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
+    write_tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
+    write_tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
     log = read_log(path, BLUEROV2)
     assert not commanded(log.log, "1").any()
     assert commanded(log.log, "5")[0] == 0.0
@@ -147,67 +90,11 @@ def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) 
 
 # ---- .bin ------------------------------------------------------------------------------------------------------------
 
-# Type, name, format and columns, as ArduSub 4.1 declares them.
-FORMATS = {
-    "RCOU": (150, "QHHHHHHHHHHHHHH", "TimeUS,C1,C2,C3,C4,C5,C6,C7,C8,C9,C10,C11,C12,C13,C14"),
-    "CTUN": (151, "Qffffffffffhh", "TimeUS,ThI,ABst,ThO,ThH,DAlt,Alt,BAlt,DSAlt,SAlt,TAlt,DCRt,CRt"),
-    "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
-    "BARO": (153, "QBffcfIffB", "TimeUS,I,Alt,Press,Temp,CRt,SMS,Offset,GndTemp,Health"),
-    "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
-    "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
-    "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
-}
-CODES = {"Q": "Q", "H": "H", "h": "h", "f": "f", "c": "h", "C": "H", "B": "B", "I": "I", "e": "i", "N": "16s"}
 
-
-def packed(name: str, *values: Any) -> bytes:
-    """Pack one message: A3 95, its type, its numbers; c, C and e are hundredths."""
-    kind, form, _ = FORMATS[name]
-    stored = [round(100 * v) if f in "cCe" else v for f, v in zip(form, values, strict=True)]
-    return b"\xa3\x95" + bytes([kind]) + struct.pack("<" + "".join(CODES[f] for f in form), *stored)
-
-
-def dataflash(path: Path, messages: Iterable[bytes]) -> Path:
-    """Write a log, which begins with the formats of messages."""
-    declared = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **FORMATS}
-    content = b""
-    for name, (kind, form, columns) in declared.items():
-        length = 89 if name == "FMT" else 3 + struct.calcsize("<" + "".join(CODES[f] for f in form))
-        content += b"\xa3\x95\x80" + struct.pack(
-            "<BB4s16s64s", kind, length, name.encode(), form.encode(), columns.encode()
-        )
-    path.write_bytes(content + b"".join(messages))
-    return path
-
-
-def rcou(time: float, *pulses: int) -> bytes:
-    return packed("RCOU", round(time * 1e6), *pulses, *[0] * (14 - len(pulses)))
-
-
-def ctun(time: float, alt: float) -> bytes:
-    return packed("CTUN", round(time * 1e6), 0.0, 0.0, 0.0, 0.0, 0.0, alt, 0.0, 0.0, 0.0, 0.0, 0, 0)
-
-
-def att(time: float, yaw: float) -> bytes:
-    return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
-
-
-def turn() -> list[bytes]:
-    """Return messages of a turn: from 1 s on, the heading passes north at 20 deg/s, by all horizontal thrusters."""
-    messages = [packed("PARM", 1, f"MOT_{n}_DIRECTION".encode(), 1.0, 1.0) for n in range(1, 7)]
-    for n in range(N):
-        time, c = 50.0 + 0.1 * n, 0.25 * (n >= 10)
-        messages += [rcou(time, pulse(c), pulse(-c), pulse(-c), pulse(c), 1500, 1500)]
-        messages += [packed("BAT", round(time * 1e6), battery, 16.0 - 8.0 * battery) for battery in (1, 0)]
-        messages += [ctun(time, -2.0), att(time, (350.0 + 2.0 * max(n - 10, 0)) % 360.0)]
-    return messages
-
-
-@pytest.mark.parametrize("cut", [1, 40, 500])
-def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, tmp_path: Path) -> None:
-    path = dataflash(tmp_path / "a.bin", turn())
-    path.write_bytes(path.read_bytes()[:-cut])
-    assert N - 6 <= len(measured(read_log(path, BLUEROV2).log, "heading")) <= N
+def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
+    path = flash(tmp_path, DIVE)
+    path.write_bytes(path.read_bytes()[:-500])
+    assert 90 < len(measured(read_log(path, BLUEROV2).log, "heading")) <= 100
 
 
 # ---- Neither ---------------------------------------------------------------------------------------------------------
@@ -216,7 +103,6 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(cut: int, tmp_path: Path)
 @pytest.mark.parametrize(
     ("name", "content", "told"),
     [
-        ("a.tlog", b"", "the file is empty"),
         ("a.bin", b"", "the file is empty"),
         ("a.bin", b"time [s],command [%]\n" * 50, "line 1: column 'command \\[%\\]' is the command of one axis"),
         ("a.bin", b"\xa3\x95\x80" + b"\xff" * 2000, "no commands of thrusters|damaged or was cut short"),
@@ -242,6 +128,6 @@ def test_what_is_no_log_is_one_clear_line(
 
 def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymavlink", None)
-    path = tlog(tmp_path / "a.tlog", [])
+    path = write_tlog(tmp_path / "a.tlog", [])
     with pytest.raises(DataFileError, match=r"a telemetry log needs pymavlink: pip install 'rov-fmu\[mavlink\]'"):
         parsers.read_guarded(tmp_path, path, parsers._TELEMETRY, ())

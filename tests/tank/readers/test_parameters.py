@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.log import Log
+from tests.tank.logs import commanded
 from tests.tank.readers import motion
 from tests.tank.readers.motion import TIME
-from tests.tank.readers.test_mavlink import N, altitude, parameter, servos, tlog
-from tests.tank.readers.test_sources import ROS, numbers, one, outputs, told
+from tests.tank.readers.test_mavlink import N
+from tests.tank.readers.test_sources import ROS, numbers, one, pulses, told
+from tests.tank.readers.writers import altitude, parameter, servos, write_tlog
 
 
 def dive(path: Path, pulse: int, *parameters: tuple[float, Any]) -> Log:
@@ -22,12 +23,7 @@ def dive(path: Path, pulse: int, *parameters: tuple[float, Any]) -> Log:
     for n in range(N):
         time = 2.0 + 0.1 * n
         messages += [servos(time, *[1500] * 4, *[pulse if n >= 10 else 1500] * 2), altitude(time, -1.0 - 0.01 * n)]
-    return one(tlog(path, messages))
-
-
-def command(log: Log, thruster: int = 5) -> Array:
-    assert log.commands is not None
-    return log.commands.at(log.commands.rows)[:, thruster - 1]
+    return one(write_tlog(path, messages))
 
 
 def told_at(time: float, **values: float) -> list[tuple[float, Any]]:
@@ -44,23 +40,18 @@ SERVO5 = {"SERVO5_MIN": 1000.0, "SERVO5_TRIM": 1480.0, "SERVO5_MAX": 2000.0, "SE
         ({"MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000}, 0.4, "full thrust is 1000 and 2000 us, and no thrust 1500 us"),
         ({"MOT_5_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0}, -0.5, "reverse the thrusters 5"),
         (SERVO5, -(1700 - 1480) / 520, "reverse the thrusters 5"),
-        (
-            {**SERVO5, "MOT_PWM_TYPE": 9.0, "MOT_PWM_MIN": 1100, "MOT_PWM_MAX": 1900},
-            -(1700 - 1480) / 520,
-            "thrusters 5",
-        ),
         ({**SERVO5, "MOT_PWM_TYPE": 8.0}, -0.4, "reverse the thrusters 5"),
         ({**SERVO5, "MOT_PWM_TYPE": 0.0}, 0.5, ""),
         ({**SERVO5, "MOT_5_DIRECTION": -1.0}, (1700 - 1480) / 520, ""),
     ],
-    ids=["none", "range", "direction", "servo", "servo alone", "servo without trim", "motor alone", "reversed twice"],
+    ids=["none", "range", "direction", "servo", "servo without trim", "motor alone", "reversed twice"],
 )
 def test_parameters_define_the_commands(
     values: dict[str, float], expected: float, sentence: str, tmp_path: Path
 ) -> None:
     log = dive(tmp_path / "a.tlog", 1700, *told_at(1.0, **values))
-    assert command(log)[-1] == pytest.approx(expected)
-    assert command(log)[0] == pytest.approx(0.0, abs=0.05)
+    assert commanded(log, "5")[-1] == pytest.approx(expected)
+    assert commanded(log, "5")[0] == pytest.approx(0.0, abs=0.05)
     assert sentence in told(log)
     assert ("reverse the thrusters" in told(log)) == (expected < 0.0)
 
@@ -73,8 +64,8 @@ def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
         *told_at(1.0, **values),
         *told_at(5.0, MOT_5_DIRECTION=-1.0, MOT_6_DIRECTION=-1.0),
     )
-    assert command(log)[29] == pytest.approx(0.5)
-    assert command(log)[31] == pytest.approx(-0.5)
+    assert commanded(log, "5")[29] == pytest.approx(0.5)
+    assert commanded(log, "5")[31] == pytest.approx(-0.5)
     assert "MOT_5_DIRECTION and MOT_6_DIRECTION changed 3 s after the first command. Each value is used" in told(log)
 
 
@@ -85,23 +76,19 @@ def csv(folder: Path, unit: str, values: Iterable[float]) -> Path:
     return path
 
 
-def test_rov_toml_states_neutral_and_span_for_every_format(tmp_path: Path) -> None:
+def test_rov_toml_states_neutral_and_span(tmp_path: Path) -> None:
     keys = LogKeys(neutral=1520.0, span=250.0)
     pulse = np.where(np.arange(N) > 9, 1645, 1520)
-    assert command(one(csv(tmp_path, "us", pulse), keys), 5)[-1] == pytest.approx(0.5)
-    assert command(one(csv(tmp_path, "us 1500 290", pulse), keys), 5)[-1] == pytest.approx(0.5), "the header counts"
-    bag = one(ROS.write(tmp_path, [*outputs(), *numbers("/depth", motion.DEPTH)]), keys)
-    assert command(bag)[-1] == pytest.approx((1500.0 + 400.0 * 0.5 - 1520.0) / 250.0)
-    topic = ROS.write(tmp_path / "b", [*numbers("/out", 1645.0 + 0.0 * TIME), *numbers("/depth", motion.DEPTH)])
-    assert command(one(topic, keys, {"/out.data": "u_5 [us]"}), 5)[-1] == pytest.approx(0.5)
-    log = one(tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 4, 1645, 1645) for n in range(N)]), keys)
-    assert command(log)[-1] == pytest.approx(0.5)
+    assert commanded(one(csv(tmp_path, "us", pulse), keys), "5")[-1] == pytest.approx(0.5)
+    assert commanded(one(csv(tmp_path, "us 1500 290", pulse), keys), "5")[-1] == pytest.approx(0.5), "the header counts"
+    bag = one(ROS.write(tmp_path, [*pulses(), *numbers("/depth", motion.DEPTH)]), keys)
+    assert commanded(bag, "5")[-1] == pytest.approx((1500.0 + 400.0 * 0.5 - 1520.0) / 250.0)
 
 
 def test_clipping_is_told_in_every_format(tmp_path: Path) -> None:
     sentence = "50 commands of {} beyond full thrust taken as full thrust"
     log = dive(tmp_path / "a.tlog", 1964)
-    assert command(log)[-1] == 1.0
+    assert commanded(log, "5")[-1] == 1.0
     assert sentence.format("thruster 5") in told(log)
     pulses = np.where(np.arange(N) > 9, 1964, 1500)
     assert sentence.format("u_5 [us]") in told(one(csv(tmp_path, "us", pulses)))
