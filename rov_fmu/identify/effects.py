@@ -31,7 +31,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         low, high = around(value, error)
         if p.kind in ("reverse thrust", "drag astern"):
             value, low, high = np.exp([value, low, high]).tolist()
-        name = " ".join(filter(None, (_WORDS[p.kind], f"to the {p.part}" if p.part else "")))
+        name = _WORDS[p.kind] + (f" to the {p.part}" if p.part else "")
         yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n))
 
 

@@ -244,7 +244,7 @@ def test_intervals_of_a_measured_curve_with_a_dead_band_cover_the_truth(tmp_path
             low, high = found.intervals[name]
             covered.setdefault(name, []).append(low <= value <= high)
         for c in (0.3, 0.5, 1.0, -0.3, -0.5, -1.0):
-            assert found.curve_force(found.layout.curves[0], c) == pytest.approx(force(c), rel=0.015), (n, c)
+            assert found.curve_force(found.layout.curves[0], c) == pytest.approx(force(c), rel=0.03), (n, c)
         low, high = found.intervals["c_0_t200"]
         assert high - low < 0.06, "an interval is not just wide"
     assert min(map(sum, covered.values())) >= binom.ppf(0.001, 8, 0.95), covered

@@ -116,7 +116,7 @@ def fit_all(
 def _evidence(objective: Objective, best: Minimum) -> float:
     """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
     widths = np.diag(objective.deviation)
-    return -best.value - np.linalg.slogdet(widths @ best.information @ widths).logabsdet
+    return -best.value - float(np.linalg.slogdet(widths @ best.information @ widths).logabsdet)
 
 
 def _scaled(objective: Objective, z: Array) -> Array:

@@ -401,8 +401,7 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str
             noises.setdefault(m.channel.quantity.name, []).append(m.noise)
     for quantity, some in noises.items():
         white, coloured = prior("white_noise"), prior("coloured_noise")
-        typical_noise = sorted(some)[len(some) // 2]
-        mean = log(typical_noise)
+        mean = log(sorted(some)[len(some) // 2])
         yield _noise("white noise", quantity, mean=mean, deviation=white, low=mean - _QUIETER)
         usual, time = _COLOURED
         yield _noise("coloured noise", quantity, mean=log(usual), deviation=coloured)
