@@ -41,6 +41,10 @@ _MOST_REASONS = 3
 """The most reasons in a line that refuses a log."""
 
 
+QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
+"""What the tables of each kind measure."""
+
+
 @dataclass(frozen=True, eq=False)
 class Tests:
     """All tests of a folder, and the vehicle that they concern."""
@@ -280,7 +284,7 @@ def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviati
         if not curve.tables and not exact:
             for key in ("a_t", "b_t"):
                 more[coefficient_name(f"{key}{REVERSE}", curve.name)] = values[curve.coefficient(key)]
-            if logged:
+            if logged or curve.name in tests.tested.thrust:
                 more[curve.coefficient("c_0")] = 0.0
         if logged:
             more[curve.coefficient("T")] = LEAST_LAG
@@ -368,7 +372,7 @@ def _table_rows(tests: Tests, vehicle: Vehicle) -> Iterator[TableRow]:
     for kind in KINDS:
         if kind == "log":
             continue
-        quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
+        quantity = QUANTITIES[kind]
         for subject, rows in tests.rows(kind):
             largest = max(abs(row.value) for row in rows)
             for row in rows:

@@ -28,19 +28,11 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if p.kind == "load":
             full = fit.known.full[p.of]
             value, error, unit = (value - p.null) * full, error * full, AXES[p.of].load
+        low, high = around(value, error)
         if p.kind in ("reverse thrust", "drag astern"):
-            low, high = (float(np.exp(end)) for end in around(value, error))
-            yield Effect(p.kind, p.of, _WORDS[p.kind], float(np.exp(value)), (low, high), "1", posterior.evidence(n))
-            continue
-        yield Effect(
-            p.kind,
-            p.of,
-            " ".join(filter(None, (_WORDS[p.kind], f"to the {p.part}" if p.part else ""))),
-            value,
-            around(value, error),
-            unit,
-            posterior.evidence(n),
-        )
+            value, low, high = np.exp([value, low, high]).tolist()
+        name = _WORDS[p.kind] + (f" to the {p.part}" if p.part else "")
+        yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n))
 
 
 _WORDS = {

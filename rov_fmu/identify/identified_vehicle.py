@@ -55,7 +55,11 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         if name not in names:
             sources[name] = "Assumed: the tests do not determine it"
     if names:
-        held = [name for name in changed if name not in names and not name.startswith("alpha_")]
+        held = [  # a file without a dead band has an exact one of 0
+            name
+            for name in fit.known.layout.coefficients
+            if name not in names and (name in changed or name.startswith("c_0"))
+        ]
         _, covariance, _ = _numbers(fit, [*names, *held])
         marginal = np.sqrt(np.diag(covariance))
         covariance = _given_the_last(covariance, len(names))
@@ -225,18 +229,15 @@ def _data(fit: Fit) -> str:
 
 def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterator[Coefficient]:
     """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
-    names = [name for name in changed if not name.startswith("alpha_")]
-    if not names:
+    if not changed:
         return
-    _, covariance, prior = _numbers(fit, names)
+    _, covariance, prior = _numbers(fit, changed)
     began = _in_file(fit, np.array([p.mean for p in fit.posterior.table.parameters]))
-    for n, name in enumerate(names):
+    for n, name in enumerate(changed):
         error, before = float(np.sqrt(covariance[n, n])), float(np.sqrt(prior[n, n]))
         told = error / before if before > 0.0 else 0.0
         declaration, value = vehicle.layout.coefficients[name], vehicle[name]
-        interval: Interval | None = _interval(vehicle, name, error)
-        if not told <= _TOLD or not error > 0.0:
-            interval = None
+        interval = _interval(vehicle, name, error) if told <= _TOLD and error > 0.0 else None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
         yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
 

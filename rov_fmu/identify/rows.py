@@ -6,7 +6,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Curve
-from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.beginning import QUANTITIES, Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
@@ -23,7 +23,7 @@ HeldOut = Mapping[tuple[str, str, float], float]
 
 def points_of(tests: Tests, held_out: HeldOut, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
     """Yield the rows of tables with what the vehicle says about them, also held out."""
-    quantity = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}[kind]
+    quantity = QUANTITIES[kind]
     for subject, rows in tests.rows(kind):
         if only and subject != only:
             continue

@@ -12,10 +12,9 @@ import pytest
 import tomlkit
 
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.identify import assess
+from rov_fmu.identify import assess, effects
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records
-from rov_fmu.identify.likelihood.parameters import OPTIONAL
 from rov_fmu.identify.result import KEPT, MOST_UNKNOWN, Answer, Disturbance, Prediction, Verdict
 from rov_fmu.identify.unexplained import causes, slips
 from tests.commands import ROOT
@@ -109,7 +108,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
     )
     assert f"raises the evidence by more than {slips._CLEAR:g} (`slips.py`)" in page
     assert f"They read {records.THINNED:g} samples per second" in page
-    assert len(OPTIONAL) == len(
+    assert len(effects._WORDS) == len(
         page.partition("## Effects ")[2].partition(" are effects")[0].replace(" and ", ", ").split(", ")
     )
 

@@ -64,8 +64,13 @@ class Fit:
 def fit_all(
     folder: Path, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
 ) -> Fit:
-    """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples."""
-    table = table_of(known, logs, sorted({row.noise for row in rows}))
+    """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples.
+
+    A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
+    bends.
+    """
+    noises = sorted({row.noise for row in rows})
+    table = table_of(known, logs, noises)
     quick = Objective(table, logs, rows, thinned=True)
     full = Objective(table, logs, rows)
     ends: list[Minimum] = []
@@ -90,9 +95,15 @@ def fit_all(
         on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
 
     near = minimise(full, _scaled(full, ends[0].z), on_step=show_full, last=False)
+    for curve in known.measured_curves:
+        other = replace(known, bent=known.bent | {curve})
+        objective = Objective(table_of(other, logs, noises), logs, rows)
+        found = minimise(objective, near.z, enough=_QUICK, last=False)
+        if _evidence(objective, found) > _evidence(full, near):
+            known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     best = minimise(full, _scaled(full, near.z), most=2)
-    posterior = Posterior.of(table, best.z, best.information)
+    posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
     if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
@@ -100,6 +111,12 @@ def fit_all(
     kept = posterior.without(posterior.absent)
     averaged = replace(posterior.averaged, z=kept.z)
     return Fit(known, full, best, posterior, averaged, kept, float(difference))
+
+
+def _evidence(objective: Objective, best: Minimum) -> float:
+    """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
+    widths = np.diag(objective.deviation)
+    return -best.value - float(np.linalg.slogdet(widths @ best.information @ widths).logabsdet)
 
 
 def _scaled(objective: Objective, z: Array) -> Array:

@@ -148,7 +148,7 @@ class Objective:
         if parameter.log is not None:
             return parameter.of == one.log.file
         axes, curves = one.layout.kinds, {curve.name for curve in one.layout.curves}
-        if parameter.kind == "row noise":
+        if parameter.kind == "row noise" or parameter.low == parameter.high:
             return False
         if parameter.kind in ("white noise", "coloured noise", "correlation time"):
             return parameter.of in {m.channel.quantity.name for m in one.measured}

@@ -6,8 +6,8 @@ change them. No deviation is estimated from one effect.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from math import exp, inf, log
 
 import numpy as np
@@ -60,6 +60,8 @@ _COLOURED = (0.3, 2.0)
 """The usual coloured noise relative to the white noise, and its usual correlation time, s."""
 _QUIETER = 2.0
 """The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
+_LINEAR = 0.3
+"""The deviation of the linear share of the thrust of a quadratic curve, whose measured forces determine it."""
 USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
@@ -70,16 +72,13 @@ per cent at most."""
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
 
-OPTIONAL = ("reverse thrust", "dead band", "lag", "dead time", "drag astern", "load", "current", "voltage")
-"""The effects that are reported only with evidence."""
-
 
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of the likelihood."""
 
     kind: str
-    """What it is, such as `quadratic drag`. Those in OPTIONAL are effects."""
+    """What it is, such as `quadratic drag`. Those with a `null` are effects."""
     of: str
     """The name of the axis, the curve or the file that has it; empty for the vehicle."""
     part: str = ""
@@ -120,6 +119,10 @@ class Parameter:
         if not self.of_motion:
             return 1e-2 if self.is_log else 1e-3
         return _MOTION_STEP * (1.0 if self.is_log else self.deviation)
+
+
+_noise = partial(Parameter, is_log=True, of_motion=False)
+"""The parameter of a noise or of the size of a slow process."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +187,8 @@ class Table:
             names = [coefficient_name(f"{key}{end}", curve.name) for key in ("a_t", "b_t")]
             if names[0] in found:
                 a, b = (self.base[name] for name in names)
-                found[names[0]], found[names[1]] = scale * ratio * a, scale * ratio * b
+                moved = self.get(z, "linear thrust", curve.name) * (a + b)
+                found[names[0]], found[names[1]] = scale * ratio * (a - moved), scale * ratio * (b + moved)
             if (band := coefficient_name(f"c_0{end}", curve.name)) in found:
                 found[band] = self.get(z, "dead band", curve.name, default=found[band])
         if "T" in curve.keys:
@@ -277,6 +281,8 @@ class Beginning:
     """The names of the coefficients that no fit changes."""
     thrust_errors: Mapping[str, float] = field(default_factory=dict)
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
+    bent: frozenset[str] = frozenset()
+    """The measured curves whose shape deviates. The others are quadratic, with a free linear share of the thrust."""
 
 
 def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
@@ -289,10 +295,8 @@ def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[
 def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
     def prior(key: str) -> float:
         """Return a deviation. Where the thrust is exact, so is its shape."""
-        if key.startswith("thrust_") or key == "dead_band":
-            exact = prior("thrust") == 0.0
-            return 0.0 if exact else known.deviations.get(key, PRIORS[key].deviation)
-        return known.deviations.get(key, PRIORS[key].deviation)
+        is_exact = (key.startswith("thrust_") or key == "dead_band") and prior("thrust") == 0.0
+        return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
     found = [*_of_curves(known, prior), *_of_axes(known, prior)]
     if logs:
@@ -309,7 +313,7 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         yield from _of_one_log(one, number, prior)
     yield from _of_noise(known, logs, prior)
     for name in row_noises:
-        yield Parameter("row noise", name, mean=log(0.03), deviation=1.0, is_log=True, low=log(1e-3), of_motion=False)
+        yield _noise("row noise", name, mean=log(0.03), deviation=1.0, low=log(1e-3))
 
 
 def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
@@ -321,15 +325,26 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
         yield Parameter("thrust scale", name, deviation=scale, is_log=True)
         if curve.tables:
             continue
-        for n in range(COUNT if shape else 0):
-            yield Parameter("thrust shape", name, str(n + 1))
+        if shape:
+            shapes = [Parameter("thrust shape", name, str(n + 1)) for n in range(COUNT)]
+            linear = [Parameter("linear thrust", name, deviation=_LINEAR)] * is_measured
+            bends = not is_measured or name in known.bent
+            yield from shapes if bends else map(_held, shapes)
+            yield from map(_held, linear) if bends else linear
         if f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact:
-            ratio = 0.5 if is_measured else prior("thrust_reverse")
-            yield Parameter("reverse thrust", name, deviation=ratio, null=0.0)
+            ratio, c = 0.5 if is_measured else prior("thrust_reverse"), known.coefficients
+            # Forces that were measured astern are no effect: their centre is not that without one.
+            is_told = is_measured and c[curve.coefficient("a_t")] != c[curve.coefficient(f"a_t{REVERSE}")]
+            yield Parameter("reverse thrust", name, deviation=ratio, null=None if is_told else 0.0)
         if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
             mean = known.coefficients[curve.coefficient("c_0")]
             width = prior("dead_band")
             yield Parameter("dead band", name, mean=mean, deviation=width, low=0.0, high=0.5, null=0.0)
+
+
+def _held(p: Parameter) -> Parameter:
+    """Return a parameter that stays 0. All models of the curves have the same parameters."""
+    return replace(p, deviation=1e-3, low=0.0, high=0.0)
 
 
 def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
@@ -368,7 +383,7 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str
         usual, least, largest = _SIZES[key]
         if deviation := prior(f"slow_{key}"):
             mean, low, high = log(usual), log(least), log(largest)
-            yield Parameter(kind, of, mean=mean, deviation=deviation, is_log=True, low=low, high=high, of_motion=False)
+            yield _noise(kind, of, mean=mean, deviation=deviation, low=low, high=high)
 
     moving = {form.axis.name for one in logs for form in one.layout.axes}
     for axis in (form.axis for form in known.layout.axes):
@@ -386,13 +401,8 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str
             noises.setdefault(m.channel.quantity.name, []).append(m.noise)
     for quantity, some in noises.items():
         white, coloured = prior("white_noise"), prior("coloured_noise")
-        typical_noise = sorted(some)[len(some) // 2]
-        mean = log(typical_noise)
-        yield Parameter(
-            "white noise", quantity, mean=mean, deviation=white, is_log=True, low=mean - _QUIETER, of_motion=False
-        )
+        mean = log(sorted(some)[len(some) // 2])
+        yield _noise("white noise", quantity, mean=mean, deviation=white, low=mean - _QUIETER)
         usual, time = _COLOURED
-        yield Parameter("coloured noise", quantity, mean=log(usual), deviation=coloured, is_log=True, of_motion=False)
-        yield Parameter(
-            "correlation time", quantity, mean=log(time), deviation=coloured, is_log=True, of_motion=False, unit="s"
-        )
+        yield _noise("coloured noise", quantity, mean=log(usual), deviation=coloured)
+        yield _noise("correlation time", quantity, mean=log(time), deviation=coloured, unit="s")

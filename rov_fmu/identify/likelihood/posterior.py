@@ -11,7 +11,7 @@ from math import exp, log
 
 import numpy as np
 
-from rov_fmu.identify.likelihood.parameters import OPTIONAL, Parameter, Table
+from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.result import KEPT, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
@@ -72,7 +72,7 @@ class Posterior:
         The effect with the least evidence is left out first, and the evidence of the others is that without it: two
         effects of which either explains the data are not both left out.
         """
-        optional = [n for n, p in enumerate(self.table.parameters) if p.kind in OPTIONAL]
+        optional = [n for n, p in enumerate(self.table.parameters) if p.null is not None]
         gone: list[int] = []
         while True:
             rest = self.without(gone)

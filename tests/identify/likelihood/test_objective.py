@@ -1,6 +1,7 @@
 """The objective J: its derivatives, the parts that logs and tables have in it, and what counts less or not at all."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +23,14 @@ PLAN = ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0), (0.2, 2.0))
 
 @pytest.fixture(scope="module")
 def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
-    """Return J for a short log of heave, two of yaw, and all tables of heave, of a vehicle with two curves."""
+    """Return J for a short log of heave, two of yaw, and all tables of heave, of a vehicle with a curve that bends."""
     tables = {**responses(VIDEORAY, HEAVE), "thrust_top.csv": pulled(6.5, 0.05), "thrust_rear.csv": pulled(43.0, 2.7)}
     path = folder_of(tmp_path_factory.mktemp("tests"), f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", tables)
     random = np.random.default_rng(0)
     for n, axis in enumerate((HEAVE, YAW, YAW)):
         write_log(path, str(n), run(VIDEORAY, axis, PLAN, 5.0).noisy(random))
     known, logs, rows = begin(load_tests(path))
+    known = replace(known, bent=frozenset({"rear"}))
     return Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
 
 
@@ -84,6 +86,8 @@ def check_gradient(objective: Objective, z: Array) -> None:
     runs = objective.runs(z)
     gradient, information = total(objective, z, objective.data(z, runs))
     for n, name in enumerate(names(objective.table.parameters)):
+        if objective.low[n] == objective.high[n]:
+            continue  # of a parameter that is held
         (h, z_up, up), (_, z_down, down) = both_ways(objective, z, n, runs)
         expected = (objective.value(z_up, up) - objective.value(z_down, down)) / (2.0 * h)
         near = 0.03 if objective.table.parameters[n].of_motion else 0.2 if "width" in name else 0.06
