@@ -15,7 +15,7 @@ from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPO
 from rov_fmu.identify.likelihood.posterior import QUANTILE
 from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorded, typical
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import did_you_mean, first_of, lines_on
+from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
@@ -105,7 +105,7 @@ def _wrong_priors(found: Folder) -> list[str]:
     lines = []
     for key, deviation in found.rov_file.tables.priors.items():
         if key not in PRIORS:
-            lines.append(key_line(f"priors.{key}", f"unknown{did_you_mean(key, PRIORS)}"))
+            lines.append(key_line(f"priors.{key}", f"unknown{only(key, PRIORS)}"))
         elif key in _NEVER_EXACT and deviation == 0.0:
             reason = "must be above 0: the noise of a sensor is seen in its samples, and never known exactly"
             lines.append(key_line(f"priors.{key} = 0", reason))

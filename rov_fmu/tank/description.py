@@ -146,7 +146,7 @@ def _check_clocks(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ..
     files = info.data.get("files", names)
     for name in names:
         if name not in files:
-            raise ValueError(f"must be of its files: {shown(name)} is not{did_you_mean(name, files)}")
+            raise ValueError(f"must be of its files, {join_names(files)}: {shown(name)} is not")
     return names
 
 
