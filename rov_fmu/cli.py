@@ -677,7 +677,8 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     "--inspect",
     "inspects",
     is_flag=True,
-    help="Only list what the log FOLDER, or each log in it, contains, and draft a rov.toml if there is none.",
+    help="List what the log FOLDER, or each log in it, contains, and identify nothing. If there is no rov.toml beside "
+    "the logs, a draft of it is written there.",
 )
 @click.option(
     "--draft",
@@ -741,16 +742,17 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
         print_inspection(inspection)
     for line in inspected.warnings:
         _warn(line)
-    following = shell_words("rov-fmu", "identify", draft.parent)
+    command = shell_words("rov-fmu", "identify", draft.parent)
+    missing = [] if inspected.has_commands else ["add the commands, or name their columns"]
     if draft.exists():
         paragraph(console(), f"There is a {draft} already, so no draft was written.")
-        print_end([], following)
+        print_end([], ", then ".join([*missing, command]))
     elif inspects or drafts:
         write_draft(draft, inspected.text)
-        print_end([draft], f"edit this draft, then {following}")
+        print_end([draft], ", then ".join(["edit this draft", *missing, command]))
     else:
         paragraph(console(), f"There is no {draft}, which gives the vehicle's name and everything that no test tells.")
-        print_end([], f"{following} --draft writes a draft of it")
+        print_end([], f"{command} --draft writes a draft of it")
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -58,7 +58,7 @@ class BuildError(Exception):
     """An error that ends a build. Its text is one line, possibly followed by the compiler's own output."""
 
 
-class OptionError(BuildError):
+class OptionError(BuildError, ValueError):
     """An option with a wrong value, or options that cannot be combined."""
 
 

@@ -133,7 +133,10 @@ class Part:
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        key = key if key in self.keys else key.removesuffix(REVERSE)
+        return self.name_of(key if key in self.keys else key.removesuffix(REVERSE))
+
+    def name_of(self, key: str) -> str:
+        """Return the name that the coefficient with a key has, or would have if it were added."""
         return dict(self.others).get(key) or coefficient_name(key, self.owner)
 
 
@@ -378,12 +381,16 @@ class Layout:
     """The source of `voltage`."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
+    has_fixed_names: bool = field(default=False, compare=False)
+    """True when the coefficients keep their names if parts or coefficients are added or removed."""
 
     def __post_init__(self) -> None:
         """Name the coefficients. The curves main and main_reverse would both have a coefficient d_main_reverse.
 
         A name that is taken gets a number, so the names of parts are free.
         """
+        if self.has_fixed_names:
+            return
         taken = {*(f"F_{thruster.name}" for thruster in self.thrusters), *(COMMANDS if self.has_dead_time else ())}
 
         def named(part: _Part) -> _Part:
@@ -410,6 +417,19 @@ class Layout:
             curves=tuple(replace(curve, keys=keys(curve, CURVE)) for curve in self.curves),
         )
 
+    def with_fixed_names(self) -> "Layout":
+        """Return the layout whose coefficients keep their names, whatever is added or removed.
+
+        They are the names beside every coefficient that the vehicle could have.
+        """
+        every = replace(self.with_keys(lambda *_: True), has_dead_time=True, has_fixed_names=False)
+
+        def named(parts: tuple[_Part, ...], among: tuple[_Part, ...]) -> tuple[_Part, ...]:
+            return tuple(replace(part, others=one.others) for part, one in zip(parts, among, strict=True))
+
+        axes, curves = named(self.axes, every.axes), named(self.curves, every.curves)
+        return replace(self, axes=axes, curves=curves, has_fixed_names=True)
+
     @classmethod
     def of_wrench(cls, axes: "Iterable[VehicleAxis]") -> "Layout":
         """Return the layout of a vehicle whose commands are a wrench in the body frame.
@@ -428,7 +448,7 @@ class Layout:
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
         wanted = set(names) - self.coefficients.keys()
-        return self.with_keys(lambda part, key: key in part.keys or coefficient_name(key, part.owner) in wanted)
+        return self.with_keys(lambda part, key: key in part.keys or part.name_of(key) in wanted)
 
     # -- lookup --
 

@@ -106,9 +106,9 @@ def _other(table: Table, against: Vehicle | None) -> Table | None:
     """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
     if not against or against.layout.gains != table.layout.gains:
         return None
-    if not against.coefficients.keys() <= table.layout.coefficients.keys():
+    values = against.in_layout(table.layout).coefficients
+    if len(values) < len(against.coefficients):
         return None
-    values = against.coefficients
     return replace(table, base={**table.base, **values}, exact=frozenset(values), shape_deviation=0.0)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Axis, coefficient_name
+from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Axis
 from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axis_alone
 from rov_fmu.identify.likelihood.objective import TableRow
@@ -15,7 +15,7 @@ from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPO
 from rov_fmu.identify.likelihood.posterior import QUANTILE
 from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorded, typical
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import did_you_mean, first_of, lines_on
+from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
@@ -109,7 +109,7 @@ def _wrong_priors(found: Folder) -> list[str]:
     lines = []
     for key, deviation in found.rov_file.tables.priors.items():
         if key not in PRIORS:
-            lines.append(key_line(f"priors.{key}", f"unknown{did_you_mean(key, PRIORS)}"))
+            lines.append(key_line(f"priors.{key}", f"unknown{only(key, PRIORS)}"))
         elif key in _NEVER_EXACT and deviation == 0.0:
             reason = "must be above 0: the noise of a sensor is seen in its samples, and never known exactly"
             lines.append(key_line(f"priors.{key} = 0", reason))
@@ -274,8 +274,8 @@ def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviati
     for form in layout.axes:
         axis = form.axis
         if axis.name in logged or tests.tested.steady.get(axis.name):
-            more |= {axis.coefficient(f"{key}{REVERSE}"): values[axis.coefficient(key)] for key in ("a_d", "b_d")}
-            more[axis.coefficient("F_0")] = base.get(axis.coefficient("F_0"), 0.0)
+            more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
+            more[form.name_of("F_0")] = 0.0
     vehicle = _with_voltage(vehicle, base, tests)
     layout = vehicle.layout
     values = {**vehicle.coefficients, **values}
@@ -283,7 +283,7 @@ def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviati
     for curve in layout.curves:
         if not curve.tables and not exact:
             for key in ("a_t", "b_t"):
-                more[coefficient_name(f"{key}{REVERSE}", curve.name)] = values[curve.coefficient(key)]
+                more[curve.name_of(f"{key}{REVERSE}")] = values[curve.coefficient(key)]
             if logged or curve.name in tests.tested.thrust:
                 more[curve.coefficient("c_0")] = 0.0
         if logged:
@@ -306,8 +306,8 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
     for curve in vehicle.layout.curves:
         if len(curve.tables) < 2:
             measured_at = tests.given.description.measured_at.get(curve.name, mean)
-            more[coefficient_name("V_0", curve.name)] = base.get(coefficient_name("V_0", curve.name), measured_at)
-            more[coefficient_name("n_V", curve.name)] = USUAL_EXPONENT if is_exact else 0.0
+            more[curve.name_of("V_0")] = base.get(curve.name_of("V_0"), measured_at)
+            more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
     layout = replace(vehicle.layout, voltage=round(mean, 3), voltage_source="Mean voltage of the logs")
     return Vehicle(layout, vehicle.coefficients).extended(more)
 
@@ -318,7 +318,7 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
     Both directions share the ratio of a_t to b_t, which are not negative. What else the forces tell is the shape that
     the likelihood fits.
     """
-    astern = coefficient_name(f"a_t{REVERSE}", curve.name) in vehicle.layout.coefficients
+    astern = f"a_t{REVERSE}" in curve.keys
     c_0 = vehicle.coefficients.get(curve.coefficient("c_0"), 0.0)
     command, F = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
     c, F, is_back = np.maximum(np.abs(command) - c_0, 0.0), np.abs(F), astern & (command < 0.0)
@@ -337,7 +337,7 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
     for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):
         if not end or astern:
             for key, share in (("a_t", fit[1]), ("b_t", 1.0 - fit[1])):
-                found[coefficient_name(f"{key}{end}", curve.name)] = float(np.exp(fit[0]) * ratio * share)
+                found[curve.name_of(f"{key}{end}")] = float(np.exp(fit[0]) * ratio * share)
     return found
 
 

@@ -13,15 +13,14 @@ from rov_fmu.equation.catalogue import (
     REVERSE,
     YAW,
     Axis,
-    coefficient_name,
 )
-from rov_fmu.equation.layout import Layout, Part
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.description import Description, Requests
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.description import Head
-from rov_fmu.vehicle.geometry import check_layout, check_part_names, check_thruster_places
+from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -95,7 +94,6 @@ def narrowed(description: Description, tested: TestContents, folder: Path, usele
         line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
         return Narrowing(None, test_mistakes=tuple(useless) or (line,))
     hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
-    hardware = hardware or [*check_part_names(_with_every_effect(layout, description.requests))]
     own = None
     if description.thrusters:
         own = replace(description.thrusters, axes=layout.axes)
@@ -127,14 +125,15 @@ def _given(description: Description, head: Head, layout: Layout, known: Mapping[
 
 def _kept_from_base(description: Description, tested: TestContents) -> dict[str, Quantity]:
     """Return the coefficients of the base that no test replaces."""
-    requests = description.requests
-    replaced = {coefficient_name("T", name) for name in requests.lag}
+    replaced: set[str] = set()
     for curve in description.layout.curves:
+        if curve.name in description.requests.lag:
+            replaced.add(curve.name_of("T"))
         if curve.name in tested.thrust:
             _, backward = tested.thrust[curve.name]
             whole_curve = backward or f"a_t{REVERSE}" not in curve.keys
             keys = [key for key in CURVE if key != "T"] if whole_curve else ["a_t", "b_t"]
-            replaced |= {coefficient_name(key, curve.name) for key in keys}
+            replaced |= {*map(curve.name_of, keys)}
     for form in description.layout.axes:
         name = form.axis.name
         keys = []
@@ -146,7 +145,7 @@ def _kept_from_base(description: Description, tested: TestContents) -> dict[str,
             keys += ["beta"]
         if name in tested.logs:
             keys += ["F_0"]
-        replaced |= {form.axis.coefficient(key) for key in keys}
+        replaced |= {*map(form.name_of, keys)}
     return {name: quantity for name, quantity in description.base_quantities.items() if name not in replaced}
 
 
@@ -156,19 +155,7 @@ def _kept_from_base(description: Description, tested: TestContents) -> dict[str,
 def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
     """Drop the coefficients that a vehicle need not have, unless they are known."""
     kinds = AXIS | CURVE
-    return layout.with_keys(
-        lambda part, key: key in part.keys and (kinds[key].needed or coefficient_name(key, part.owner) in known)
-    )
-
-
-def _with_every_effect(layout: Layout, requests: Requests) -> Layout:
-    """Return the layout with all coefficients that the fits may add, so that their names can be checked beforehand."""
-    asked: dict[str, tuple[str, ...]] = {"T": requests.lag, "d": (), "d_reverse": ()}
-
-    def has(part: Part, key: str) -> bool:
-        return key not in asked or key in part.keys or part.owner in asked[key]
-
-    return replace(layout.with_keys(has), has_dead_time=True)
+    return layout.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
 
 
 def _is_tested_or_known(axis: Axis, tested: TestContents, known: Collection[str]) -> bool:
@@ -253,7 +240,7 @@ def _missing_or_doubled_tests(
                 yield f"no thrust_{curve.name}*.csv, and [known] in rov.toml does not give {names[0]}"
             continue
         file, backward = tested.thrust[curve.name]
-        reverse_names = tuple(f"{name}{REVERSE}" for name in names)
+        reverse_names = tuple(curve.name_of(f"{key}{REVERSE}") for key in ("a_t", "b_t"))
         for pair in (names, reverse_names) if backward else (names,):
             if given := [name for name in pair if name in description.known]:
                 yield f"rov.toml gives {', '.join(given)}, but there is {file} too"

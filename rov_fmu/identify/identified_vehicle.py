@@ -18,7 +18,7 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.description import Provenance
-from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated, some_estimates
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -35,6 +35,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     """
     given, kept = tests.given, fit.kept
     layout = _layout(tests, fit)
+    own = replace(layout, has_fixed_names=False)  # the names that the vehicle has when its file is read
     values = _in_file(fit, kept.z)
     values |= {  # a file has no smaller exponent
         c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
@@ -89,8 +90,9 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         estimates=estimates,
         provenance=made,
         measured_from=_data(fit),
-    )
-    return vehicle, coefficients
+    ).in_layout(own)
+    renamed = dict(zip(layout.coefficients, own.coefficients, strict=True))
+    return vehicle, {renamed[name]: replace(one, name=renamed[name]) for name, one in coefficients.items()}
 
 
 def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
@@ -109,16 +111,14 @@ def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
         for name, quantity in tables.quantities(layout).items()
         if quantity and places[name][0] in ("arm", "curves")
     }
-    numbers = {name: vehicle.coefficients.get(name, UNTUNED) for name in kept}
-    sources = dict.fromkeys(kept, NOT_GIVEN) | {name: s for name, s in vehicle.sources.items() if name in kept}
-    intervals = {name: interval for name, interval in vehicle.intervals.items() if name in kept}
+    vehicle = vehicle.in_layout(layout)
+    numbers = {**dict.fromkeys(kept, UNTUNED), **vehicle.coefficients}
+    sources = {**dict.fromkeys(kept, NOT_GIVEN), **vehicle.sources}
     return replace(
         vehicle,
-        layout=layout,
         coefficients=numbers | {name: quantity.value for name, quantity in thrust.items()},
         sources=sources | {name: quantity.source for name, quantity in thrust.items()},
-        intervals=intervals | {name: q.interval for name, q in thrust.items() if q.interval},
-        estimates=some_estimates(vehicle.estimates, kept),
+        intervals={**vehicle.intervals, **{name: q.interval for name, q in thrust.items() if q.interval}},
         command_range=vehicle.command_range if tables.validity else (0.0, 1.0),
     )
 

@@ -3,12 +3,13 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.equation.layout import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
@@ -65,14 +66,14 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
-    names = tuple(vehicle.estimates)
+    names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,
         vehicle=of_file,
         against=against,
         axes=tuple(axes),
-        curves={curve.name: _those_of(coefficients, map(curve.coefficient, curve.keys)) for curve in known.curves},
+        curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
         forces=tuple(points_of(tests, held_out, vehicle, "thrust")),
         effects=tuple(effects_of(fit)),
         disturbances=tuple(slow),
@@ -102,19 +103,19 @@ def _axis(
     answers = assess.answers(fit.averaged, axis, vehicle)
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
-    names = [axis.coefficient(key) for key in (*vehicle.layout.kinds[axis.name].keys, "beta")]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     return AxisResult(
         axis=axis,
         verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady),
         answers=answers,
-        known=_those_of(coefficients, names),
+        known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),
         predictions=own,
         points=(*steady, *times),
         next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits, answers),
     )
 
 
-def _those_of(coefficients: Mapping[str, Coefficient], names: Iterable[str]) -> tuple[Coefficient, ...]:
-    """Return the coefficients with these names, of those that the fit changes."""
+def _those_of(coefficients: Mapping[str, Coefficient], part: Part, *more: str) -> tuple[Coefficient, ...]:
+    """Return the coefficients of a curve or an axis, of those that the fit changes. `more` are keys beside its own."""
+    names = map(part.coefficient, (*part.keys, *more))
     return tuple(coefficients[name] for name in names if name in coefficients)

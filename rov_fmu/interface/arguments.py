@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, Declaration
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.messages import InputError, brief, did_you_mean, only, shown
+from rov_fmu.io.messages import InputError, brief, only, shown
 from rov_fmu.vehicle.quantity import within
 
 if TYPE_CHECKING:
@@ -196,9 +196,7 @@ def check_name(what: str, name: str, declarations: Mapping[str, Declaration], al
     """Raise InputError if no variable of this kind has the name, and it is not one of the others."""
     if name not in declarations and name not in also:
         kind = {"inputs": "input", "start": "state", "state": "state", "coefficients": "coefficient"}[what]
-        names = [*declarations, *also]
-        known = only(str(name), names) if len(names) < 20 else did_you_mean(str(name), names)
-        raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{known}")
+        raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{only(str(name), [*declarations, *also])}")
 
 
 def _check_shape(key: str, values: Array, times: int, many: bool) -> None:
@@ -255,5 +253,5 @@ def checked_record(record: Sequence[str] | None, layout: Layout, names: Collecti
         return [*layout.state, *layout.calculated]
     for name in [record] if isinstance(record, str) else record:
         if name not in names:
-            raise InputError(f"record: the vehicle has no variable {shown(name)}{did_you_mean(str(name), names)}")
+            raise InputError(f"record: the vehicle has no variable {shown(name)}{only(str(name), names)}")
     return [record] if isinstance(record, str) else list(record)

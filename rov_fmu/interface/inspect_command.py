@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
-from rov_fmu.equation.catalogue import AXES, BODY, EXTERNAL
+from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
@@ -15,9 +15,10 @@ from rov_fmu.io.messages import NO_FILE, brief, first_of, one_line
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
+from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
-from rov_fmu.tank.folder import unreadable
+from rov_fmu.tank.folder import PATTERNS, unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
 from rov_fmu.tank.readers.parsers import one_parser
@@ -39,6 +40,11 @@ class Inspected:
     """The place of rov.toml."""
     text: str
     """The draft of rov.toml."""
+
+    @property
+    def has_commands(self) -> bool:
+        """True if a log or a table has commands, without which nothing can be identified."""
+        return any(one.commands or any(row.name == COMMAND for row in one.channels) for one in self.logs)
 
 
 def lacks_description(folder: Path) -> bool:
@@ -70,8 +76,7 @@ def inspect_logs(path: Path) -> Inspected:
                 mistakes += str(error).splitlines()
                 findings.append(unreadable(log, error))
     if not inspections:
-        none = f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it"
-        raise DataFileError(*(mistakes or [none]))
+        raise DataFileError(*(mistakes or [f"{path}: there is no log ({PATTERNS}) in it"]))
     tables = headers_of_tables(folder)
     text = _draft(folder, inspections, tables, *_thrusters(inspections, layouts, tables.curves))
     return Inspected(inspections, sentences(findings, SENTENCES), folder / ROV_FILE, text)
@@ -137,7 +142,7 @@ def _draft(
         curves=tables.curves or ["all"],
         axes=AXES.values(),
         signals={row.name for one in inspections for row in one.channels},
-        body=[*BODY],
+        body=[*BODY, *ARM],
         vehicle=vehicle,
         columns=columns,
         headers=_questions(headers),
@@ -170,17 +175,20 @@ def _dives(inspections: Sequence[Inspection]) -> list[list[str]]:
     """Return the files of each dive of several files: one with commands, and those without commands that belong to it.
 
     A file without commands belongs to the one whose times overlap most with its own, or, without an overlap, to the
-    only one with commands.
+    only one with commands. Where there are several, the user has to decide.
     """
     times = {one.path: _times(one) for one in inspections}
     files = {one.path: [one.path.name] for one in inspections if one.commands}
+    undecided = []
     for path, (start, end) in times.items():
         if files and path not in files and isfinite(start):
             overlaps = {other: min(end, times[other][1]) - max(start, times[other][0]) for other in files}
             best = max(files, key=lambda other: overlaps[other])
             if overlaps[best] > 0.0 or len(files) == 1:
                 files[best].append(path.name)
-    return [names for names in files.values() if len(names) > 1]
+            else:
+                undecided.append(["?", path.name])
+    return [*(names for names in files.values() if len(names) > 1), *undecided]
 
 
 def _times(inspection: Inspection) -> tuple[float, float]:

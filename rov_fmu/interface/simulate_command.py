@@ -13,7 +13,7 @@ from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, one_line, shown, wrapped
+from rov_fmu.io.messages import FileError, InputError, one_line, only, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
 
@@ -97,15 +97,15 @@ class Settings:
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     """Return the values of the options --set: inputs, initial values and coefficients. Raises InputError."""
     variables = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
-    names = [*variables, *layout.kinds]
+    names = [*layout.kinds, *variables]
     values: dict[str, float] = {}
     for text in settings:
         name, _, value = (part.strip() for part in text.partition("="))
         if name not in names and name in layout.calculated:
             raise InputError(f"--set {text}: {name} is an output, which cannot be set")
         if name not in names:
-            hint = did_you_mean(name, names)
-            raise InputError(f"--set {text}: the vehicle has no such input, state or coefficient{hint}")
+            known = only(name, names)
+            raise InputError(f"--set {text}: the vehicle has no such input, axis, state or coefficient{known}")
         if name in values:
             raise InputError(f"--set {text}: {name} is set twice")
         try:

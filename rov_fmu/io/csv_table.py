@@ -396,6 +396,8 @@ def _why_no_variable(header: Sequence[str], place: int, why_wrong: Callable[[str
         return "this column occurs twice"
     if place and _UNIT.search(name):
         return f"must be {shown(_UNIT.sub('', name))} without a unit; a command of 30 % is 0.3 here"
+    if (unit := _UNIT.search(name)) and unit[0] != " [s]":
+        return "must be the time in s, which is the unit here"
     return why_wrong(name) if place else None
 
 

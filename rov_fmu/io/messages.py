@@ -12,6 +12,8 @@ from textwrap import wrap
 MOST = 10
 """The largest number of mistakes in a file that are printed. The others are only counted."""
 
+_MOST_NAMES = 20
+"""The largest number of names in a message that lists those that exist."""
 NO_FILE = "there is no such file"
 """The reason if a file is missing."""
 
@@ -137,12 +139,12 @@ def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
 
 
 def only(name: str, names: Collection[str], in_words: str = "") -> str:
-    """Return the end of a message about an unknown name: the names that exist, and the most similar one.
+    """Return the end of a message about an unknown name: the first names that exist, and the most similar one.
 
     `in_words` replaces the list of the names with commas. If there is only one name, it is not suggested again.
     """
     hint = did_you_mean(name, names) if len(names) > 1 else ""
-    return f", only {in_words or ', '.join(names)}{hint}"
+    return f", only {in_words or ', '.join(first_of([*names], _MOST_NAMES))}{hint}"
 
 
 def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[str, str] | None = None) -> str:

@@ -25,9 +25,8 @@ from rov_fmu.equation.catalogue import (
     SWAY,
     YAW,
     Declaration,
-    coefficient_name,
 )
-from rov_fmu.equation.layout import Direction, Layout, VehicleAxis
+from rov_fmu.equation.layout import Direction, Layout, Part, VehicleAxis
 from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -147,7 +146,7 @@ def _check_clocks(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ..
     files = info.data.get("files", names)
     for name in names:
         if name not in files:
-            raise ValueError(f"must be of its files: {shown(name)} is not{did_you_mean(name, files)}")
+            raise ValueError(f"must be of its files, {join_names(files)}: {shown(name)} is not")
     return names
 
 
@@ -356,10 +355,11 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
     own_layout = file.layout
     start = base.layout if base else _start(file)
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
-    # With `[fit] voltage`, V_0 belongs to the effect that is fitted.
-    names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
-    layout = _largest_layout(start, axis_keys, {*known_names} - names.keys())
+    layout = _largest_layout(start, axis_keys)
+    # With `[fit] voltage`, V_0 belongs to the effect that is fitted.
+    names = {curve.name_of("V_0"): curve.name for curve in layout.curves if file.fit.voltage}
+    layout = layout.extended({*known_names} - names.keys())
     curves = tuple(curve.name for curve in layout.curves)
     given = {name: quantity for name, quantity in file.quantities(layout).items() if quantity} | dict(file.known)
     return Description(
@@ -369,7 +369,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         axes=tuple(name for name in AXES if name in start.kinds or name in own_layout.kinds),
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
-        base_quantities=_quantities(base) if base else {},
+        base_quantities=_quantities(base.in_layout(layout)) if base else {},
         requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
         measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=file.validity.limits if file.validity else base.limits if base else (),
@@ -406,14 +406,17 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
     }
 
 
-def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]], known: Iterable[str]) -> Layout:
-    """Add every axis that the thrusters drive, the keys of the file's own axis tables, and the known coefficients."""
+def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) -> Layout:
+    """Add every axis that the thrusters drive, and the keys of the file's own axis tables.
+
+    Effects come and go while a vehicle is identified, so its coefficients have fixed names.
+    """
     forms = []
     for name, axis in AXES.items():
         if layout.signs(axis) or name in layout.kinds or name in axis_keys:
             form = layout.kinds.get(name, VehicleAxis(axis))
             forms.append(VehicleAxis(axis, (*form.keys, *axis_keys.get(name, ()))))
-    return replace(layout, axes=tuple(forms)).extended(known)
+    return replace(layout, axes=tuple(forms)).with_fixed_names()
 
 
 # ---- Mistakes that depend on the vehicle's hardware ------------------------------------------------------------------
@@ -433,15 +436,13 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     for name in file.windows:
         if name not in windows:
             yield key_line(f"windows.{name}", f"there is no such key{only(name, windows, join_names(windows))}")
-    curves = [curve.name for curve in layout.curves]
-    requests = description.requests
+    curves, requests = layout.curves_by_name, description.requests
     asked = {"lag": ("T", requests.lag), "voltage": ("n_V", tuple(curves) if requests.voltage else ())}
     for key, (coefficient, names) in asked.items():
         for name in names:
-            given = coefficient_name(coefficient, name)
             if name not in curves:
                 yield key_line(f"fit.{key}", f"there is no such curve{only(name, curves, join_names(curves))}", name)
-            elif given in description.named:
+            elif (given := curves[name].name_of(coefficient)) in description.named:
                 yield key_line(f"fit.{key}", f"{given} is given, so it cannot be fitted too", name)
     if requests.attitude and (own := [name for name in ("roll", "pitch") if name in description.axes]):
         yield key_line("fit.attitude", f"the vehicle has the axis {join_names(own)}, which is simulated: leave it out")
@@ -500,11 +501,11 @@ def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:
 def _missing_halves(file: RovTables, description: Description) -> Iterator[str]:
     """Yield a line for each coefficient without its partner, unless check_names_and_keys reports it already."""
     given, tables = {*description.base_quantities, *description.known}, description.layout.keys_in_file
-    layout = description.layout
-    for owner in (*(curve.name for curve in layout.curves), *(form.axis.velocity for form in layout.axes)):
+    parts: tuple[Part, ...] = (*description.layout.curves, *description.layout.axes)
+    for part in parts:
         for keys in _PAIRS:
-            one, other = (coefficient_name(key, owner) for key in keys)
-            if one in given and other not in given and (one in file.known or not one.endswith(REVERSE)):
+            one, other = map(part.name_of, keys)
+            if one in given and other not in given and (one in file.known or not keys[0].endswith(REVERSE)):
                 table = "known" if one in file.known else ".".join(tables[one][:-1])
                 yield key_line(table, f"{one} is given, but {other} is not")
 

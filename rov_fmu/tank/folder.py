@@ -22,7 +22,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES, TABLE_SUFFIXES
-from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed
+from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
 from rov_fmu.io.reading import hash_of
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -37,6 +37,9 @@ from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
+_SUFFIXES = (*TABLE_SUFFIXES, *LOG_SUFFIXES)
+PATTERNS = ", ".join(f"*{suffix}" for suffix in _SUFFIXES)
+"""The names that the files of tests have."""
 KINDS = (*TABLES, "log")
 """The words that the name of a file begins with."""
 _LOADS = "The vehicle has these loads as inputs, and neither thrusters nor their lag"
@@ -185,12 +188,12 @@ class Folder:
         """Yield a line for each entry of [columns] and [topics] that no file has."""
         tables = self.rov_file.tables
         for table, names in (("columns", tables.columns), ("topics", tables.topics)):
-            free = self.known - names.keys()
+            free = sorted(self.known - names.keys())
             for name, value in names.items():
                 if name not in self.known:
                     is_header = table == "columns"
                     what = "no CSV file has such a column" if is_header else "no log has such a topic and field"
-                    yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, free)}", value)
+                    yield key_line(f"{table}.{name}", f"{what}{only(name, free) if free else ''}", value)
 
     def missing_columns(self, requests: Requests) -> Iterator[str]:
         """Yield a line for each key of [fit] that needs a column which a log does not have."""
@@ -254,8 +257,7 @@ def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = l
     parts = {name for dive in dives.values() for name in dive.files}
     paths = [path for path in test_files(folder) if path.name not in parts]
     if not paths and not dives:
-        patterns = ", ".join(f"*{suffix}" for suffix in (*TABLE_SUFFIXES, *LOG_SUFFIXES))
-        raise VehicleFileError(*mistakes, f"{folder}: there are no tests ({patterns}) in this folder")
+        raise VehicleFileError(*mistakes, f"{folder}: there are no tests ({PATTERNS}) in this folder")
     vehicles = filter(None, (tables.against, tables.base))
     check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *vehicles])
     found.read_all(paths)
@@ -274,8 +276,7 @@ def unreadable(path: Path, error: FileError) -> Finding:
 def test_files(folder: Path) -> list[Path]:
     """Return the files of a folder that may be tests, also those of bags in folders of their own, in order."""
     in_bags = (path for bag in folder.glob("*/metadata.yaml") for path in bag.parent.iterdir())
-    suffixes = (*TABLE_SUFFIXES, *LOG_SUFFIXES)
-    return sorted(path for path in (*folder.iterdir(), *in_bags) if path.name.lower().endswith(suffixes))
+    return sorted(path for path in (*folder.iterdir(), *in_bags) if path.name.lower().endswith(_SUFFIXES))
 
 
 def _read_description(folder: Path) -> RovFile:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Layout, Part, Thruster
+from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
@@ -23,7 +23,7 @@ It decides whether the thrusters can drive two axes separately, and whether a th
 
 
 def check_layout(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
-    """Yield a line for each mistake in the thrusters, axes, inputs and names of a vehicle.
+    """Yield a line for each mistake in the thrusters, axes and inputs of a vehicle.
 
     `driven` are the names of axes that thrusters must drive even if weight rights the vehicle about them.
     """
@@ -33,7 +33,6 @@ def check_layout(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
     else:
         yield from check_axes(layout, driven)
         yield from check_inputs(layout)
-    yield from check_part_names(layout)
 
 
 def check_thruster_places(layout: Layout) -> Iterator[str]:
@@ -133,16 +132,6 @@ def _unit(row: Sequence[float]) -> list[float]:
     """Return a row divided by its Euclidean norm."""
     norm = hypot(*row)
     return [part / norm for part in row]
-
-
-def check_part_names(layout: Layout) -> Iterator[str]:
-    """Check that all coefficients have their usual names, by which the identification knows them."""
-    tables: Mapping[str, Mapping[str, Part]] = {"axes": layout.kinds, "curves": layout.curves_by_name}
-    for table, parts in tables.items():
-        for part in parts:
-            for key, name in parts[part].others:
-                reason = f"another variable has its name, and it would be {name}; rename a part"
-                yield key_line(f"{table}.{part}.{key}", reason)
 
 
 # ---- Mass, damping, weight -------------------------------------------------------------------------------------------

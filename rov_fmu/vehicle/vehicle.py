@@ -8,7 +8,7 @@ from itertools import chain
 from math import inf, isfinite, sin
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from typing_extensions import Self
 
@@ -41,6 +41,7 @@ class VehicleFileError(FileError):
 
 
 Values = Mapping[str, float]
+_Value = TypeVar("_Value")
 
 
 class _Formulas:
@@ -117,6 +118,29 @@ class Vehicle:
     def extended(self, values: Values) -> Self:
         """Return the vehicle with other or additional coefficients."""
         return replace(self, layout=self.layout.extended(values), coefficients={**self.coefficients, **values})
+
+    def in_layout(self, layout: Layout) -> Self:
+        """Return the vehicle with another layout, and with those of its coefficients that this layout has too.
+
+        A coefficient may have another name there: its tables and its key in the vehicle file tell which one it is.
+        """
+        there = {keys: name for name, keys in layout.keys_in_file.items()}
+        names = {name: there[keys] for name, keys in self.layout.keys_in_file.items() if keys in there}
+
+        def renamed(values: Mapping[str, _Value]) -> dict[str, _Value]:
+            return {names[name]: value for name, value in values.items() if name in names}
+
+        return replace(
+            self,
+            layout=layout,
+            coefficients=renamed(self.coefficients),
+            sources=renamed(self.sources),
+            intervals=renamed(self.intervals),
+            estimates={
+                name: row.model_copy(update={"correlation": renamed(row.correlation)})
+                for name, row in renamed(self.estimates).items()
+            },
+        )
 
     def __repr__(self) -> str:
         """Return the name of the vehicle, its axes, its inputs, and the coefficients that were set by hand."""

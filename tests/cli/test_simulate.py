@@ -120,7 +120,10 @@ def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:
 
 WRONG = {
     "unknown vehicle": ("videorey", "videorey: there is no such file, "),
-    "unknown name": ("--set ul=1", "--set ul=1: the vehicle has no such input, state or coefficient; did you"),
+    "unknown name": (
+        "--set ul=1",
+        "--set ul=1: the vehicle has no such input, axis, state or coefficient, only surge, ",
+    ),
     "an output": ("--set F_l=3", "--set F_l=3: F_l is an output, which cannot be set\n"),
     "percent": ("--set u_l=30%", "--set u_l=30%: '30%' must be a finite number: 30 % is 0.3\n"),
     "percent of a length": ("--set z=30%", "--set z=30%: '30%' must be a finite number\n"),

@@ -14,6 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
@@ -73,16 +74,27 @@ def parsed(draft: str) -> dict[str, Any]:
     return tomlkit.parse(draft).unwrap()
 
 
+def weigh(folder: Path) -> None:
+    """Complete a draft with what only the owner of the vehicle can tell."""
+    path = folder / "rov.toml"
+    draft = path.read_text(encoding="utf-8")
+    path.write_text(draft.replace('\nm_rov = { value = "?"', "\nm_rov = { value = 12"), encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long if name in (".bag", ".db3") else ()) for name in FILES]
 )
-def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, inspect: Inspect) -> None:
+def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, inspect: Inspect) -> None:
     write, axes = FILES[name]
     write(tmp_path)
     out, draft = inspect()
     assert out.endswith(f"Wrote {tmp_path / 'rov.toml'}. Next: edit this draft, then rov-fmu identify {tmp_path}\n")
     assert 'base = "bluerov2"' in draft
+    with pytest.raises(VehicleFileError, match=r"known\.m_rov\.value = '\?': must be a number$"):
+        load_tests(tmp_path)
+    weigh(tmp_path)
     tests = load_tests(tmp_path)
+    assert tests.given.vehicle["m_rov"] == 12.0
     assert axes <= {*tests.tested.logs}
     (log,) = tests.folder.logs
     assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
@@ -326,6 +338,7 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     assert main(["identify", str(tmp_path), "--draft"]) == 0
     (warning,) = capsys.readouterr().err.splitlines()
     assert warning.startswith(f"rov-fmu: warning: {name}: left out, because it cannot be read: ")
+    weigh(tmp_path)
     tests = load_tests(tmp_path)
     assert tests.tested.logs == ["heave"]
     assert f"{name}: left out, because it cannot be read" in by_heading(tests.findings)["Warnings"][0]
@@ -340,5 +353,40 @@ def test_files_of_several_dives_are_paired_by_their_times(tmp_path: Path, inspec
     for n in (1, 2):
         table(tmp_path / f"out_{n}.csv", "time [s],u_1 [%],u_2 [%]", TIME + 99 * n, 9 * TIME, -9 * TIME)
         table(tmp_path / f"in_{n}.csv", "time [s],depth [m]", TIME + 99 * n + 2.0, DEPTH)
+    table(tmp_path / "other_clock.csv", "time [s],heading [deg]", TIME + 9e5, TIME)
     _, draft = inspect()
-    assert parsed(draft)["dives"] == {f"dive_{n}": {"files": [f"out_{n}.csv", f"in_{n}.csv"]} for n in (1, 2)}
+    paired = {f"dive_{n}": {"files": [f"out_{n}.csv", f"in_{n}.csv"]} for n in (1, 2)}
+    assert parsed(draft)["dives"] == paired | {"dive_3": {"files": ["?", "other_clock.csv"]}}
+
+
+def test_a_vehicle_with_an_arm_asks_for_it(tmp_path: Path, inspect: Inspect) -> None:
+    """The mass and the place of the rear thrusters are the owner's; a moment of inertia may be that of the base."""
+    table(tmp_path / "log.csv", "time [s],u_l [%],u_r [%],u_t [%],depth [m]", TIME, TIME, TIME, TIME, DEPTH)
+    _, draft = inspect()
+    assert [line.partition("   #")[::2] for line in draft.splitlines() if "value = " in line] == [
+        ('m_rov = { value = "?", unit = "kg", source = "Measured" }', " 6.57 in the base"),
+        ('# I_r = { value = "?", unit = "kg.m2", source = "Measured" }', " 0.105 in the base"),
+        ('R = { value = "?", unit = "m", source = "Measured" }', " 0.22 in the base"),
+        ('gamma = { value = "?", unit = "rad", source = "Measured" }', " 0.423 in the base"),
+    ]
+
+
+def test_logs_without_commands_are_not_said_to_be_identifiable(
+    tmp_path: Path, inspect: Inspect, capsys: Capsys
+) -> None:
+    """A file with motion alone, and one with commands alone, are refused with the table that joins them."""
+    table(tmp_path / "in.csv", "time [s],depth [m]", TIME, DEPTH)
+    end = f"add the commands, or name their columns, then rov-fmu identify {tmp_path}\n"
+    assert inspect()[0].endswith(f"Next: edit this draft, then {end}")
+    assert inspect()[0].endswith(f"Next: {end}")
+    (tmp_path / "rov.toml").unlink()
+    table(tmp_path / "out.csv", "time [s],u_l [%],u_r [%],u_t [%]", TIME + 900.0, TIME, TIME, TIME)
+    _, draft = inspect()
+    weigh(tmp_path)
+    text = re.sub(r'= "\?"', "= 0.3", draft).partition("[dives")[0]
+    (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
+    assert main(["identify", str(tmp_path)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.rpartition("; ")[2] for line in lines] == [
+        "if another file of the same dive has it, [dives] in rov.toml joins the files"
+    ] * 2

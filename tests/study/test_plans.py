@@ -75,6 +75,7 @@ FIGURES = {
     'end = "np.max(u)"': "figures.end = 'np.max(u)': np.max is an attribute, which is not allowed: write max(...)",
     'end = "V_ss(u, 0, 100)"': "figures.end = 'V_ss(u, 0, 100)': there is no time 100 s in a run from 0 to 1 s",
     'end = "final(alpha_u)"': "figures.end = 'final(alpha_u)': TypeError: 'float' object is not subscriptable; alpha_u",
+    'end = "u[11]"': "figures.end = 'u[11]': IndexError: index 11 is out of bounds for axis 0 with size 11",
     'end = "u"': "figures.end = 'u': must be one number, and not an array",
     'end = "max"': "figures.end = 'max': max is a function: write max(...)",
     'end = "out[0]"': "figures.end = 'out[0]': out gives a variable by its name: write out[\"der(u)\"]",
@@ -166,6 +167,7 @@ def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
     {
         "time,u_l\n0,0\n\n0.1,1.5\n": "line 4, column 'u_l' = 1.5 at 0.1 s: must be within -1 ... 1",
         "time,u_l\n0.03,0.5\n0.1,0.5\n": "line 2, column 'u_l' = 0.5 at 0.03 s: a jump, as from 0 here, must be at a ",
+        "time [ms],u_l\n0,0\n": "line 1, column 'time [ms]': must be the time in s, which is the unit here",
         "time,u\n0,0\n": "column 'u': is no input of the FMU; its causality is output",
     }.items(),
 )

@@ -105,6 +105,21 @@ def test_a_ramp_is_exact_to_second_order_of_the_step(foreign: Foreign, tmp_path:
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.01)
 
 
+def test_runs_in_which_the_vehicle_turns_over_are_counted(
+    tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A moment of 60 N.m about the x axis is more than weight and buoyancy resist. No figure has an angle."""
+    plan = tmp_path / "plan.toml"
+    plan.write_text(
+        'vehicle = "bluerov2_heavy"\nstop_time = 5.0\nstep = 0.1\nsampler = "grid"\n'
+        '[vary]\nK_ext.values = [0.0, 1.0, 60.0]\n[figures]\nend = "z[-1]"\n',
+        encoding="utf-8",
+    )
+    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 0
+    told = "warning: in 1 of 3 runs the vehicle turned over: phi or theta passed 90 degrees"
+    assert capsys.readouterr().err.count(told) == 1
+
+
 @pytest.mark.parametrize("reset", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
     reset: int, foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str

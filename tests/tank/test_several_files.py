@@ -126,7 +126,8 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
         ),
         (
             f'{FILES}\nother_clock = ["depht.csv"]',
-            "rov.toml: dives.may.other_clock = ['depht.csv']: must be of its files: 'depht.csv' is not; did you mean",
+            "rov.toml: dives.may.other_clock = ['depht.csv']: must be of its files, "
+            "commands.csv, depth.csv, heading.csv: 'depht.csv' is not",
         ),
         ('files = ["commands.csv"]', "rov.toml: dives.may.files = ['commands.csv']: must be two or more files"),
     ],

@@ -13,8 +13,8 @@ from math import exp, inf, log
 import numpy as np
 
 from rov_fmu.c.filter import Parameters, Slow
-from rov_fmu.equation.catalogue import HEAVE, REVERSE, Axis, coefficient_name
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.catalogue import HEAVE, REVERSE, Axis
+from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
 
@@ -160,12 +160,13 @@ class Table:
         """Return all coefficients of the layout for the coordinates of the parameters."""
         found = dict(self.base)
         for form in self.layout.axes:
-            self._axis(found, z, form.axis)
+            self._axis(found, z, form)
         for curve in self.layout.curves:
             self._curve(found, z, curve)
         return found | {name: self.base[name] for name in self.exact}
 
-    def _axis(self, found: dict[str, float], z: Sequence[float], axis: Axis) -> None:
+    def _axis(self, found: dict[str, float], z: Sequence[float], form: VehicleAxis) -> None:
+        axis = form.axis
         for key, kind in (("a_d", "quadratic drag"), ("b_d", "linear drag")):
             name = axis.coefficient(key)
             found[name] = self.get(z, kind, axis.name, default=found[name])
@@ -175,7 +176,7 @@ class Table:
                 found[reverse] = found[name] * ratio * exp(self.get(z, "drag astern", axis.name))
         beta = axis.coefficient("beta")
         found[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
-        if (load := axis.coefficient("F_0")) in self.layout.coefficients:
+        if (load := form.coefficient("F_0")) in self.layout.coefficients:
             found[load] = self.base[load] + self.full.get(axis.name, 0.0) * self.get(z, "load", axis.name)
 
     def _curve(self, found: dict[str, float], z: Sequence[float], curve: Curve) -> None:
@@ -184,12 +185,12 @@ class Table:
         if "k_t" in curve.keys:
             found[curve.coefficient("k_t")] *= scale
         for end, ratio in (("", 1.0), (REVERSE, reverse)):
-            names = [coefficient_name(f"{key}{end}", curve.name) for key in ("a_t", "b_t")]
+            names = [curve.name_of(f"{key}{end}") for key in ("a_t", "b_t")]
             if names[0] in found:
                 a, b = (self.base[name] for name in names)
                 moved = self.get(z, "linear thrust", curve.name) * (a + b)
                 found[names[0]], found[names[1]] = scale * ratio * (a - moved), scale * ratio * (b + moved)
-            if (band := coefficient_name(f"c_0{end}", curve.name)) in found:
+            if (band := curve.name_of(f"c_0{end}")) in found:
                 found[band] = self.get(z, "dead band", curve.name, default=found[band])
         if "T" in curve.keys:
             lag = curve.coefficient("T")
@@ -362,8 +363,8 @@ def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parame
         free = {*known.layout.coefficients} - known.exact
         if axis.coefficient(f"a_d{REVERSE}") in free:
             yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
-        if axis.coefficient("F_0") in free:
-            null = -c[axis.coefficient("F_0")] / known.full[name]
+        if (load := known.layout.kinds[name].coefficient("F_0")) in free:
+            null = -c[load] / known.full[name]
             yield Parameter("load", name, deviation=prior("load"), null=null)
 
 

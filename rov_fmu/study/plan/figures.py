@@ -190,6 +190,8 @@ def unusable(text: str, variables: Iterable[str], varied: Collection[str], times
             numbers = expression.names.intersection(varied)
             if numbers and isinstance(error.__cause__, TypeError):
                 return f"{error}; {min(numbers)} varies, and what varies is a number"
-            if isinstance(error.__cause__, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
+            # No operation gives an array that is longer than a run.
+            beyond = isinstance(error.__cause__, IndexError) and f"{error}".endswith(f" size {len(times)}")
+            if beyond or isinstance(error.__cause__, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
                 return str(error)
     return ""

@@ -17,6 +17,8 @@ from rov_fmu.study.run.simulator import Job, LoadError, RunError, Simulator
 Array = npt.NDArray[np.float64]
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
+ANGLES = ("phi", "theta")
+"""The variables that tell whether a vehicle turns over."""
 _MANY = 10.0
 """The seconds that the runs of a task may take in addition to the limit of one run. A task is made to take 1 s."""
 
@@ -31,6 +33,8 @@ class Run:
     figures: Sequence[float]
     kept: Sequence[npt.NDArray[Any]] = ()
     """The values of each kept output, if the run ended."""
+    turned: bool = False
+    """True if the vehicle turned over: it rolled or pitched by more than 90 degrees."""
 
 
 class Child:
@@ -123,8 +127,9 @@ class _Runner:
             return _failed(self._job, str(error))
         figures, reason = self._figures.of({**dict(zip(self._job.varied, values, strict=True)), **run})
         kept = [run[name][points] for name in self._job.plan.kept]
+        turned = any(np.any(np.abs(run[name]) > 0.5 * np.pi) for name in ANGLES if name in run)
         if resets:
             self._simulator.reset()
         else:
             self._simulator.renew()
-        return Run(INCOMPLETE if reason else DONE, reason, figures, kept)
+        return Run(INCOMPLETE if reason else DONE, reason, figures, kept, turned)

@@ -58,6 +58,8 @@ class Spent:
 
     runs: int = 0
     failed: int = 0
+    turned: int = 0
+    """The number of these runs in which the vehicle turned over."""
     started: float = 0.0
     """The seconds until the workers had started."""
     elapsed: float = 0.0
@@ -163,6 +165,7 @@ class _Runs:
         self.store.write(first, end, part.runs, part.trajectories)
         self.spent.runs += end - first
         self.spent.failed += part.failed
+        self.spent.turned += part.turned
         self.seconds = max(part.seconds / (end - first), 1e-6)
         self._report()
 

@@ -49,7 +49,7 @@ def run_study(
     on_progress: Callable[[Progress], None],
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> tuple[Spent, Results]:
-    """Do the missing runs; return their times and the results. `on_warning` is called before the first run."""
+    """Do the missing runs; return their times and the results. `on_warning` is called with each warning."""
     plan = load_plan(path)
     store = Store(folder)
     model = _model(plan, path)
@@ -76,6 +76,9 @@ def run_study(
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)
+        if spent.turned:
+            count = f"in {spent.turned} of {spent.runs} runs"
+            on_warning(f"{count} the vehicle turned over: phi or theta passed 90 degrees")
         return spent, Results(folder)
 
 

@@ -34,6 +34,8 @@ class Part:
     runs: bytes
     trajectories: bytes | None
     failed: int
+    turned: int
+    """The number of runs in which the vehicle turned over."""
     seconds: float
     """The time that the runs took."""
 
@@ -92,7 +94,8 @@ def do_runs(key: str, first: int, rows: Array) -> Part:
         found = child.runs(rows)
         seconds = perf_counter() - began
     trajectories = _trajectories(pool.job, first, found) if pool.job.plan.kept else None
-    return Part(_runs(pool.job, first, rows, found), trajectories, sum(run.status == FAILED for run in found), seconds)
+    failed, turned = sum(run.status == FAILED for run in found), sum(run.turned for run in found)
+    return Part(_runs(pool.job, first, rows, found), trajectories, failed, turned, seconds)
 
 
 def _runs(job: Job, first: int, rows: Array, found: Sequence[Run]) -> bytes:

@@ -55,6 +55,8 @@ _MOST_UNORDERED = 0.2
 """The largest share of rows out of order. If it is exceeded, the times are not those of a log."""
 _IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in ("[]", "()"))
 """The ends of headers in pulse widths, such as "PWM (us)": such a column may have commands."""
+_ELSEWHERE = "; if another file of the same dive has it, [dives] in rov.toml joins the files"
+"""The end of a message about a log that has commands or motion, but not both."""
 _SLOW, _SHORTEST = 0.1, 1e-5
 """A log with fewer rows per second than the first number, or with shorter intervals than the second, s, has times in
 another unit than its header says, in all likelihood."""
@@ -147,9 +149,10 @@ def _wrong_columns(
     if not found and command and not axis:
         yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
         return
-    if not found:
-        yield _no_commands(known, unread, others, renaming)
-    yield from _no_motion(headers, layout, axis, known, renaming)
+    wrong = [] if found else [_no_commands(known, unread, others, renaming)]
+    wrong += _no_motion(headers, layout, axis, known, renaming)
+    elsewhere = _ELSEWHERE if len(wrong) == 1 and not axis else ""
+    yield from (f"{line}{elsewhere}" for line in wrong)
 
 
 def _no_motion(
