@@ -19,10 +19,8 @@ import lief
 import numpy as np
 import pytest
 
-from rov_fmu.build import chosen_platforms
 from rov_fmu.c.compile import PLATFORMS, fmi_headers
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import SHIPPED
 from tests.conftest import Made
 from tests.vehicles import VIDEORAY, random_inputs
 from verification.references.c_programs import compile_c, run_program
@@ -90,40 +88,6 @@ def test_one_archive_holds_all_platforms(binaries: Binaries) -> None:
         names = {n for n in content.namelist() if n.startswith("binaries/")}
     assert names == {binaries.of(name).relative_to(binaries.folder).as_posix() for name in PLATFORMS}
     assert set(PLATFORMS) == {*LINUX, *WINDOWS, *DARWIN}
-
-
-@pytest.mark.weekly
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("vehicle", SHIPPED)
-def test_every_vehicle_that_ships_is_built_for_all_platforms(
-    vehicle: str, fmi: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["build", vehicle, "--fmi", str(fmi)]) == 0
-    (archive,) = tmp_path.iterdir()
-    assert archive.name == f"{vehicle}{'.fmi3' if fmi == 3 else ''}.fmu"
-    assert archive.stat().st_size <= LARGEST
-    assert capsys.readouterr().out.startswith(f"{archive.name}: ")
-
-
-# The names that FMPy gives to platforms and machines, except Linux on ARM, which has no name in FMI 2.0.
-@pytest.mark.parametrize(
-    ("system", "machine", "two", "three"),
-    [
-        ("Linux", "x86_64", "linux64", "x86_64-linux"),
-        ("Linux", "aarch64", "aarch64-linux", "aarch64-linux"),
-        ("Windows", "AMD64", "win64", "x86_64-windows"),
-        ("Darwin", "x86_64", "darwin64", "x86_64-darwin"),
-        ("Darwin", "arm64", "darwin64", "aarch64-darwin"),
-    ],
-)
-def test_the_hosts_binary_is_the_one_that_importers_load_there(
-    system: str, machine: str, two: str, three: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("platform.system", lambda: system)
-    monkeypatch.setattr("platform.machine", lambda: machine)
-    (of_two,), (of_three,) = (chosen_platforms(["host"], fmi) for fmi in (2, 3))
-    assert (of_two, TUPLES[of_three]) == (two, three)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other platforms are tested in the archive for all platforms")

@@ -1,7 +1,5 @@
 """The OSP model description contains every input and output in the groups of OSP-IS 1.0.1."""
 
-from dataclasses import replace
-
 import pytest
 from lxml import etree
 
@@ -23,11 +21,6 @@ SEQUENCE = {
     "LinearDisplacement": {"m": 1},
     "AngularDisplacement": {"rad": 1},
 }
-
-
-@pytest.fixture(scope="module")
-def groups(vehicle: Vehicle) -> list[etree._Element]:
-    return groups_of(vehicle.layout)
 
 
 def groups_of(layout: Layout) -> list[etree._Element]:
@@ -88,22 +81,6 @@ def test_what_systems_connect_by(vehicle: Vehicle) -> None:
         words = " ".join(f"{axis}={name}" if axis else name for axis, name in members)
         found[group.get("name")] = (group.tag.removeprefix(NAMESPACE), words)
     assert CONNECTED.items() <= found.items()
-
-
-def test_the_names_of_groups_differ_whatever_the_names_of_curves_and_thrusters_are() -> None:
-    """The torque of a curve `external` is in another group than the torque from outside."""
-    layout = VEHICLES["VideoRay"].layout
-    first, second = layout.curves
-    renamed = replace(
-        layout,
-        curves=(replace(first, name="external"), second),
-        thrusters=tuple(
-            t.model_copy(update={"curve": {first.name: "external"}.get(t.curve, t.curve)}) for t in layout.thrusters
-        ),
-    )
-    found = [group.get("name") for group in groups_of(renamed)]
-    assert len({*found}) == len(found)
-    assert {"external_torque_N_ext", "external_torque_tau_external"} <= {*found}
 
 
 # ---- rov-fmu build --osp -------------------------------------------------------------------------------------------

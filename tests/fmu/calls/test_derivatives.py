@@ -12,7 +12,6 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi3
 from tests.fmi import (
     CO_SIMULATION,
-    EVERY_MODE,
     INITIALIZATION,
     INSTANTIATED,
     MODEL_EXCHANGE,
@@ -23,7 +22,7 @@ from tests.fmi import (
     reals,
     room,
 )
-from tests.fmu.calls.conftest import WRAPPERS
+from tests.fmu.calls.conftest import WRAPPERS, modes_of
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, State, Values, at_rest
 from verification.references.rigid_vehicle import calculated
 
@@ -48,11 +47,6 @@ _SOME = ("videoray_dir", "heavy3_dir", "everything_dir", "six3_dir")
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Return the FMU of the VideoRay, or of a vehicle with lag and coupling, with all effects, or with six axes."""
     return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))
-
-
-@pytest.fixture(scope="module", params=["videoray3_dir", "heavy3_dir", "six3_dir"])
-def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
-    return fmi3.Fmu(request.getfixturevalue(request.param))
 
 
 @pytest.fixture
@@ -86,14 +80,10 @@ def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
     return [motion | random_parameters(fmu, rng) for motion in motions]
 
 
-def bring(rov: AnyInstance, mode: str, point: dict[str, float]) -> None:
-    rov.set(point)
-    rov.reach(mode)
-
-
 def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> AnyInstance:
     rov = fmu.instance(kind)
-    bring(rov, mode, point)
+    rov.set(point)
+    rov.reach(mode)
     return rov
 
 
@@ -159,34 +149,22 @@ def test_at_a_kink_the_derivative_is_one_sided(fmu: Fmu, rov: Vehicle) -> None:
             check_slopes(rov, instance, kink, known, inside)
 
 
-@pytest.mark.parametrize(
-    ("kind", "mode"), [c for c in EVERY_MODE if c[1] not in (INSTANTIATED, INITIALIZATION)], ids=str
-)
-def test_directional_derivatives_are_the_same_in_every_mode(fmu: Fmu, kind: int, mode: str) -> None:
-    unknowns = fmu.outputs + fmu.derivatives
-    for point in points(fmu, 5, seed=2):
-        with at_point(fmu, kind, INITIALIZATION, point) as rov, at_point(fmu, kind, mode, point) as later:
-            for known in fmu.inputs + given(fmu):
-                assert later.derivatives(unknowns, known) == rov.derivatives(unknowns, known)
-
-
-# ---- Adjoint derivatives ----
-
-
-@pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
-def test_adjoint_derivatives_agree_with_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
-    """(v J) u = v (J u) for the knowns of the mode."""
-    rng = random.Random(4)
-    unknowns = fmu3.outputs + fmu3.derivatives
-    for point in points(fmu3, 5, seed=2):
-        known = list(point) if mode == INITIALIZATION else fmu3.inputs + fmu3.states
-        u, v = ({name: rng.uniform(-1.0, 1.0) for name in names} for names in (known, unknowns))
-        with fmu3.instance(kind) as rov:
-            bring(rov, mode, point)
-            change, row = rov.derivatives(unknowns, u), rov.adjoint(unknowns, known, list(v.values()))
-            terms = [a * b for a, b in zip(v.values(), change, strict=True)]
-            combined = sum(a * b for a, b in zip(row, u.values(), strict=True))
-            assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
+def test_derivatives_are_the_same_in_every_mode_and_the_adjoint_ones_agree_with_them(fmu: Fmu) -> None:
+    """(v J) u = v (J u) for random u and v. In Initialization Mode the coefficients are knowns, too."""
+    rng, unknowns = random.Random(4), fmu.outputs + fmu.derivatives
+    for point, (kind, mode) in product(points(fmu, 2, seed=2), modes_of(fmu.VERSION)):
+        if mode == INSTANTIATED:
+            continue
+        with at_point(fmu, kind, INITIALIZATION, point) as first, at_point(fmu, kind, mode, point) as rov:
+            for name in fmu.inputs + given(fmu):
+                assert rov.derivatives(unknowns, name) == first.derivatives(unknowns, name)
+            if isinstance(rov, fmi3.Instance):
+                known = list(point) if mode == INITIALIZATION else fmu.inputs + fmu.states
+                u, v = ({name: rng.uniform(-1.0, 1.0) for name in names} for names in (known, unknowns))
+                row = rov.adjoint(unknowns, known, list(v.values()))
+                terms = [a * b for a, b in zip(v.values(), rov.derivatives(unknowns, u), strict=True)]
+                combined = sum(a * b for a, b in zip(row, u.values(), strict=True))
+                assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
 
 
 @pytest.mark.parametrize("function", ["fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"])
@@ -229,10 +207,9 @@ def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, n
             assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
 
 
-@pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])
-def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu, mode: str) -> None:
+def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu) -> None:
     n = len(fmu.states)
-    for point in points(fmu, 5, seed=8):
+    for point, mode in product(points(fmu, 3, seed=8), MODES[MODEL_EXCHANGE][1:]):
         with at_point(fmu, MODEL_EXCHANGE, mode, point) as rov:
             derivatives, states = room(n), room(n)
             rov.expect("GetContinuousStateDerivatives", derivatives, n)

@@ -1,6 +1,5 @@
 """Model Exchange: an integrator of the importer gives the trajectory of the exact steps, and there are no events."""
 
-from itertools import pairwise
 from math import inf, nan
 
 import fmpy
@@ -82,19 +81,6 @@ def test_event_mode_keeps_the_states_and_takes_inputs_and_tuning(fmu: Fmu) -> No
         rov.expect("EnterContinuousTimeMode")
         assert rov.get(fmu.states) == list(states)
         assert rov.get(["der(w)"]) == pytest.approx([2.0 * before])
-
-
-def test_a_solver_may_go_back_in_time(fmu: Fmu) -> None:
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        rov.start(START | {"u_l": 0.4}, stop=1.0)
-        rov.expect("EnterContinuousTimeMode")
-        results, states = [], set()
-        for t in (0.0, 0.5, 0.25, -1e-9):
-            rov.expect("SetTime", t)
-            results.append(rov.get(fmu.derivatives))
-            states.add(rov.save())
-        assert all(a == b for a, b in pairwise(results))  # the model is autonomous
-        assert len(states) == 4  # and the time is part of the state
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])

@@ -27,9 +27,7 @@ from verification.references.vehicles import IDENTIFIED
 Texts = Mapping[str, str]
 Capsys = pytest.CaptureFixture[str]
 Measure = Callable[[Subject], Evidence]
-VERSIONS = ["videoray_fmu", pytest.param("videoray3_fmu", marks=pytest.mark.long)]
 
-TOOLS = Path(__file__).parents[3] / "verification/interoperability/.tools"
 
 _SLAVE = """
 import os, random, time
@@ -112,9 +110,10 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
             serialization.Encoding.PEM, serialization.PrivateFormat.OpenSSH, serialization.NoEncryption()
         )
     )
-    return build(
-        load_vehicle(folder / "vehicle.toml"), folder / "harbour.fmu", platforms=["host"], sign=folder / "key"
-    ).path
+    vehicle, path = load_vehicle(folder / "vehicle.toml"), folder / "harbour.fmu"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.build.web_module", lambda _: b"")  # no question is about the page that flies
+        return build(vehicle, path, platforms=["host"], sign=folder / "key").path
 
 
 @pytest.fixture(scope="module")
@@ -177,13 +176,6 @@ def test_the_page_is_complete_and_loads_nothing(proof: Proof) -> None:
         assert f'<section class="claim {evidence.result.replace(" ", "-")}">' in page
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_what_is_impossible_is_refused_in_both_versions(version: str, request: pytest.FixtureRequest) -> None:
-    found = measured(measures.limits, request.getfixturevalue(version))
-    assert (found.result, found.figure) == ("holds", "8 of 8")
-    assert [row[1] for row in found.rows] == ["8 of 8", "8 of 8", "20 of 20", "20 of 20", *["1 of 1"] * 4]
-
-
 @pytest.mark.long
 def test_a_vehicle_with_coupling_and_lag_keeps_its_energy(everything_dir: Path, six_dir: Path, tmp_path: Path) -> None:
     for folder in (everything_dir, six_dir):
@@ -197,20 +189,15 @@ def test_a_vehicle_with_coupling_and_lag_keeps_its_energy(everything_dir: Path, 
 # ---- FMUs that break a claim -----------------------------------------------------------------------------------------
 
 
-def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
-    """The page is written all the same, and one line says what does not hold."""
+def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path) -> None:
     name = f"{FOLDER}/surge_70_tuned_expected.csv"
     fmu = altered(
         videoray_fmu, {name: lambda old: re.sub(rb"(\.\d\d\d)\d*\n$", rb"\g<1>1\n", old)}, tmp_path / "other.fmu"
     )
-    page = tmp_path / "page.html"
-    assert main(["prove", str(fmu), "--report", str(page)]) == 1
-    out, err = capsys.readouterr()
-    (line,) = [line for line in err.splitlines() if " fails: " in line]
-    assert line.startswith(f"rov-fmu: {fmu}: expected results fails: 62 of 63 results of 29")
-    assert "Experiment surge_70_tuned: x deviates by" in line
-    assert re.search(r"expected results +fails", out)
-    assert "Experiment surge_70_tuned: x deviates by" in page.read_text(encoding="utf-8")
+    found = measured(measures.expected, fmu)
+    assert found.result == "fails"
+    assert "62 of 63 results of 29" in found.sentence
+    assert "Experiment surge_70_tuned: x deviates by" in found.sentence
 
 
 _REFUSES = "self.u += 1.0 if h <= 0.0 or h != h or h > 1.0 else h * self.X_ext; return 0.0 < h <= 1.0"
@@ -221,13 +208,9 @@ _ACCEPTED = "Not refused: an input that is not a number, an infinite input, a pa
 @pytest.mark.parametrize(
     ("measure", "step", "ours", "result", "words"),
     [
-        ("step_size", _EXACT, False, "holds", ""),
         ("step_size", "self.u -= h * self.u", False, "fails", ""),
         ("step_size", "self.u = 1.0 if h < 0.9 else float('nan')", False, "fails", ""),
-        ("repeatability", _EXACT, False, "holds", "100 of 100"),
-        ("repeatability", "self.u = -self.u", False, "holds", "100 of 100"),
         ("repeatability", "self.u += self.noise * h", False, "fails", "1 of 100"),
-        ("conservation", _EXACT, True, "holds", ""),
         ("conservation", f"{_EXACT}; self.u *= 1.0 + 1e-4", True, "fails", "but rises"),
         ("conservation", f"{_EXACT}; self.u *= 1.0 - 1e-4", True, "fails", ""),
         ("conservation", _EXACT, False, "does not apply", _STRANGE),
@@ -243,16 +226,6 @@ def test_a_claim_fails_for_an_fmu_that_breaks_it(
     found = measured(getattr(measures, measure), slave(step, tmp_path, ours=ours))
     assert found.result == result, found.sentence
     assert words in found.sentence or found.figure == words
-
-
-def test_the_cost_of_a_slow_step_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measures, "_COST_SECONDS", 0.2)
-    found = measured(measures.cost, slave("time.sleep(0.002)", tmp_path))
-    assert found.result == "measured"
-    number, unit = found.figure.split()
-    assert unit == "ms"
-    assert 2.0 <= float(number) < 50.0
-    assert sum(found.curve["shares"]) == pytest.approx(1.0)
 
 
 def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -327,28 +300,3 @@ def test_a_page_that_cannot_be_written_is_told_before_anything_runs(
     ):
         assert main(["prove", str(videoray_fmu), "--report", str(target)]) == 2
         assert capsys.readouterr().err == f"rov-fmu: {target}: {reason}\n"
-
-
-_BALLS = [*TOOLS.glob("python*/lib/python*/site-packages/fmpy/modelica/FMI/Resources/FMUs/*/modelDescription.xml")]
-"""The unpacked FMUs of Reference-FMUs that are part of FMPy 0.3.20, which CoFMPy pins."""
-
-
-@pytest.mark.interop
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_the_bouncing_ball_of_the_reference_fmus_gets_a_report(version: str, tmp_path: Path, capsys: Capsys) -> None:
-    """Its maker promised little, so it fails nothing. It never answers to a step that is not a number."""
-    wanted = (b'modelName="BouncingBall"', f'fmiVersion="{version}"'.encode())
-    found = [path.parent for path in _BALLS if all(words in path.read_bytes() for words in wanted)]
-    if not found:
-        pytest.skip("python -m verification.interoperability --install python installs the reference FMUs")
-    fmu, page = tmp_path / "BouncingBall.fmu", tmp_path / "page.html"
-    with zipfile.ZipFile(fmu, "w") as archive:
-        for path in found[0].rglob("*"):
-            archive.write(path, path.relative_to(found[0]))
-    assert main(["prove", str(fmu), "--report", str(page)]) == 0
-    assert " fails: " not in capsys.readouterr().err
-    text = page.read_text(encoding="utf-8")
-    assert f"FMI {version}, Co-Simulation and Model Exchange, made by Reference FMUs" in text
-    assert "100 of 100 runs of the default experiment (3 s)" in text
-    assert "it needs more than 5 s" in text
-    assert text.count('<p class="result">does not apply</p>') == 4

@@ -209,6 +209,7 @@ print(hashlib.sha256(repr(sorted(reference_results(load_vehicle(EVERYTHING)).ite
 """
 
 
+@pytest.mark.long
 def test_expected_results_have_the_same_bytes_whatever_the_linear_algebra_of_the_processor() -> None:
     """OpenBLAS computes other last digits on other processors. The expected results must not contain any of its."""
     command = [sys.executable, "-c", _HASH]
