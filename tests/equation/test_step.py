@@ -3,7 +3,6 @@
 import random
 from itertools import product
 from math import cos, isfinite, sin
-from time import process_time
 
 import pytest
 
@@ -24,11 +23,9 @@ M, I_R = FREE["m_rov"], FREE["I_r"]
 
 CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
     "from rest, with a lag": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
-    "from rest, by one lagging thruster, which turns and sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
     "the thrust changes its sign": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
     "a load cancels the present thrust": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 1.0)),
     "surge and sway turn the vehicle": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
-    "coasting": (HEAVY, {}, {"u": 1.0, "v": 0.1, "r": 0.3}, (0.1, 1.0)),
     "a lag of a millisecond": (LAGGING.replaced({"T_t200": 1e-3}), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 0.3)),
     "there and back with a turn there and back": (
         FREE,
@@ -41,13 +38,6 @@ CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
         {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5},
         {"w": 0.3},
         (0.1, 1.0),
-    ),
-    "a fast axis that nothing drives": (VIDEORAY.replaced({"b_d_w": 1e6}), {"u_l": 0.6}, {"w": 0.3}, (0.1,)),
-    "almost no drag": (
-        VIDEORAY.replaced({f"{key}_d_{v}": 1e-6 for key in "ab" for v in "uwr"}),
-        {},
-        {"u": 1.0, "r": 0.5},
-        (1.0, 100.0),
     ),
     "within the dead band": (HEAVY, {"u_1": 0.05, "u_2": -0.05}, {"u": 0.5, "r": 1.0}, (0.1, 2.0)),
 }
@@ -140,24 +130,6 @@ def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
 # ---- Overflow and long steps ----
 
 
-@pytest.mark.parametrize(
-    ("rov", "inputs", "state", "h"),
-    [
-        (HEAVY, {}, {"u": 1e200, "v": 1e200, "r": 1e200}, 1.0),
-        (FREE, {}, {"u": 1.0, "r": 1e300}, 1e10),
-        (FREE, {"X_ext": 1e308}, {"r": 1.0}, 1e308),
-        (COUPLED, {"X_ext": 1e308, "Y_ext": -1e308}, {"r": 1e300}, 1e300),
-    ],
-    ids=["velocities", "turn", "distance", "all"],
-)
-def test_a_step_that_overflows_is_not_finite_and_takes_no_time(
-    rov: Vehicle, inputs: Values, state: Values, h: float
-) -> None:
-    start = process_time()
-    assert not all(map(isfinite, in_python(*case(rov, inputs, state), h).values()))
-    assert process_time() - start < 2.0
-
-
 def test_a_step_of_more_substeps_than_allowed_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
     rov, inputs, state = case(HEAVY, AHEAD, {})
     for most, finite in ((10_000, True), (100, False)):
@@ -165,9 +137,9 @@ def test_a_step_of_more_substeps_than_allowed_is_not_finite(monkeypatch: pytest.
         assert all(map(isfinite, rov.step(inputs, state, 300.0).values())) == finite
 
 
-@pytest.mark.parametrize("h", [100.0, 300.0])
-def test_a_long_step_ends_in_straight_or_circular_motion(h: float) -> None:
+def test_a_long_step_ends_in_circular_motion() -> None:
     """From a state that has settled, the motion is a circle, with its radius from the steady velocities."""
+    h = 300.0
     inputs = still(VIDEORAY) | {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5, "V_N": 0.1}
     a = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0)
     b = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0 + h)

@@ -129,7 +129,7 @@ _needs_fma = pytest.mark.skipif(
 
 
 def _builds() -> Iterator[Any]:
-    """Yield header, compiler and flags of each library: every header, compiler and standard, C++, and fused products."""
+    """Yield header, compiler and flags of each library: every header, compiler and standard, C++, fused products."""
     for i, release in enumerate(RELEASES):
         yield release, _NAMES[i % len(_NAMES)], (f"-std={_STANDARDS[i % 2]}", "-O2")
     yield "3.0", "zig", _CPP

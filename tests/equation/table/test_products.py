@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation import terms
 from rov_fmu.equation.expression import Name, Names, compiled, of
-from rov_fmu.equation.forces import QUADRATIC, Effect, Force, forces_of
+from rov_fmu.equation.forces import Effect, Force, forces_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.printed import model_of
 from rov_fmu.equation.step import step
@@ -77,17 +77,3 @@ def test_a_step_follows_a_cubic_force(start: float, monkeypatch: pytest.MonkeyPa
     assert [found["w"], found["z"]] == pytest.approx(exact.tolist(), rel=1e-10, abs=1e-10)
     after = step_jacobian(Vehicle(layout, plain.coefficients), inputs, {"w": start, "z": 0.0}, 0.8).after
     assert after == pytest.approx(found, rel=1e-8, abs=1e-8)
-
-
-def test_two_powers_of_one_effect_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Their coefficients would have the same name."""
-
-    def with_cubic(layout: Layout, names: Names) -> Iterator[Force]:
-        yield from forces_of(layout, names)
-        yield Force(QUADRATIC, "w", -1, (Name("m_rov"),), ("w", "w", "w"))
-
-    monkeypatch.setattr(terms, "forces_of", with_cubic)
-    layout = VEHICLES["heave only"].layout
-    (curve,) = layout.curves
-    with pytest.raises(ValueError, match="needs an effect of its own"):
-        equation_of(replace(layout, curves=(replace(curve, description="two powers"),)))

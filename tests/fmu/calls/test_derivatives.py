@@ -23,6 +23,7 @@ from tests.fmi import (
     room,
 )
 from tests.fmu.calls.conftest import WRAPPERS, modes_of
+from tests.often import often
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, State, Values, at_rest
 from verification.references.rigid_vehicle import calculated
 
@@ -114,9 +115,7 @@ def check_slopes(rov: Vehicle, instance: AnyInstance, point: Values, known: str,
         assert d == pytest.approx(expected[name], rel=error, abs=0.01 * error * size), (name, known, side, point)
 
 
-@pytest.mark.parametrize(
-    "number", [1, pytest.param(6, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.weekly)]
-)
+@often("number", 1, 6, 60)
 def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """The knowns are all inputs, states and coefficients; the unknowns are all calculated variables."""
     for point, kind in product(points(fmu, number, seed=1), MODES):

@@ -29,6 +29,7 @@ from rov_fmu.io.messages import FileError, ProofError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.conftest import without_page
+from tests.often import often
 
 Capsys = pytest.CaptureFixture[str]
 _REFIT = SHIPPED["videoray_refit"]
@@ -42,23 +43,7 @@ def refit() -> Mapping[str, bytes]:
     return reference_results(load_vehicle(_REFIT))
 
 
-def _roles(files: Mapping[str, bytes]) -> dict[str, str]:
-    return {x.get("source"): x.get("role") for x in etree.fromstring(files[MANIFEST])}
-
-
 # ---- The files and their roles ---------------------------------------------------------------------------------------
-
-
-def test_the_roles_are_those_of_the_standard(refit: Mapping[str, bytes]) -> None:
-    assert {
-        "vehicle/videoray_refit.toml": "model",
-        "../../documentation/model_card.txt": "report",
-        "surge_70_expected.csv": "result",
-        "covariance.csv": "result",
-        "experiments.exp": "experiment/validation",
-        "uncertainty.exp": "experiment/uncertainty-analysis",
-        f"../../{META_DATA}": "meta-data",
-    }.items() <= _roles(refit).items()
 
 
 def test_a_vehicle_can_be_read_from_its_fmu(tmp_path: Path) -> None:
@@ -68,12 +53,6 @@ def test_a_vehicle_can_be_read_from_its_fmu(tmp_path: Path) -> None:
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / path).write_bytes(content)
     assert load_vehicle(tmp_path / FOLDER / "vehicle" / "bluerov2_heavy.toml") == vehicle
-
-
-def test_coefficients_set_by_hand_are_in_the_vehicle_file() -> None:
-    vehicle = load_vehicle(_REFIT).with_(a_d_u=7.5)
-    text = reference_results(vehicle)[f"{FOLDER}/vehicle/videoray_refit.toml"].decode()
-    assert tomlkit.parse(text)["axes"]["surge"]["a_d"]["value"] == 7.5
 
 
 def test_the_covariance_is_that_of_the_vehicle_file(refit: Mapping[str, bytes]) -> None:
@@ -219,7 +198,7 @@ def test_one_altered_byte_is_named(
     )
 
 
-@pytest.mark.parametrize("stride", [7, pytest.param(1, marks=pytest.mark.long)])
+@often("stride", 7, 1)
 def test_no_byte_of_the_meta_data_can_be_altered(stride: int, tmp_path: Path) -> None:
     """Whether it is a name, a hash, a word or a part of the XML: the line names the meta-data."""
     files = {"a": b"1", "b": b"2"}
