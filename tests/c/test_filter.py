@@ -274,21 +274,6 @@ def test_an_outlier_tells_ever_less() -> None:
 # ---- Runs that repeat, and predictions -------------------------------------------------------------------------------
 
 
-def test_frozen_gains_reproduce_the_run_that_they_come_from() -> None:
-    log = measured(LAGGING, record((DEPTH, VELOCITY), sampled()))
-    known, of_heave = with_all(LAGGING), Filter(LAGGING)
-    first = of_heave.run(log, known)
-    again = of_heave.run(log, known, repeated=first)
-    frozen = of_heave.run(log, known, repeated=first, frozen=True)
-    assert again.innovations.tolist() == first.innovations.tolist()
-    assert again.variances.tolist() == first.variances.tolist()
-    assert frozen.innovations == pytest.approx(first.innovations, abs=1e-12)
-    assert frozen.variances.size == 0
-    other = replace(known, coefficients={**LAGGING.coefficients, "a_d_w": 20.0})
-    moved = of_heave.run(log, other, repeated=first, frozen=True)
-    assert np.abs(moved.innovations - first.innovations).max() > 1e-4
-
-
 @pytest.mark.parametrize("frozen", [False, True])
 @pytest.mark.parametrize("turns", [False, True])
 def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) -> None:

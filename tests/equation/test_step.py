@@ -1,7 +1,5 @@
 """Steps in cases that are difficult for a Runge-Kutta method: reversals, lags, stiffness, long steps, overflow."""
 
-import random
-from itertools import product
 from math import cos, isfinite, sin
 
 import pytest
@@ -12,7 +10,7 @@ from rov_fmu.equation.catalogue import SWAY
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_python, worst
-from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
+from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, still
 
 COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
 FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
@@ -47,39 +45,12 @@ def case(rov: Vehicle, inputs: Values, state: Values) -> tuple[Vehicle, State, S
     return rov, {**still(rov), **inputs}, {**at_rest(rov), **state}
 
 
-def reversed_drag(rov: Vehicle, share: float) -> Vehicle:
-    """Return a vehicle whose drag in reverse is a share of that ahead."""
-    names = [f"{key}_{form.axis.velocity}" for form in rov.layout.axes for key in ("a_d", "b_d")]
-    return rov.extended({f"{name}_reverse": share * rov[name] for name in names})
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_a_step_in_a_special_case_is_exact(name: str) -> None:
     rov, inputs, state, steps = CASES[name]
     for h in steps:
         velocity, path = worst(in_python, *case(rov, inputs, state), h)
         assert max(velocity, path) <= 1e-13, h
-
-
-@pytest.mark.parametrize(
-    ("names", "shares", "cases"),
-    [
-        (["bluerov2_heavy"], (0.01, 30.0), 1),
-        pytest.param(sorted(SHIPPED), (0.01, 1.0 / 30.0, 30.0, 100.0), 2, marks=pytest.mark.long),
-        pytest.param(sorted(SHIPPED), (0.01, 1.0 / 30.0, 30.0, 100.0), 40, marks=pytest.mark.weekly),
-    ],
-    ids=["the Heavy", "every vehicle", "every vehicle, often"],
-)
-def test_a_step_is_exact_whatever_the_drag_in_reverse(names: list[str], shares: tuple[float, ...], cases: int) -> None:
-    """One step begins at rest, another one in motion."""
-    for name, share in product(names, shares):
-        rov = reversed_drag(HEAVY if name == "bluerov2_heavy" else load_vehicle(SHIPPED[name]), share)
-        rng = random.Random(f"{name} {share} {cases}")
-        for _ in range(cases):
-            _, inputs, state, h = random_case(rng, rov, -2.0, 0.7)
-            for start in (state, at_rest(rov)):
-                velocity, path = worst(in_python, rov, inputs, start, h)
-                assert max(velocity, path) <= 1e-13, (name, share, inputs, start, h)
 
 
 def test_a_velocity_that_is_only_a_rounding_error_does_not_shorten_the_substeps() -> None:

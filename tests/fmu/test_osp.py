@@ -59,28 +59,4 @@ def test_every_input_and_output_is_in_one_group(rov: Vehicle) -> None:
         assert len(set(axes)) == len(axes)
 
 
-CONNECTED = {
-    "thruster_commands": ("Generic", "u_l u_r u_t"),
-    "external_force": ("Force", "x=X_ext z=Z_ext"),
-    "thrust_t": ("Force", "z=F_t"),
-    "rear_torque": ("Torque", "z=tau_rear"),
-    "current": ("LinearVelocity", "x=V_N y=V_E"),
-    "velocity": ("LinearVelocity", "x=u z=w"),
-    "yaw_rate": ("AngularVelocity", "z=r"),
-    "position": ("LinearDisplacement", "x=x y=y"),
-    "depth": ("LinearDisplacement", "z=z"),
-    "heading": ("AngularDisplacement", "z=psi"),
-}
-"""Groups of the VideoRay: the element, and each variable with its axis."""
-
-
-def test_what_systems_connect_by(vehicle: Vehicle) -> None:
-    found = {}
-    for group in groups_of(vehicle.layout):
-        members = ((variable.get("axis"), variable.get("ref")) for variable in group)
-        words = " ".join(f"{axis}={name}" if axis else name for axis, name in members)
-        found[group.get("name")] = (group.tag.removeprefix(NAMESPACE), words)
-    assert CONNECTED.items() <= found.items()
-
-
 # ---- rov-fmu build --osp -------------------------------------------------------------------------------------------

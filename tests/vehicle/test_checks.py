@@ -8,9 +8,6 @@ from typing import Any
 import pytest
 import tomlkit
 
-from rov_fmu.equation.catalogue import (
-    AXES,
-)
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
@@ -337,15 +334,6 @@ def test_numbers_that_are_probably_wrong_give_a_warning(case: str, tmp_path: Pat
     with pytest.warns(UserWarning, match=re.escape(f"{path}: {words}")) as caught:
         load_vehicle(path)
     assert len(caught) == 1
-
-
-def test_roll_and_pitch_need_no_thruster(tmp_path: Path) -> None:
-    path = tmp_path / "rov.toml"
-    places = {f"thruster.{name}.position.value": [-0.2, y, 0.0] for name, y in (("l", -0.1), ("r", 0.1), ("s", 0.0))}
-    path.write_text(changed(places, SIX), encoding="utf-8")
-    layout = load_vehicle(path).layout
-    assert not layout.drivers(AXES["roll"])
-    assert not layout.signs(AXES["roll"])
 
 
 def test_a_coefficient_that_makes_the_mass_matrix_indefinite_cannot_be_set() -> None:

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from math import e, isclose
 from pathlib import Path
@@ -11,7 +11,6 @@ import pytest
 from scipy.optimize import brentq
 
 from rov_fmu.cli import main
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -144,13 +143,6 @@ def test_files_hold_the_printed_cells(tables: Mapping[str, ResponseTable]) -> No
 
 
 # ---- rov-fmu tables -------------------------------------------------------------------------------------
-
-
-def test_tables_are_of_the_axes_of_the_paper(vehicle: Vehicle) -> None:
-    axes = tuple(one for one in vehicle.layout.axes if one.axis.name != "heave")
-    without_heave = replace(vehicle, layout=replace(vehicle.layout, axes=axes))
-    with pytest.raises(DataFileError, match="VideoRay Pro 4: Tables 6-8 are of surge, heave and yaw, it has no heave"):
-        load_tables(without_heave)
 
 
 def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

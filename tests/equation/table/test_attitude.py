@@ -1,6 +1,6 @@
 """The attitude in formulas: angles, quaternion and rotation matrix (rov_fmu/equation/attitude.py)."""
 
-from math import cos, pi, sin, tau
+from math import cos, pi, sin
 
 import pytest
 
@@ -13,7 +13,6 @@ from rov_fmu.equation.attitude import (
     start_formulas,
 )
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.step import unwrapped
 
 ENTRIES = [f"R_{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
 ATTITUDES = {
@@ -55,11 +54,3 @@ def test_angles_become_a_quaternion_a_matrix_and_angles_again(angles: tuple[floa
         old = {name: sign * q[name] for name in QUATERNION}
         back = compiled(quaternion_formulas())({**R, **old})
         assert [back[f"next_{name}"] for name in QUATERNION] == pytest.approx([*old.values()], abs=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("angle", "near", "expected"),
-    [(0.1, 0.0, 0.1), (0.1, 3.0, 0.1), (0.1, 3.5, 0.1 + tau), (-3.0, 3.0, -3.0 + tau), (3.0, -20.0, 3.0 - 4.0 * tau)],
-)
-def test_an_angle_is_unwrapped_to_the_nearest(angle: float, near: float, expected: float) -> None:
-    assert unwrapped(angle, near) == pytest.approx(expected, rel=1e-15)

@@ -166,27 +166,10 @@ def test_derivatives_are_the_same_in_every_mode_and_the_adjoint_ones_agree_with_
                 assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
 
 
-@pytest.mark.parametrize("function", ["fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"])
-def test_the_numbers_of_seeds_and_sensitivities_must_match_the_variables(fmu3: fmi3.Fmu, function: str) -> None:
-    of, n_seed = fmu3.references, 2 if "Directional" in function else 3
-    arguments = (of(["u", "der(u)", "r"]), 3, of(["r", "u"]), 2)
-    with fmu3.instance() as rov:
-        rov.start({"u": 0.5, "r": 0.2})
-        for seeds, sensitivities in [(n_seed - 1, 5 - n_seed), (n_seed, 4 - n_seed), (0, 0)]:
-            found = room(5 - n_seed)
-            rov.refuse(function, *arguments, reals(1.0, 2.0, 3.0), seeds, found, sensitivities)
-            assert list(found) == list(room(5 - n_seed))
-            assert f"it takes {n_seed} and {5 - n_seed}" in rov.log[-1].text
-        rov.expect(function, *arguments, reals(1.0, 2.0, 3.0), n_seed, found, 5 - n_seed)
-        by_r, by_u = (rov.derivatives(["der(u)"], known)[0] for known in ("r", "u"))
-        expected = [2.0, by_r + 2.0 * by_u, 1.0] if n_seed == 2 else [2.0 * by_r + 3.0, 1.0 + 2.0 * by_u]
-        assert list(found) == pytest.approx(expected, rel=1e-13)
-
-
 # ---- Derivatives by time ----
 
 
-@pytest.mark.parametrize("number", [8, pytest.param(300, marks=pytest.mark.weekly)])
+@often("number", 2, 8, 300)
 def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """By the chain rule, with the inputs held. Every fourth point is at rest."""
     for n, point in enumerate(points(fmu, number, seed=7)):

@@ -372,17 +372,3 @@ def test_a_step_that_overflows_leads_to_error_mode_with_the_state_from_before(fm
         assert rov.mode() == STEP
         rov.step(0.5, 0.5)
         rov.expect("FreeFMUState", ctypes.byref(state))
-
-
-@pytest.mark.parametrize(("logging", "modes"), [(False, 0), (True, 4)])
-def test_without_logging_only_fmi_2_logs_errors_and_neither_logs_modes(fmu: Fmu, logging: bool, modes: int) -> None:
-    with fmu.instance(MODEL_EXCHANGE, logging=logging) as rov:
-        rov.reach(CONTINUOUS)
-        rov.expect("Terminate")
-        assert [(m.status, m.category) for m in rov.log if m.status == OK] == [(OK, "logEvents")] * modes
-        rov.log.clear()
-        for switched_on in (logging or fmu.VERSION == 2, True):
-            rov.refuse("ExitInitializationMode")
-            assert [m.category for m in rov.log] == ["logStatusError"] * switched_on
-            rov.log.clear()
-            rov.expect("SetDebugLogging", True, 1, strings(b"logStatusError"))

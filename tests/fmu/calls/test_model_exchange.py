@@ -66,23 +66,6 @@ def test_cvode_gives_the_trajectory_of_co_simulation_within_its_tolerance(
     assert error.max() < 1000.0 * tolerance
 
 
-def test_event_mode_keeps_the_states_and_takes_inputs_and_tuning(fmu: Fmu) -> None:
-    n = len(fmu.states)
-    states = reals(*(0.25 * i - 0.7 for i in range(n)))
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        rov.reach(CONTINUOUS)
-        rov.expect("SetTime", 1.5)
-        rov.expect("SetContinuousStates", states, n)
-        before, beta = rov.get(["der(w)", "beta_w"])
-        rov.expect("EnterEventMode")
-        assert rov.get(fmu.states) == list(states)
-        rov.set({"u_t": 0.0, "beta_w": 2.0 * beta})
-        rov.update()
-        rov.expect("EnterContinuousTimeMode")
-        assert rov.get(fmu.states) == list(states)
-        assert rov.get(["der(w)"]) == pytest.approx([2.0 * before])
-
-
 @pytest.mark.parametrize("value", [nan, inf, -inf])
 def test_a_solver_state_that_is_not_finite_is_discarded(fmu: Fmu, value: float) -> None:
     n = len(fmu.states)

@@ -28,7 +28,7 @@ from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.messages import FileError, ProofError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.conftest import without_page
+from tests.conftest import Made, without_page
 from tests.often import often
 
 Capsys = pytest.CaptureFixture[str]
@@ -266,13 +266,16 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def signed_fmu(keys: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def signed_fmu(keys: Path, made_once: Made) -> Path:
     """A signed FMU in pure Python, which needs no compiler."""
-    path = tmp_path_factory.mktemp("signed") / "refit.fmu"
-    with without_page():
-        built = build(load_vehicle(_REFIT), path, backend="pythonfmu", sign=keys / "key")
-    assert [*built.beside] == [path.with_name("refit.fmu.sig")]
-    return path
+
+    def fill(folder: Path) -> None:
+        path = folder / "refit.fmu"
+        with without_page():
+            built = build(load_vehicle(_REFIT), path, backend="pythonfmu", sign=keys / "key")
+        assert [*built.beside] == [path.with_name("refit.fmu.sig")]
+
+    return made_once("signed", fill) / "refit.fmu"
 
 
 def test_a_signed_fmu_is_proved(signed_fmu: Path, keys: Path, capsys: Capsys) -> None:

@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests import fmi3
-from tests.conftest import unzipped
+from tests.conftest import Made, unzipped
 from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
@@ -89,14 +90,12 @@ def _expected(values: Mapping[str, Any], ranges: Ranges) -> Any:
 
 @pytest.fixture(scope="module", params=[("flat", 2), ("tilted", 3)], ids=str)
 def built(
-    request: pytest.FixtureRequest,
-    vehicles: dict[str, tuple[Vehicle, Ranges]],
-    tmp_path_factory: pytest.TempPathFactory,
+    request: pytest.FixtureRequest, vehicles: dict[str, tuple[Vehicle, Ranges]], made_once: Made
 ) -> tuple[Fmu, Vehicle, Ranges]:
     """Return the FMU of either vehicle in either version of FMI, with the vehicle and its ranges."""
     name, fmi = request.param
     vehicle, ranges = vehicles[name]
-    return WRAPPERS[fmi](unzipped(vehicle, tmp_path_factory.mktemp(name), fmi)), vehicle, ranges
+    return WRAPPERS[fmi](made_once(f"outside {name}", partial(unzipped, vehicle, fmi=fmi))), vehicle, ranges
 
 
 @pytest.fixture
@@ -211,19 +210,6 @@ def test_exactly_at_an_end_it_is_0_and_its_derivative_is_that_of_the_inside(fmu:
                 assert rov.get(["outside"]) == rov.derivatives(["outside"], name) == [0.0]
                 rov.set({name: 1.01 * end or -0.01})
                 assert rov.derivatives(["outside"], name) != [0.0]
-
-
-def test_its_derivative_by_time_is_the_chain_rule(fmu: Fmu, ranges: Ranges) -> None:
-    """As the derivative of an output in Co-Simulation, with the commands held."""
-    found = []
-    for point in _points(fmu, 6, seed=5):
-        with _at(fmu, point, CO_SIMULATION, STEP) as rov:
-            values = _read(rov)
-            rates = zip(fmu.states, rov.get(fmu.derivatives), strict=True)
-            found += rov.rates(["outside"])
-            expected = sum(_slope(values, name, ranges) * rate for name, rate in rates)
-            assert found[-1] == pytest.approx(expected, rel=1e-11, abs=1e-12)
-    assert any(found)
 
 
 def test_what_is_set_counts_at_once(fmu: Fmu, ranges: Ranges) -> None:
