@@ -356,13 +356,10 @@ def random_state(rng: random.Random, rov: Vehicle) -> State:
         else:
             size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
             found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
-    return found | (random_quaternion(rng) if rov.layout.has_attitude else {})
-
-
-def random_quaternion(rng: random.Random, length: float = 1.0) -> State:
-    """Return a quaternion of this length; all attitudes are equally likely."""
-    parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]
-    return {name: length * part / hypot(*parts) for name, part in zip(QUATERNION, parts, strict=True)}
+    if rov.layout.has_attitude:  # all attitudes are equally likely
+        parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]
+        found |= {name: part / hypot(*parts) for name, part in zip(QUATERNION, parts, strict=True)}
+    return found
 
 
 def random_case(rng: random.Random, rov: Vehicle, shortest: float = -6.0, longest: float = 0.3) -> Case:
