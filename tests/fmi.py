@@ -192,9 +192,6 @@ class Fmu(ABC):
         `how` has its name, whether messages are logged, and in FMI 3.0 what is done in intermediate update.
         """
 
-    def unload(self) -> None:
-        fmpy.freeLibrary(self.dll._handle)
-
 
 AnyFmu = TypeVar("AnyFmu", bound=Fmu)
 

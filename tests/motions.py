@@ -144,9 +144,3 @@ def rounding_of_velocity(*velocities: float) -> float:
 def rounding_of_distance(case: Case) -> float:
     """Return the error that test_alone.py allows for a distance. A subnormal velocity always has the error TINY."""
     return DISTANCE * path(*case) + TINY * max(1.0, case[4])
-
-
-def memory(A: float, B: float, h: float, slowest: float = 0.0) -> float:
-    """Return for how long (s) a change of the velocity has an effect. It fades at least at the rate B + 2 A |v|."""
-    rate = B + 2.0 * A * slowest
-    return min(h, 1.0 / rate) if rate * h > 1.0 else h

@@ -63,7 +63,6 @@ _PAIR = (
     thruster("l", "t200", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)),
     thruster("r", "t200", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)),
 )
-_BOW = thruster("b", "t200", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0))
 _MIX = {
     "ahead": {"1": 1.0, "2": 1.0, "3": -1.0, "4": -1.0},
     "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
@@ -192,27 +191,16 @@ HEAVY = four_axes(load_vehicle(SHIPPED["bluerov2_heavy"]))
 VEHICLES = {
     "VideoRay": VIDEORAY,
     "Heavy": HEAVY,
-    "neither lag nor coupling": _rov("uvwr", _T200, _ALL_ROUND, ("m_a", *_DRAG)),
     "with an input mix": _rov("uvwr", _T200, _ALL_ROUND, _ALL, mix={**_MIX, "down": {"5": -1.0, "6": -1.0}}),
     "drag by direction, coupled, late": _rov("uvwr", _LAGGING, _ALL_ROUND, _ALL, coupled=True),
     "coupled without lag, three commands, no heave": _rov(
         "uvr", Curve("t200", ("a_t", "b_t", "c_0", "c_0_reverse")), _PLANAR, _ALL, coupled=True, mix=_MIX
     ),
     "lag without coupling": _rov("uwr", _LAGGING, (*_PAIR, *_VERTICAL), _ALL),
-    "an arm with lag beside a swift thruster": numbered(
-        Layout(
-            _axes("uwr", ("m_a", *_DRAG)),
-            (Curve("rear", ("a_t", "b_t", "T"), 2), Curve("top")),
-            VIDEORAY.layout.thrusters,
-        )
-    ),
-    "sway and yaw": _rov("vr", _T200, (_BOW,)),
     "heave only": _rov("w", _T200, _VERTICAL, _EITHER),
     "yaw only": _rov("r", _T200, _PAIR),
-    "yaw only, late": _rov("r", _LAGGING, _PAIR),
     "surge and sway without yaw": _rov("uv", _T200, _PLANAR, _EITHER),
     "surge without drag": numbered(Layout(_axes("ur"), (_T200,), _PAIR), a_d_u=0.0, b_d_u=0.0),
-    "linear drag alone, late": numbered(Layout(_axes("ur"), (_LAGGING,), _PAIR), a_d_u=0.0, a_d_r=0.0, b_d_r=0.3),
 }
 
 _SKEW = (
@@ -368,13 +356,10 @@ def random_state(rng: random.Random, rov: Vehicle) -> State:
         else:
             size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
             found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
-    return found | (random_quaternion(rng) if rov.layout.has_attitude else {})
-
-
-def random_quaternion(rng: random.Random, length: float = 1.0) -> State:
-    """Return a quaternion of this length; all attitudes are equally likely."""
-    parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]
-    return {name: length * part / hypot(*parts) for name, part in zip(QUATERNION, parts, strict=True)}
+    if rov.layout.has_attitude:  # all attitudes are equally likely
+        parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]
+        found |= {name: part / hypot(*parts) for name, part in zip(QUATERNION, parts, strict=True)}
+    return found
 
 
 def random_case(rng: random.Random, rov: Vehicle, shortest: float = -6.0, longest: float = 0.3) -> Case:

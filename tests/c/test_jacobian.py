@@ -45,9 +45,11 @@ def _variational(rov: Vehicle, inputs: dict[str, float], state: dict[str, float]
     return end[:n], derivatives
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if n % 2 else pytest.mark.long) for n, name in enumerate(ALL)]
-)
+_SOME = ("Heavy", "six_coupled", "a very short lag")
+"""The vehicles of the default tests: with coupling and lag, with six axes, and with a stiff lag."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in _SOME else pytest.mark.long) for name in ALL])
 def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
     rov = ALL[name]
     rng = random.Random(name)

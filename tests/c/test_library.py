@@ -3,8 +3,6 @@
 import ctypes
 import importlib.util
 import os
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -14,7 +12,7 @@ from rov_fmu.c import library
 from rov_fmu.c.compile import BuildError, compile_engine
 from rov_fmu.c.library import load_library
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, ROOT
+from tests.commands import BARE
 from tests.vehicles import VEHICLES
 
 ROV = load_vehicle(BARE)
@@ -96,40 +94,3 @@ def test_without_a_compiler_one_line_says_so(cache: Cache, monkeypatch: pytest.M
     with pytest.raises(BuildError, match=r"^the C compiler is missing: pip install ziglang$"):
         load_library(ROV)
     assert cache.files() == []
-
-
-_PROGRAM = f"""
-import sys, time
-from pathlib import Path
-import rov_fmu
-from rov_fmu.c import library
-
-def compile_engine(texts):
-    time.sleep(0.5)  # so that both processes compile
-    return Path(sys.argv[1]).read_bytes()
-
-library.compile_engine = compile_engine
-print(rov_fmu.load({str(BARE)!r}).simulate([0, 1, 2], {{}}, start={{"w": 1.0}})["w"].tolist())
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux uses XDG_CACHE_HOME")
-@pytest.mark.long
-def test_two_processes_at_once_do_not_clash(cache: Cache, tmp_path: Path) -> None:
-    load_library(ROV)
-    (compiled,) = cache.files()
-    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
-    both = [
-        subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM, str(compiled)],
-            cwd=ROOT,
-            env=environment,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        for _ in range(2)
-    ]
-    one, other = (process.communicate(timeout=300)[0] for process in both)
-    assert [process.returncode for process in both] == [0, 0]
-    assert one == other != ""
-    assert len(list((tmp_path / "rov-fmu" / "engine").iterdir())) == 1

@@ -6,8 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
-from math import cos, sin
 from pathlib import Path
 
 import fmpy
@@ -18,11 +16,9 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.layout import Curve
-from rov_fmu.vehicle.schema import MOST
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
-from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, numbered, random_inputs, random_state, thruster
+from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, random_inputs, random_state
 
 Array = NDArray[np.float64]
 
@@ -70,24 +66,6 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
     found = simulate(rov, times, {**inputs, **start}, [*rov.layout.state, *rov.layout.calculated])
     assert found.failed == len(times)
     np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
-
-
-@pytest.mark.long
-def test_a_vehicle_with_the_most_curves_moves_as_in_python() -> None:
-    """Each curve with a lag is a component of its own, so there are more components than bits in an int."""
-    curves = tuple(Curve(f"c{n}", ("a_t", "b_t", "T")) for n in range(MOST))
-    thrusters = tuple(
-        thruster(f"{n}", f"c{n}", (cos(n), sin(n), 0.1 * (n % 3)), (0.1 * (n % 4), 0.2 - 0.1 * (n % 5), 0.05))
-        for n in range(MOST)
-    )
-    layout = replace(SIX.layout, curves=curves, thrusters=thrusters, fins=(), mix={})
-    rov = numbered(layout).replaced({f"T_c{n}": 0.1 + 0.01 * n for n in range(MOST)})
-    inputs = {**layout.usual_inputs, **{f"u_{n}": 0.3 * sin(n) for n in range(MOST)}}
-    found = simulate(rov, [0.0, 0.1, 0.5, 2.0], inputs).values[:, 0, -1]
-    expected = layout.at_rest
-    for h in (0.1, 0.4, 1.5):
-        expected = rov.step(inputs, expected, h)
-    np.testing.assert_allclose(found, [expected[name] for name in layout.state], rtol=1e-11, atol=1e-12)
 
 
 def _variations(vehicles: int, times: int) -> dict[str, Array]:

@@ -8,6 +8,7 @@ import pytest
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import Step, in_fmu, in_python
 from tests.fmi2 import Fmu
+from tests.often import often
 from tests.vehicles import HEAVY, VIDEORAY, at_rest, random_case, still
 
 
@@ -18,9 +19,7 @@ def vehicle(request: pytest.FixtureRequest) -> tuple[Vehicle, Step]:
     return rov, partial(in_fmu, Fmu(request.getfixturevalue(f"{request.param}_dir")))
 
 
-@pytest.mark.parametrize(
-    "cases", [25, pytest.param(250, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
-)
+@often("cases", 25, 250, 1000)
 def test_a_step_in_c_agrees_with_the_step_in_python(vehicle: tuple[Vehicle, Step], cases: int) -> None:
     rov, step = vehicle
     rng = random.Random(cases)

@@ -4,7 +4,6 @@ import random
 from collections.abc import Iterable
 from itertools import islice, product
 from math import cos, sin
-from time import process_time
 from typing import Any
 
 import pytest
@@ -13,8 +12,7 @@ from scipy.integrate import solve_ivp
 from rov_fmu.equation.alone import AxisAlone as Axis
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import Step, errors, in_python
-from tests.fmi import ERROR
-from tests.fmi2 import Fmu
+from tests.often import often
 from tests.vehicles import (
     VEHICLES,
     VIDEORAY,
@@ -31,8 +29,6 @@ from verification.references import reference
 VELOCITY, PATH = 2e-14, 1e-13
 """The allowed errors, relative to the largest velocity and to the length of the path."""
 LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
-EVERY = pytest.mark.parametrize("stride", [4, pytest.param(1, marks=LONG)])
-"""The distance between the cases of a list that are tested."""
 
 
 def hold(steps: Iterable[Step], cases: Iterable[Case], velocity: float = VELOCITY, path: float = PATH) -> None:
@@ -66,22 +62,6 @@ def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> Non
     hold([in_python], [random_case(rng, random_vehicle(rng), longest=longest) for _ in range(number)], 1e-12, 1e-12)
 
 
-@pytest.mark.parametrize("stride", [17, pytest.param(1, marks=LONG)])
-def test_extreme_vehicles_are_exact(steps: list[Step], stride: int) -> None:
-    """A vehicle has one gram of mass, and as much drag as a vehicle file may contain: up to 1e12/m and 1e12/s."""
-    light = VIDEORAY.replaced({"m_rov": 1e-3, "beta_w": 1e3})
-    drags, loads = (0.0, 1.0, 1e6), (-1e12, -1.0, 0.0, 1e9)
-    cases = product(drags, drags, loads, (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3))
-    for a_d, b_d, Z_ext, w, h in islice(cases, 0, None, stride):
-        rov, inputs = light.replaced({"a_d_w": a_d, "b_d_w": b_d}), {**still(light), "Z_ext": Z_ext}
-        heave = rov.motions(inputs)[1]
-        exact = reference.axis(heave.A, heave.B, heave.C, w, h)
-        for step in steps:
-            found = step(rov, inputs, {**at_rest(rov), "w": w}, h)
-            assert abs(found["w"] - exact.velocity) <= 2e-15 * exact.scale, (heave, w, h)
-            assert abs(found["z"] - exact.distance) <= 4e-15 * exact.path, (heave, w, h)
-
-
 # ---- Reversals and spins ----
 
 REVERSALS = [
@@ -101,30 +81,11 @@ def of_axes(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> Case:
     return rov, {**still(rov), "X_ext": surge.C, "N_ext": yaw.C}, {**at_rest(rov), "u": u, "r": r}, h
 
 
-@pytest.mark.parametrize("stride", [13, pytest.param(1, marks=LONG)])
+@often("stride", 13, 1)
 def test_a_reversal_while_spinning_is_exact(steps: list[Step], stride: int) -> None:
     for after, (surge, yaw, u, r) in islice(product((1.0, 1.3, 0.9, 2.5), REVERSALS), 0, None, stride):
         rest = reference.time_to_rest(surge.A, surge.B, -abs(surge.C), abs(u))
         hold(steps, [of_axes(surge, yaw, u, r, after * rest)], 3e-14, 3e-13)  # of many pieces
-
-
-# Axes of surge and yaw, u, r and h. Some numbers are huge, others next to nothing.
-CALM = Axis(0.5, 1.4, 0.27)
-OVERFLOWING = {  # angles of more than 1e308 rad, and distances of more than 1e308 m
-    "turn": of_axes(CALM, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
-    "both": of_axes(Axis(0.0, 0.0, -1.0), Axis(0.0, 0.0, 0.0), 1e10, 1e300, 1e10 + 10.0),
-}
-
-
-@pytest.mark.parametrize("name", ["turn", pytest.param("both", marks=LONG)])
-def test_a_step_that_overflows_is_not_finite_or_is_refused_within_seconds(fmu: Fmu, name: str) -> None:
-    rov, inputs, before, h = OVERFLOWING[name]
-    start = process_time()
-    with fmu.instance() as instance:
-        instance.start({**rov.coefficients, **inputs, **before})
-        instance.step(0.0, h, ERROR)
-        assert any(word in instance.log[-1].text for word in ("overflows", "MOST_PIECES"))
-    assert process_time() - start < 20.0  # a million pieces, of 2 to 5 us each, precede a refusal
 
 
 # ---- The VideoRay, against an integration of the equations as the paper prints them ----
@@ -185,15 +146,3 @@ def test_a_step_solves_the_equations_of_the_paper(steps: list[Step], h: float) -
 
 
 # ---- Many steps, long steps and far headings ----
-
-
-@EVERY
-def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(steps: list[Step], stride: int) -> None:
-    for name in islice(MANOEUVRES, stride - 1, None, stride):
-        inputs, before = manoeuvre(name)
-        exact = reference.step(VIDEORAY, inputs, before, 1000.0)
-        for step in steps:
-            started = process_time()
-            found = step(VIDEORAY, inputs, before, 1000.0)
-            assert process_time() - started < 0.1
-            assert max(errors(found, exact.state, exact.scale, before)) <= 1e-14

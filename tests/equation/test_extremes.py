@@ -11,6 +11,7 @@ import pytest
 
 from tests.fmi import ERROR, OK
 from tests.fmi2 import Fmu
+from tests.often import often
 
 _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 
@@ -18,9 +19,8 @@ _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 def _cases(count: int) -> list[tuple[float, dict[str, float]]]:
     """Return step sizes and values to set: motions without drag, forces that overflow, and some with random values."""
     ahead = {"u_l": 0.3}
-    cases = [(10.0**power, ahead | {a: 0.0, b: 0.0}) for power in (140, 300) for a, b in _DRAG]
-    cases += [(6e-6, {"N_ext": 1.1e118, "u": 1e90}), (2.0, {"N_ext": -2.4e108, "u": 1e100}), (1e308, ahead)]
-    cases += [(1.0, {"r": 1e40}), (1.0, {"X_ext": 1e308}), (1e3, {"u": 1e154, "r": 1e154}), (5e-324, ahead)]
+    cases = [(1e300, ahead | {a: 0.0, b: 0.0}) for a, b in _DRAG] + [(1e308, ahead), (5e-324, ahead)]
+    cases += [(6e-6, {"N_ext": 1.1e118, "u": 1e90}), (1.0, {"r": 1e40}), (1e3, {"u": 1e154, "r": 1e154})]
     random_ = random.Random(3)
     names = ("u_l", "u_r", "X_ext", "N_ext", "u", "r", "psi")
     for _ in range(count):
@@ -49,7 +49,7 @@ def step_them_all(folder: str, count: int) -> None:
             assert seconds < 10.0, case  # a million pieces take about a second
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(150, marks=pytest.mark.long)])
+@often("count", 6, 150)
 def test_steps_of_absurd_size_end(count: int, videoray_dir: Path) -> None:
     # in a separate process, because a step that does not end cannot be interrupted
     code = f"from tests.equation.test_extremes import step_them_all; step_them_all({str(videoray_dir)!r}, {count})"

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import pytest
-from hypothesis import assume
 from hypothesis import strategies as st
 
 from rov_fmu.equation.alone import steady_velocity
@@ -14,12 +12,12 @@ from tests.motions import (
     TINY,
     Case,
     hold,
-    memory,
     path,
     rounding_of_distance,
     rounding_of_velocity,
     step_alone,
 )
+from tests.often import often
 
 
 def for_every(
@@ -28,9 +26,7 @@ def for_every(
     """Make a test of a law: for the cases in `at`, and for random motions, many more of them in the long tests."""
 
     def decorate(law: Callable[..., None]) -> Callable[[int], None]:
-        @pytest.mark.parametrize(
-            "motions", [15, pytest.param(250, marks=pytest.mark.long), pytest.param(3000, marks=pytest.mark.weekly)]
-        )
+        @often("motions", 15, 250, 3000)
         def test(motions: int) -> None:
             hold(law, motions, *strategies, at=at)
 
@@ -41,25 +37,6 @@ def for_every(
 
 
 # ---- Semigroup ----
-
-
-@for_every(CASES, st.just(0.5) | st.floats(0.5, 1.0), st.booleans(), at=[(case, 0.5, True) for case in BOUNDARIES])
-def test_two_parts_of_a_step_are_the_step(case: Case, fraction: float, longer_first: bool) -> None:
-    """Many of the parts are half steps. Drag only damps the rounding error of the first part."""
-    A, B, C, v0, h = case
-    parts = [fraction * h, h - fraction * h]  # the difference is exact
-    assume(parts[1] > 0.0)
-    t1, t2 = parts if longer_first else parts[::-1]
-    velocity, distance = step_alone(*case)
-    middle, first = step_alone(A, B, C, v0, t1)
-    end, second = step_alone(A, B, C, middle, t2)
-    rounding = rounding_of_velocity(v0, velocity)
-    assert abs(end - velocity) <= 3.0 * rounding
-    # Without a braking force nothing cancels, and the rounding error is relative to the velocity itself.
-    passed_on = rounding if C < 0.0 < v0 or v0 < 0.0 < C else rounding_of_velocity(middle)
-    slowest = min(abs(middle), abs(end)) if middle * end > 0.0 else 0.0
-    allowed = 2.0 * rounding_of_distance(case) + passed_on * memory(A, B, t2, slowest)
-    assert abs(first + second - distance) <= allowed + 2.0**-52 * (abs(first) + abs(second))
 
 
 # ---- Approach to equilibrium ----

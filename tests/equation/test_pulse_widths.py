@@ -2,10 +2,8 @@
 
 import random
 
-import numpy as np
 import pytest
 
-from rov_fmu.c.simulation import simulate
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import SIX, THRUST_EFFECTS, VEHICLES, pulsed, random_inputs, random_state
 
@@ -48,19 +46,3 @@ def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
         assert of_pulses.derivatives(pulses, state) == rov.derivatives(fractions, state)
         assert of_pulses.calculated(pulses, state) == rov.calculated(fractions, state)
         state = {name: found[name] for name in state}
-
-
-def test_neutral_gives_no_thrust_and_is_the_start_value() -> None:
-    rov = ROVS["thrust"]
-    of_pulses = pulsed(rov, PULSE)
-    usual = of_pulses.layout.usual_inputs
-    for name, command in of_pulses.layout.commands.items():
-        assert (command.unit, command.minimum, command.start, command.maximum) == ("us", *PULSE)
-        assert usual[name] == PULSE[1]
-    assert set(of_pulses.commanded(usual).values()) == {0.0}
-    assert of_pulses.layout.usual_inputs.keys() == rov.layout.usual_inputs.keys()
-    times = np.array([0.0, 0.3, 0.6])
-    names = [*rov.layout.state, *rov.layout.calculated]
-    assert (
-        simulate(of_pulses, times, record=names).values.tolist() == simulate(rov, times, record=names).values.tolist()
-    )

@@ -1,13 +1,14 @@
 """The mathematics of rov_fmu/vehicle/vehicle.py: thrust, signs, rates."""
 
 import random
-from math import copysign, inf, sin
+from math import copysign
 
 import pytest
 from mpmath import mp
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.often import often
 from tests.vehicles import (
     HEAVY,
     SIX,
@@ -21,7 +22,7 @@ from tests.vehicles import (
 )
 from verification.references.equations import equations, steady_forces
 
-COMMANDS = [-1.0, -0.7, -0.2, 0.0, 0.1, 0.27, 0.5, 1.0]
+COMMANDS = [-1.0, -0.2, 0.0, 0.27, 1.0]
 
 
 @pytest.fixture(scope="module")
@@ -50,29 +51,14 @@ def test_thrust_is_that_of_2_9_and_10(k: Vehicle, c: float) -> None:
     assert F["tau_rear"] == 0.0
 
 
-@pytest.mark.parametrize("c", COMMANDS)
-def test_the_unweighted_rear_thrust_is_that_of_8_negative_below_27_percent(vehicle: Vehicle, c: float) -> None:
-    unweighted = vehicle.replaced(vehicle.alternatives["unweighted_rear_thrust"].values)
-    F = thrust(unweighted, u_l=c, u_r=c)
-    assert pytest.approx(100.3 * abs(c) * c - 27.09 * c, rel=1e-14) == F["F_l"] + F["F_r"]
-    assert (F["F_l"] * c < 0.0) == (0.0 < abs(c) <= 0.27)
-
-
-def test_each_rear_thruster_has_half_the_pair_and_the_torque_of_4(k: Vehicle) -> None:
-    F = thrust(k, u_l=0.6, u_r=-0.3)
-    assert pytest.approx((42.9 * 0.36 + 2.711 * 0.6) / 2.0, rel=1e-15) == F["F_l"]
-    assert pytest.approx(-(42.9 * 0.09 + 2.711 * 0.3) / 2.0, rel=1e-15) == F["F_r"]
-    assert pytest.approx(0.22 * sin(0.423) * F["F_l"] + 0.22 * sin(-0.423) * F["F_r"], rel=1e-15) == F["tau_rear"]
-
-
-@pytest.mark.parametrize("beyond", [1.0 + 1e-15, 1.5, 1e300])
+@pytest.mark.parametrize("beyond", [1.0 + 1e-15, 1e300])
 def test_commands_beyond_full_thrust_saturate(k: Vehicle, beyond: float) -> None:
     full, more = held(k, u_l=1.0, u_r=-1.0, u_t=1.0), held(k, u_l=beyond, u_r=-beyond, u_t=beyond)
     assert k.calculated(more, at_rest(k)) == k.calculated(full, at_rest(k))
     assert k.step(more, at_rest(k), 1.0) == k.step(full, at_rest(k), 1.0)
 
 
-@pytest.mark.parametrize("cases", [25, pytest.param(300, marks=pytest.mark.long)])
+@often("cases", 25, 300)
 def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -> None:
     """They agree within the rounding of the largest term, also at rest and on the edges of the dead band."""
     rng = random.Random(6)
@@ -94,17 +80,11 @@ def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -
     ("inputs", "signs"),
     [
         ({"u_l": 0.3, "u_r": 0.3}, {"u": 1, "x": 1}),
-        ({"u_l": -0.3, "u_r": -0.3}, {"u": -1, "x": -1}),
         ({"u_l": 0.3, "u_r": -0.3}, {"r": 1, "psi": 1}),
-        ({"u_l": -0.3, "u_r": 0.3}, {"r": -1, "psi": -1}),
         ({"u_l": 0.5, "u_r": 0.3}, {"u": 1, "x": 1, "y": 1, "r": 1, "psi": 1}),
         ({"u_t": 0.3}, {"w": 1, "z": 1}),
-        ({"u_t": -0.3}, {"w": -1, "z": -1}),
-        ({"X_ext": 1.0}, {"u": 1, "x": 1}),
-        ({"Z_ext": 1.0}, {"w": 1, "z": 1}),
-        ({"N_ext": 0.1}, {"r": 1, "psi": 1}),
-        ({"V_N": 1.0}, {"x": 1}),
-        ({"V_E": 1.0}, {"y": 1}),
+        ({"X_ext": 1.0, "V_E": 1.0}, {"u": 1, "x": 1, "y": 1}),
+        ({"Z_ext": 1.0, "V_N": 1.0}, {"w": 1, "z": 1, "x": 1}),
     ],
 )
 def test_the_signs_are_those_of_the_body_and_earth_frames(k: Vehicle, inputs: Values, signs: dict[str, int]) -> None:
@@ -133,23 +113,6 @@ def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
 
 
 # ---- One axis alone ----
-
-
-def test_an_axis_alone_has_the_numbers_of_18() -> None:
-    rov = VEHICLES["drag by direction, coupled, late"].replaced({"alpha_u": 0.5, "beta_u": 0.8})
-    form = rov.layout.kinds["surge"]
-    m, gain = 13.5 + 6.3567, 0.8 / (13.5 + 6.3567)
-    assert rov.effective_inertia(form) == pytest.approx(m / 0.8)
-    still = VEHICLES["VideoRay"].replaced({"beta_u": 0.0})
-    assert still.effective_inertia(still.layout.kinds["surge"]) == inf
-    assert still.response(SURGE, 0.5) == (0.0, inf)
-    motion = rov.alone(SURGE, held(rov, X_ext=2.0))
-    assert pytest.approx((gain * 141.0, gain * 13.7)) == (motion.A, motion.B)
-    assert motion.reverse == pytest.approx((gain * 190.0, gain * 4.0))
-    assert pytest.approx(gain * (2.0 + 0.1)) == motion.C
-    assert rov.motions(held(rov, X_ext=2.0))[0] == motion
-    thrust = rov.force(SURGE, 0.5)
-    assert pytest.approx(gain * (0.5 * thrust + 0.1)) == rov.held(SURGE, 0.5).C
 
 
 def _loss(rov: Vehicle, axis: Axis, inputs: dict[str, float]) -> float:

@@ -1,9 +1,6 @@
 """Steps in cases that are difficult for a Runge-Kutta method: reversals, lags, stiffness, long steps, overflow."""
 
-import random
-from itertools import product
 from math import cos, isfinite, sin
-from time import process_time
 
 import pytest
 
@@ -13,7 +10,7 @@ from rov_fmu.equation.catalogue import SWAY
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_python, worst
-from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, random_case, still
+from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, still
 
 COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
 FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
@@ -24,11 +21,9 @@ M, I_R = FREE["m_rov"], FREE["I_r"]
 
 CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
     "from rest, with a lag": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
-    "from rest, by one lagging thruster, which turns and sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
     "the thrust changes its sign": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
     "a load cancels the present thrust": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 1.0)),
     "surge and sway turn the vehicle": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
-    "coasting": (HEAVY, {}, {"u": 1.0, "v": 0.1, "r": 0.3}, (0.1, 1.0)),
     "a lag of a millisecond": (LAGGING.replaced({"T_t200": 1e-3}), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 0.3)),
     "there and back with a turn there and back": (
         FREE,
@@ -42,13 +37,6 @@ CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
         {"w": 0.3},
         (0.1, 1.0),
     ),
-    "a fast axis that nothing drives": (VIDEORAY.replaced({"b_d_w": 1e6}), {"u_l": 0.6}, {"w": 0.3}, (0.1,)),
-    "almost no drag": (
-        VIDEORAY.replaced({f"{key}_d_{v}": 1e-6 for key in "ab" for v in "uwr"}),
-        {},
-        {"u": 1.0, "r": 0.5},
-        (1.0, 100.0),
-    ),
     "within the dead band": (HEAVY, {"u_1": 0.05, "u_2": -0.05}, {"u": 0.5, "r": 1.0}, (0.1, 2.0)),
 }
 
@@ -57,39 +45,12 @@ def case(rov: Vehicle, inputs: Values, state: Values) -> tuple[Vehicle, State, S
     return rov, {**still(rov), **inputs}, {**at_rest(rov), **state}
 
 
-def reversed_drag(rov: Vehicle, share: float) -> Vehicle:
-    """Return a vehicle whose drag in reverse is a share of that ahead."""
-    names = [f"{key}_{form.axis.velocity}" for form in rov.layout.axes for key in ("a_d", "b_d")]
-    return rov.extended({f"{name}_reverse": share * rov[name] for name in names})
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_a_step_in_a_special_case_is_exact(name: str) -> None:
     rov, inputs, state, steps = CASES[name]
     for h in steps:
         velocity, path = worst(in_python, *case(rov, inputs, state), h)
         assert max(velocity, path) <= 1e-13, h
-
-
-@pytest.mark.parametrize(
-    ("names", "shares", "cases"),
-    [
-        (["bluerov2_heavy"], (0.01, 30.0), 1),
-        pytest.param(sorted(SHIPPED), (0.01, 1.0 / 30.0, 30.0, 100.0), 2, marks=pytest.mark.long),
-        pytest.param(sorted(SHIPPED), (0.01, 1.0 / 30.0, 30.0, 100.0), 40, marks=pytest.mark.weekly),
-    ],
-    ids=["the Heavy", "every vehicle", "every vehicle, often"],
-)
-def test_a_step_is_exact_whatever_the_drag_in_reverse(names: list[str], shares: tuple[float, ...], cases: int) -> None:
-    """One step begins at rest, another one in motion."""
-    for name, share in product(names, shares):
-        rov = reversed_drag(HEAVY if name == "bluerov2_heavy" else load_vehicle(SHIPPED[name]), share)
-        rng = random.Random(f"{name} {share} {cases}")
-        for _ in range(cases):
-            _, inputs, state, h = random_case(rng, rov, -2.0, 0.7)
-            for start in (state, at_rest(rov)):
-                velocity, path = worst(in_python, rov, inputs, start, h)
-                assert max(velocity, path) <= 1e-13, (name, share, inputs, start, h)
 
 
 def test_a_velocity_that_is_only_a_rounding_error_does_not_shorten_the_substeps() -> None:
@@ -140,24 +101,6 @@ def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
 # ---- Overflow and long steps ----
 
 
-@pytest.mark.parametrize(
-    ("rov", "inputs", "state", "h"),
-    [
-        (HEAVY, {}, {"u": 1e200, "v": 1e200, "r": 1e200}, 1.0),
-        (FREE, {}, {"u": 1.0, "r": 1e300}, 1e10),
-        (FREE, {"X_ext": 1e308}, {"r": 1.0}, 1e308),
-        (COUPLED, {"X_ext": 1e308, "Y_ext": -1e308}, {"r": 1e300}, 1e300),
-    ],
-    ids=["velocities", "turn", "distance", "all"],
-)
-def test_a_step_that_overflows_is_not_finite_and_takes_no_time(
-    rov: Vehicle, inputs: Values, state: Values, h: float
-) -> None:
-    start = process_time()
-    assert not all(map(isfinite, in_python(*case(rov, inputs, state), h).values()))
-    assert process_time() - start < 2.0
-
-
 def test_a_step_of_more_substeps_than_allowed_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
     rov, inputs, state = case(HEAVY, AHEAD, {})
     for most, finite in ((10_000, True), (100, False)):
@@ -165,9 +108,9 @@ def test_a_step_of_more_substeps_than_allowed_is_not_finite(monkeypatch: pytest.
         assert all(map(isfinite, rov.step(inputs, state, 300.0).values())) == finite
 
 
-@pytest.mark.parametrize("h", [100.0, 300.0])
-def test_a_long_step_ends_in_straight_or_circular_motion(h: float) -> None:
+def test_a_long_step_ends_in_circular_motion() -> None:
     """From a state that has settled, the motion is a circle, with its radius from the steady velocities."""
+    h = 300.0
     inputs = still(VIDEORAY) | {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5, "V_N": 0.1}
     a = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0)
     b = VIDEORAY.step(inputs, at_rest(VIDEORAY), 90.0 + h)

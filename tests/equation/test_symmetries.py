@@ -8,6 +8,7 @@ import pytest
 
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import Step
+from tests.often import often
 from tests.vehicles import (
     HEAVY,
     VEHICLES,
@@ -28,9 +29,7 @@ def negated(values: Values, *names: str) -> State:
 def for_every(law: Callable[[Step, Case], None]) -> Callable[[list[Step], int], None]:
     """Make a test of a law for random vehicles like the VideoRay, many more of them in the long and weekly tests."""
 
-    @pytest.mark.parametrize(
-        "cases", [15, pytest.param(100, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
-    )
+    @often("cases", 15, 100, 1000)
     def test(steps: list[Step], cases: int) -> None:
         rng = random.Random(law.__name__)
         for _ in range(cases):
@@ -61,16 +60,6 @@ def test_ahead_and_astern_are_mirror_images_to_the_last_bit(step: Step, case: Ca
 
 
 # ---- Without force ----
-
-
-@for_every
-def test_without_force_no_velocity_gains_one_bit_or_changes_its_sign(step: Step, case: Case) -> None:
-    k, i, s, h = case
-    after = step(k, {**still(k), "V_N": i["V_N"], "V_E": i["V_E"]}, s, h)
-    for name in ("u", "w", "r"):
-        assert 0.0 <= after[name] <= s[name] or s[name] <= after[name] <= 0.0
-        if k[f"a_d_{name}"] == k[f"b_d_{name}"] == 0.0:
-            assert after[name] == s[name]
 
 
 def energy(rov: Vehicle, state: Values) -> float:

@@ -84,16 +84,6 @@ def test_a_compile_error_is_printed_with_the_compilers_message(
     assert not (tmp_path / "rov.fmu").exists()
 
 
-def test_a_missing_compiler_says_how_to_get_it(
-    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    find = fmu_compile.importlib.util.find_spec  # type: ignore[attr-defined]
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "ziglang" else find(name))
-    assert _build(old) == 1
-    assert _one_line(capsys) == "rov-fmu: the C compiler is missing: pip install ziglang"
-    assert _untouched(old)
-
-
 @pytest.mark.usefixtures("without_page", "uncompiled")
 @pytest.mark.parametrize(("owner", "function"), [(os, "fsync"), (Path, "replace")], ids=["fsync", "replace"])
 def test_a_full_disk_leaves_the_old_fmu(
@@ -124,33 +114,6 @@ def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
     )
 
 
-@pytest.mark.skipif(os.name != "posix", reason="a limit on the size of files is POSIX")
-def test_a_full_temporary_folder_is_reported(old: Path, tmp_path: Path) -> None:
-    limited = tmp_path / "limited.py"
-    limited.write_text(
-        "import matplotlib.font_manager, resource, runpy, signal, sys\n"  # matplotlib writes a cache when imported
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
-        f"sys.argv = ['build_fmu.py', {str(BARE)!r}, '--platform', 'host', '-o', {str(old)!r}]\n"
-        f"runpy.run_path({_SCRIPT!r}, run_name='__main__')\n",
-        encoding="utf-8",
-    )
-    # -B: otherwise Python would write truncated .pyc files, which later imports would read
-    result = subprocess.run(
-        [sys.executable, "-B", limited],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, even if another is installed
-    )
-    assert result.returncode == 1
-    assert result.stderr.splitlines()[0].startswith("rov-fmu: ")
-    assert "File too large" in result.stderr
-    assert "Traceback" not in result.stderr
-    assert _untouched(old)
-
-
 def _is_running(process: int) -> bool:
     """Return True if a process exists and is not a zombie."""
     stat = Path(f"/proc/{process}/stat")
@@ -169,7 +132,7 @@ def _wait_until(is_so: Callable[[], object], process: subprocess.Popen[str] | No
         time.sleep(0.001)
 
 
-_MOMENTS = [0.1, 0.0, 0.01, 0.03, 0.2, 0.3, 0.5, 0.7]
+_MOMENTS = [0.1, 0.0, 0.03, 0.3, 0.7]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, /proc is Linux")

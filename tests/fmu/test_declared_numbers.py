@@ -6,8 +6,6 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from rov_fmu.fmu.variables import unit_of
-
 DRAG, CURVES, TUNING = (
     " ".join(f"{kind}_{which}" for kind in kinds.split() for which in whiches.split())
     for kinds, whiches in (("a_d b_d", "u w r"), ("a_t b_t", "rear top"), ("alpha beta", "u w r"))
@@ -44,14 +42,6 @@ UNITS: dict[str, tuple[object, ...]] = {
     "N.m.s/rad": (1, 2, -1, -1, 0),
     "N.m.s2/rad2": (1, 2, 0, -2, 0),
 }
-FURTHER_UNITS: dict[str, tuple[object, ...]] = {
-    "V": (1, 2, -3, 0, -1),
-    "us": (0, 0, 1, 0, 0),
-    "1/s": (0, 0, -1, 0, 0),
-    "N/s": (1, 1, -3, 0, 0),
-    "N.s2/(m2.rad2)": (1, -1, 0, -2, 0),
-}
-"""Units of other vehicles."""
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +65,3 @@ def test_units(description: etree._ElementTree) -> None:
         shown = ((shown.get("name"), pytest.approx(float(shown.get("factor")))) for shown in unit.iter("DisplayUnit"))
         found[unit.get("name")] = (*exponents, *(part for pair in shown for part in pair))
     assert found == UNITS
-
-
-@pytest.mark.parametrize("text", FURTHER_UNITS)
-def test_a_unit_is_read_from_its_text(text: str) -> None:
-    found = unit_of(text)
-    assert tuple(found.exponents.get(base, 0) for base in ("kg", "m", "s", "rad", "A")) == FURTHER_UNITS[text]
-    assert found.size == (1e-6 if text == "us" else 1.0)

@@ -1,7 +1,5 @@
 """The OSP model description contains every input and output in the groups of OSP-IS 1.0.1."""
 
-from dataclasses import replace
-
 import pytest
 from lxml import etree
 
@@ -23,11 +21,6 @@ SEQUENCE = {
     "LinearDisplacement": {"m": 1},
     "AngularDisplacement": {"rad": 1},
 }
-
-
-@pytest.fixture(scope="module")
-def groups(vehicle: Vehicle) -> list[etree._Element]:
-    return groups_of(vehicle.layout)
 
 
 def groups_of(layout: Layout) -> list[etree._Element]:
@@ -64,46 +57,6 @@ def test_every_input_and_output_is_in_one_group(rov: Vehicle) -> None:
         axes = [axis for variable in group if (axis := variable.get("axis"))]
         assert set(axes) <= {"x", "y", "z"}
         assert len(set(axes)) == len(axes)
-
-
-CONNECTED = {
-    "thruster_commands": ("Generic", "u_l u_r u_t"),
-    "external_force": ("Force", "x=X_ext z=Z_ext"),
-    "thrust_t": ("Force", "z=F_t"),
-    "rear_torque": ("Torque", "z=tau_rear"),
-    "current": ("LinearVelocity", "x=V_N y=V_E"),
-    "velocity": ("LinearVelocity", "x=u z=w"),
-    "yaw_rate": ("AngularVelocity", "z=r"),
-    "position": ("LinearDisplacement", "x=x y=y"),
-    "depth": ("LinearDisplacement", "z=z"),
-    "heading": ("AngularDisplacement", "z=psi"),
-}
-"""Groups of the VideoRay: the element, and each variable with its axis."""
-
-
-def test_what_systems_connect_by(vehicle: Vehicle) -> None:
-    found = {}
-    for group in groups_of(vehicle.layout):
-        members = ((variable.get("axis"), variable.get("ref")) for variable in group)
-        words = " ".join(f"{axis}={name}" if axis else name for axis, name in members)
-        found[group.get("name")] = (group.tag.removeprefix(NAMESPACE), words)
-    assert CONNECTED.items() <= found.items()
-
-
-def test_the_names_of_groups_differ_whatever_the_names_of_curves_and_thrusters_are() -> None:
-    """The torque of a curve `external` is in another group than the torque from outside."""
-    layout = VEHICLES["VideoRay"].layout
-    first, second = layout.curves
-    renamed = replace(
-        layout,
-        curves=(replace(first, name="external"), second),
-        thrusters=tuple(
-            t.model_copy(update={"curve": {first.name: "external"}.get(t.curve, t.curve)}) for t in layout.thrusters
-        ),
-    )
-    found = [group.get("name") for group in groups_of(renamed)]
-    assert len({*found}) == len(found)
-    assert {"external_torque_N_ext", "external_torque_tau_external"} <= {*found}
 
 
 # ---- rov-fmu build --osp -------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import fmpy
 import pytest
 
 from rov_fmu.c.compile import WARNINGS, compiler, fmi_headers
+from tests.often import often
 
 
 @pytest.fixture
@@ -50,10 +51,10 @@ def test_the_cmake_project_that_fmpy_creates_builds_and_simulates(
         assert ours[name] == pytest.approx(theirs[name], rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("optimization", ["-O0", pytest.param("-O3", marks=pytest.mark.long)])
-def test_no_warning_under_the_strictest_flags(either_dir: Path, tmp_path: Path, optimization: str) -> None:
+@often("how", "-O0 -c -o fmu.o", "-O3 -c -o fmu.o")
+def test_no_warning_under_the_strictest_flags(either_dir: Path, tmp_path: Path, how: str) -> None:
     more = ["-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wcast-qual", "-Wvla"]
-    flags = ["-std=c11", *WARNINGS, *more, optimization, "-isystem", str(fmi_headers())]
-    command = [*compiler(), *flags, "-c", "fmu.c", "-o", str(tmp_path / "fmu.o")]
-    result = subprocess.run(command, cwd=either_dir / "sources", capture_output=True, text=True, check=False)
+    flags = ["-std=c11", *WARNINGS, *more, "-isystem", str(fmi_headers())]
+    command = [*compiler(), *flags, *how.split(), str(either_dir / "sources" / "fmu.c")]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")

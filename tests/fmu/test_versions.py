@@ -143,17 +143,10 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
 def test_the_description_follows_its_schema_and_the_rules_of_fmpy(kind: str, fmi: int, tmp_path: Path) -> None:
     document = described(ROVS[kind], fmi)
     check_schema(document, f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
+    check_schema(etree.fromstring(build_description("a_rov")), "fmi3/fmi3BuildDescription.xsd")
     (tmp_path / "modelDescription.xml").write_bytes(etree.tostring(document))
     description = fmpy.read_model_description(str(tmp_path), validate=False)
     assert validate_model_description(description, validate_variable_names=True, validate_model_structure=True) == []
-
-
-def test_the_build_description_follows_its_schema_and_names_the_file_to_compile() -> None:
-    document = etree.fromstring(build_description("a_rov"))
-    check_schema(document, "fmi3/fmi3BuildDescription.xsd")
-    (configuration,) = document
-    assert configuration.get("modelIdentifier") == "a_rov"
-    assert [file.get("name") for file in document.iter("SourceFile")] == ["fmu.c"]
 
 
 SAVED = {"canGetAndSetFMU{0}tate": "true", "canSerializeFMU{0}tate": "true", "providesDirectionalDerivative{1}": "true"}
@@ -239,10 +232,6 @@ def test_an_interface_that_an_fmu_cannot_have_is_refused(
     monkeypatch.chdir(tmp_path)
     for options, line in (
         (["--backend", "pythonfmu", "--interface", "me"], "--interface me: PythonFMU makes Co-Simulation (cs) alone"),
-        (
-            ["--backend", "pythonfmu", "--interface", "both"],
-            "--interface both: PythonFMU makes Co-Simulation (cs) alone",
-        ),
         (["--osp", "--interface", "me"], "--interface me: libcosim and the OSP tools, which --osp is for, run"),
         (["--interface", "model-exchange"], "must be one of cs, me, both; did you mean me?"),
     ):

@@ -10,6 +10,7 @@ import pytest
 from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.often import often
 from tests.tank.logs import read_log
 
 
@@ -52,9 +53,7 @@ def _table(folder: Path, text: str, **also: Column) -> Columns:
 @pytest.mark.parametrize(
     "text",
     [
-        "length [m],time [s]\n0.5,1.25\n1e3,-2\n",
         "length [m];time [s]\n0,5;1,25\n1e3;-2\n",
-        "length [m];time [s];\n0.5;1.25;\n1e3;-2;;\n",
         "length [m]\ttime [s]\n0,5\t1.25\n1e3\t-2\n",
         '"length [m]";"time [s]"\n"0,5";"1,25"\n\n;\n1000;-2\n',
         "LENGTH[M],Time  [ S ]\n 0.5 , 1.25 \n1e3,-2\n",
@@ -112,23 +111,6 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
     assert ({name: [*rows] for name, rows in table.unread.items()}, table.torn) == ({"length": [1], "time": []}, 1)
 
 
-def test_other_names_and_units_with_numbers(tmp_path: Path) -> None:
-    def scale(numbers: tuple[float, ...]) -> Callable[[float], float]:
-        if len(numbers) != 2:
-            raise ValueError("two numbers, please")
-        return lambda number: (number - numbers[0]) / numbers[1]
-
-    column = Column({"m": 1.0}, maximum=1.0, also=("l",), conversions={"raw": scale})
-    path = _file(tmp_path, "L [RAW 10 2.5]\n15\n")
-    table = read_columns(path, {"length": column})
-    assert (_values(table), table.units) == ({"length": [2.0]}, {"length": "raw"})
-    _file(tmp_path, "length [raw 10]\n15\n")
-    with pytest.raises(DataFileError, match=r"column 1 = 'length \[raw 10\]': two numbers, please"):
-        read_columns(path, {"length": column})
-    _file(tmp_path, "length [m],l [km]\n1,15\n")
-    assert _values(read_columns(path, {"length": column}, others=True)) == {"length": [1.0]}
-
-
 # ---- Large files -----------------------------------------------------------------------------------------------------
 
 
@@ -154,7 +136,7 @@ def _peak(action: Callable[[], object]) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("rows", [10_000, pytest.param(40_000, marks=pytest.mark.long)])
+@often("rows", 3_000, 40_000)
 def test_a_log_takes_at_most_six_times_its_size_in_memory(rows: int, tmp_path: Path) -> None:
     path, layout = tmp_path / "log_dive.csv", load_vehicle(SHIPPED["bluerov2"]).layout
     _log(path, 300)

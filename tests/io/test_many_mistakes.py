@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.io.messages import lines_on
 from tests.commands import BARE, TESTS, without_progress
+from tests.often import often
 
 Capsys = pytest.CaptureFixture[str]
 SECONDS_PER_MISTAKE = 4e-4
@@ -32,7 +32,7 @@ def _plan(folder: Path) -> tuple[Path, list[str]]:
     return path, ["study", str(path), "-o", str(folder / "results")]
 
 
-@pytest.mark.parametrize("number", [10_000, pytest.param(200_000, marks=pytest.mark.long)])
+@often("number", 10_000, 200_000)
 @pytest.mark.parametrize("file", [_vehicle, _rov, _plan])
 def test_many_unknown_tables(
     file: Callable[[Path], tuple[Path, list[str]]], number: int, tmp_path: Path, capsys: Capsys
@@ -54,10 +54,3 @@ def test_a_toml_file_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsy
         file.truncate(30_000_000)
     assert main(command) == 2
     assert capsys.readouterr().err == f"rov-fmu: {path}: is too large, with 30 MB: at most 20 MB are read\n"
-
-
-def test_each_mistake_is_printed_once_and_one_more_is_in_the_singular() -> None:
-    path = Path("some.toml")
-    assert lines_on(path, ["a", "b", "a"]) == ["some.toml: a", "some.toml: b"]
-    assert lines_on(path, [*map(str, range(11)), "3"])[10:] == ["some.toml: 1 more mistake"]
-    assert lines_on(path, ["a", "", ""]) == ["some.toml: a", "some.toml: 2 more mistakes"]

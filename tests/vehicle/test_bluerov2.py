@@ -1,13 +1,11 @@
 """The numbers of BlueROV2 and BlueROV2 Heavy against their sources."""
 
 import csv
-from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
 from rov_fmu.equation.catalogue import AXES
@@ -36,11 +34,6 @@ def points() -> tuple[Any, Any]:
     return (pulse - 1500.0) / 400.0, force * NEWTON
 
 
-def quadratic(a: float, b: float, c_0: float, c: Any) -> Any:
-    m = np.maximum(np.abs(c) - c_0, 0.0)
-    return np.sign(c) * (a * m + b) * m
-
-
 def rms(residuals: Any) -> float:
     return float(np.sqrt(np.mean(residuals**2)))
 
@@ -54,18 +47,6 @@ def test_the_curve_is_that_of_the_makers_points_to_0_35_newton(ship: Vehicle) ->
     assert np.all(shipped[np.abs(c) < 0.0872] == 0.0)
     ends = [ship.curve_force(curve, command) for command in (1.0, -1.0)]
     assert ends == pytest.approx([5.25 * NEWTON, -4.1 * NEWTON], rel=0.04), "forward is the strong side"
-
-
-def test_the_curve_is_the_least_squares_fit(ship: Vehicle) -> None:
-    c, thrust = points()
-
-    def residuals(k: Sequence[float]) -> Any:
-        a, b, a_reverse, b_reverse, c_0 = k
-        return np.where(c > 0.0, quadratic(a, b, c_0, c), quadratic(a_reverse, b_reverse, c_0, c)) - thrust
-
-    fit = least_squares(residuals, [20.0, 20.0, 20.0, 20.0, 0.05], x_scale=[10.0, 10.0, 10.0, 10.0, 0.1])
-    names = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
-    assert [ship[name] for name in names] == pytest.approx(fit.x, rel=0.025)
 
 
 def test_the_lag_loses_the_impulse_of_the_published_transfer_function() -> None:

@@ -8,9 +8,6 @@ from typing import Any
 import pytest
 import tomlkit
 
-from rov_fmu.equation.catalogue import (
-    AXES,
-)
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
@@ -76,105 +73,90 @@ _ALONE: dict[str, Any] = {"inputs": GONE, "alternatives": GONE, "body.coupling":
 _NO_BOOST: dict[str, Any] = {**_ALONE, "thruster.l": GONE, "thruster.r": GONE, "curves.boost": GONE, "arm": GONE}
 
 
-# How the file is changed, and what each of the lines must contain, in their order.
-MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
+# How the file is changed, and the parts of each line, in their order.
+MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     # names
-    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [("thruster#2.name = '1': thruster#1 has this name",)]),
+    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, "thruster#2.name = '1': thruster#1 has this name"),
     "names of thrusters that differ in case": (
         {**_ALONE, "thruster.l.name": "R"},
-        [("thruster#7.name = 'r': thruster#6 has the name 'R': they differ only in case",)],
-    ),
-    "a name with a space": (
-        {**_ALONE, "thruster.5.name": "top 5"},
-        [("thruster.top 5.name = 'top 5'", "at most 30 letters, digits and underscores")],
+        "thruster#7.name = 'r': thruster#6 has the name 'R': they differ only in case",
     ),
     "a curve without a name and one with an endless one": (
         {**_ALONE, "curves": {"": _CURVE, "x" * 300: _CURVE}},
-        [
-            ("curves.'' = ''", "letters"),
-            (f"curves.{'x' * 70}... = 'xxx", "letters"),
-            *[(f"thruster.{name}.curve", f"there is no such curve, only '', {'x' * 193}...") for name in "12345lr"],
-        ],
+        f"curves.'' = '' … letters\ncurves.{'x' * 70}... = 'xxx … letters\n"
+        + "\n".join(f"thruster.{n}.curve … there is no such curve, only '', {'x' * 193}..." for n in "12345lr"),
     ),
-    "an unknown curve": (
-        {"thruster.5.curve": "T200"},
-        [("thruster.5.curve = 'T200'", "no such curve, only frame, boost")],
-    ),
-    "a curve of no thruster": ({"curves.spare": _CURVE}, [("curves.spare: no thruster has this curve",)]),
-    "no thrusters": ({"thruster": []}, [("thruster = []", "must have at least 1 item")]),
+    "a curve of no thruster": ({"curves.spare": _CURVE}, "curves.spare: no thruster has this curve"),
     # keys that need others, or have no use
-    "half a curve in reverse": (
-        {"curves.frame.b_t_reverse": GONE},
-        [("curves.frame.b_t_reverse", "missing", "a_t_reverse is there")],
-    ),
-    "a dead band in reverse only": ({"curves.frame.c_0": GONE}, [("curves.frame.c_0", "missing", "c_0_reverse")]),
-    "no mass": ({"body.m_rov": GONE}, [("body.m_rov", "missing", "surge")]),
-    "no arm": ({"arm": GONE}, [("arm", "R and gamma", "missing", "a thruster has the key arm")]),
+    "a dead band in reverse only": ({"curves.frame.c_0": GONE}, "curves.frame.c_0 … missing … c_0_reverse"),
+    "no mass": ({"body.m_rov": GONE}, "body.m_rov … missing … surge"),
+    "no arm": ({"arm": GONE}, "arm … R and gamma … missing … a thruster has the key arm"),
     "an arm for nothing": (
         {f"thruster.{n}.{key}": v for n in "lr" for key, v in (("arm", GONE), ("position", place(0.0, 0.1, 0.0)))},
-        [(f"arm.{key}: only yaw with thrusters that have the key arm needs it: remove it",) for key in ("R", "gamma")],
+        "arm.R: only yaw with thrusters that have the key arm needs it: remove it\n"
+        "arm.gamma: only yaw with thrusters that have the key arm needs it: remove it",
     ),
     "an arm of a thruster astern": (
         {"thruster.l.direction.value": [-1.0, 0.0, 0.0]},
-        [("thruster.l.arm", "pushes ahead", "position instead")],
+        "thruster.l.arm … pushes ahead … position instead",
     ),
-    "no place": ({"thruster.1.position": GONE}, [("thruster.1.position", "or arm", "missing", "yaw")]),
+    "no place": ({"thruster.1.position": GONE}, "thruster.1.position … or arm … missing … yaw"),
     # numbers
     "a direction of no length": (
         {"thruster.5.direction.value": [0, 0, 0]},
-        [("thruster.5.direction.value = [0, 0, 0]", "must have a length")],
+        "thruster.5.direction.value = [0, 0, 0] … must have a length",
     ),
     "an unknown axis": (
         {"axes.rol": {"a_d": quantity(1.0, "N.m.s2/rad2")}},
-        [("axes.rol: there is no such key, only surge, sway, heave, roll, pitch, yaw; did you mean roll?",)],
+        "axes.rol: there is no such key, only surge, sway, heave, roll, pitch, yaw; did you mean roll?",
     ),
     # thrust
     "thrust of the wrong sign": (
         {"curves.boost.a_t.value": -200.0, "curves.boost.b_t.value": 10.0},
-        [("curves.boost: must give a force above 0 at full command, but a_t_boost and b_t_boost give -190 N",)],
+        "curves.boost: must give a force above 0 at full command, but a_t_boost and b_t_boost give -190 N",
     ),
     "thrust in reverse of the wrong sign": (
         {"curves.frame.a_t_reverse.value": -100.0},
-        [("curves.frame: must give a force above 0 at full command in reverse", "a_t_frame_reverse")],
+        "curves.frame: must give a force above 0 at full command in reverse … a_t_frame_reverse",
     ),
     # geometry
-    "no axes": ({**_NO_BOOST, "axes": {}}, [("axes", "at least one of surge, sway, heave, roll, pitch, yaw")]),
+    "no axes": ({**_NO_BOOST, "axes": {}}, "axes … at least one of surge, sway, heave, roll, pitch, yaw"),
     "an axis that no thruster drives": (
         {**_ALONE, "thruster.5.direction.value": [1, 0, 0], "thruster.5.position": place(0.0, 0.0, 0.0)},
-        [("axes.heave: no thruster drives it: give one a direction with a part down, or remove this table",)],
+        "axes.heave: no thruster drives it: give one a direction with a part down, or remove this table",
     ),
     "a thruster that drives no axis": (
         {**_ALONE, "axes.heave": GONE},
-        [("thruster.5", "acts on no axis of the vehicle, which are surge, sway, yaw")],
+        "thruster.5 … acts on no axis of the vehicle, which are surge, sway, yaw",
     ),
     "a yaw without an arm": (
         {**_NO_BOOST, **{f"thruster.{n}.position.value": [0, 0, 0] for n in "1234"}},
-        [("axes.yaw: no thruster turns the vehicle: give one a position beside the line of its force", "remove")],
+        "axes.yaw: no thruster turns the vehicle: give one a position beside the line of its force … remove",
     ),
     "thrusters that cancel": (
         {
             **_NO_BOOST,
             **{f"thruster.{n}.position.value": [x, 0.0, 0.0] for n, x in (("1", 1), ("2", 1), ("3", 1), ("4", 1))},
         },
-        [("axes.sway", "the thrusters cancel", "yaw; correct a direction or a position, or remove this table")],
+        "axes.sway … the thrusters cancel … yaw; correct a direction or a position, or remove this table",
     ),
     # coupling
-    "coupling of an endless inertia": ({"axes.yaw.beta.value": 0.0}, [("axes.yaw.beta.value = 0.0", "at least 0.001")]),
+    "coupling of an endless inertia": ({"axes.yaw.beta.value": 0.0}, "axes.yaw.beta.value = 0.0 … at least 0.001"),
     # inputs
     "an input for a thruster that is not there": (
         {"inputs.heave.6": 1.0},
-        [("inputs.heave.6", "no such thruster, only 1, 2, 3, 4, 5, l, r")],
+        "inputs.heave.6 … no such thruster, only 1, 2, 3, 4, 5, l, r",
     ),
-    "a thruster no input drives": ({"inputs.boost.r": 0.0}, [("inputs", "no input drives the thruster r")]),
+    "a thruster no input drives": ({"inputs.boost.r": 0.0}, "inputs … no input drives the thruster r"),
     "an input that drives nothing": (
         {"inputs.idle": {"5": 0.0}},
-        [("inputs.idle: drives no thruster: give one a gain other than 0",)],
+        "inputs.idle: drives no thruster: give one a gain other than 0",
     ),
-    "an axis no input drives": ({"inputs.yaw": GONE, "inputs.boost.r": 1.0}, [("axes.yaw", "no input drives it")]),
+    "an axis no input drives": ({"inputs.yaw": GONE, "inputs.boost.r": 1.0}, "axes.yaw … no input drives it"),
     # alternatives
     "an alternative out of bounds": (
         {"alternatives.other.a_d_u.value": -1.0},
-        [("alternatives.other.a_d_u.value = -1.0", "0 ... 1000000 N.s2/m2")],
+        "alternatives.other.a_d_u.value = -1.0 … 0 ... 1000000 N.s2/m2",
     ),
     # several mistakes at once, of form and of content
     "many": (
@@ -186,109 +168,89 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
             "inputs.idle": {"5": 0.0},
             "alternatives.other.a_d_u.unit": "lb",
         },
-        [
-            ("validity.command_max",),
-            ("thruster.5.curve",),
-            ("inputs.idle",),
-            ("curves.frame.b_t_reverse",),
-            ("axes.yaw.beta",),
-        ],
+        "validity.command_max\nthruster.5.curve\ninputs.idle\ncurves.frame.b_t_reverse\naxes.yaw.beta",
     ),
     "coupling without sway": (
         {**_NO_BOOST, "body.coupling": True, "axes.sway": GONE},
-        [("body.coupling", "needs surge, sway and yaw; there is no sway")],
+        "body.coupling … needs surge, sway and yaw; there is no sway",
     ),
     "two places": (
         {"thruster.l.position": place(0.0, 0.1, 0.0)},
-        [("thruster.l.arm", "must not be given together with position")],
+        "thruster.l.arm … must not be given together with position",
     ),
     "an input whose thrusters cancel": (
         {"inputs.spin": {"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}},
-        [("inputs.spin", "drives no axis", "cancel")],
-    ),
-    "no drag": ({"axes.sway.b_d": GONE}, [("axes.sway.b_d", "missing")]),
-    "a place on a plane": (
-        {"thruster.1.position.value": [0.156, 0.111]},
-        [("thruster.1.position.value = [0.156, 0.111]", "three numbers")],
+        "inputs.spin … drives no axis … cancel",
     ),
     "a place beyond any vehicle": (
         {"thruster.1.position.value": [156, 111, 0.0]},
-        [("thruster.1.position.value = [156, 111, 0.0]", "-100 ... 100 m")],
-    ),
-    "a list for an input": (
-        {"inputs.heave": ["5"]},
-        [("inputs.heave = ['5']: must be a table: write [inputs.heave]",)],
+        "thruster.1.position.value = [156, 111, 0.0] … -100 ... 100 m",
     ),
 }
 
 
-MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
+MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
     # weight and buoyancy
-    "no buoyancy": ({"body.B": GONE}, [("body.B: this key is missing, and W is there",)]),
+    "no buoyancy": ({"body.B": GONE}, "body.B: this key is missing, and W is there"),
     "a centre of buoyancy of a vehicle that does not tilt": (
         {"body.x_B": GONE, "body.y_B": GONE, "body.z_G": GONE, "axes.roll": GONE, "axes.pitch": GONE, "cross": {}},
-        [
-            ("body.I_p: only roll needs it, and there is no [axes.roll]: remove it",),
-            ("body.I_q: only pitch needs it",),
-            ("body.z_B: acts only in roll and pitch: remove it, or add an axis",),
-        ],
+        "body.I_p: only roll needs it, and there is no [axes.roll]: remove it\n"
+        "body.I_q: only pitch needs it\n"
+        "body.z_B: acts only in roll and pitch: remove it, or add an axis",
     ),
-    "a loss of thrust in reverse only": ({"curves.one.d": GONE}, [("curves.one.d", "missing", "d_reverse is there")]),
     "a loss of thrust of an arm": (
         {
             "thruster.l.position": GONE,
             "thruster.l.arm": "port",
             "arm": {"R": quantity(0.2, "m"), "gamma": quantity(0.5, "rad")},
         },
-        [("thruster.l.arm: d of the curve one needs a place: give the thruster's position",)],
+        "thruster.l.arm: d of the curve one needs a place: give the thruster's position",
     ),
-    "a thruster without its place": ({"thruster.t.position": GONE}, [("thruster.t.position", "the vehicle has roll")]),
+    "a thruster without its place": ({"thruster.t.position": GONE}, "thruster.t.position … the vehicle has roll"),
     # cross terms
     "a cross term of an axis that is not there": (
         {"axes.pitch": GONE, "body.I_q": GONE, "cross.a_d_wq": GONE},
-        [("cross.m_a_uq: the vehicle has no pitch: remove this key, or add the axis",)],
+        "cross.m_a_uq: the vehicle has no pitch: remove this key, or add the axis",
     ),
     "a cross term in the other order": (
         {"cross.m_a_qu": quantity(0.1, "kg.m")},
-        [("cross.m_a_qu: write m_a_uq, which is the same coefficient",)],
+        "cross.m_a_qu: write m_a_uq, which is the same coefficient",
     ),
     "a cross term of one axis": (
         {"cross.m_a_uu": quantity(1.0, "kg")},
-        [("cross.m_a_uu: there is no such key, only m_a_uq, b_d_uq, a_d_uq and Y_ur", "drag of one axis is in [axes]")],
+        "cross.m_a_uu: there is no such key, only m_a_uq, b_d_uq, a_d_uq and Y_ur … drag of one axis is in [axes]",
     ),
     # the mass matrix
     "an entry of the mass matrix that is too large": (
         {"cross.m_a_uq.value": 3.0},
-        [("cross.m_a_uq.value = 3.0: the entry of the mass matrix for surge and pitch", "within ±3", "but it is 3.24")],
+        "cross.m_a_uq.value = 3.0: the entry of the mass matrix for surge and pitch … within ±3 … but it is 3.24",
     ),
     "a centre of mass too far away": (
         {"body.z_G.value": 0.3},
-        [("cross.m_a_uq.value = -0.1: the entry", "surge and pitch, with that of the centre of mass", "but it is 3.5")],
+        "cross.m_a_uq.value = -0.1: the entry … surge and pitch, with that of the centre of mass … but it is 3.5",
     ),
     "entries of the mass matrix of an endless inertia": (
         {"body.coupling": GONE, "axes.heave.beta": quantity(0.0, "1")},
-        [("axes.heave.beta.value = 0.0: must be at least 0.001 where axes are coupled",)],
+        "axes.heave.beta.value = 0.0: must be at least 0.001 where axes are coupled",
     ),
     # Fossen's notation
     **{
         f"{key} for {wanted}": (
             {f"axes.surge.{key}": quantity(-6.36, "kg")},
-            [(f"axes.surge.{key}: there is no such key; give {wanted}",)],
+            f"axes.surge.{key}: there is no such key; give {wanted}",
         )
         for key, wanted in {
-            "X_udot": "-X_udot, which is positive, as m_a of [axes.surge]",
             "X_uu": "-X_u|u|, which is positive, as a_d of [axes.surge]",
-            "M_udot": "its negative as m_a_uq in [cross]",
             "N_v|v|": "its negative as a_d_rv in [cross]",
         }.items()
     },
     "entries that are too large together": (
         {"cross.m_a_uq.value": 1.7, "cross.m_a_ur": quantity(1.7, "kg.m"), "cross.m_a_qr": quantity(-0.3, "kg.m2")},
-        [("cross: the mass matrix of", "must be positive definite: reduce m_a_uq, m_a_pr, m_a_ur, m_a_qr")],
+        "cross: the mass matrix of … must be positive definite: reduce m_a_uq, m_a_pr, m_a_ur, m_a_qr",
     ),
     "a negative added mass": (
         {"axes.surge.m_a.value": -6.36},
-        [("axes.surge.m_a.value = -6.36: must be within 0 ... 1000000 kg; give -X_udot as a positive m_a",)],
+        "axes.surge.m_a.value = -6.36: must be within 0 ... 1000000 kg; give -X_udot as a positive m_a",
     ),
 }
 
@@ -298,27 +260,21 @@ CASES = [(TEXT, case) for case in MISTAKES.items()] + [(SIX, case) for case in M
 
 @pytest.mark.parametrize(("text", "case"), CASES, ids=[name for _, (name, _) in CASES])
 def test_each_mistake_is_one_clear_line(
-    text: str, case: tuple[str, tuple[dict[str, Any], list[tuple[str, ...]]]], tmp_path: Path
+    text: str, case: tuple[str, tuple[dict[str, Any], str]], tmp_path: Path
 ) -> None:
     changes, wanted = case[1]
     path = tmp_path / "rov.toml"
     path.write_text(changed(changes, text), encoding="utf-8")
-    lines = refusal(path).splitlines()
-    assert len(lines) == len(wanted), lines
-    for line, words in zip(lines, wanted, strict=True):
-        assert line.startswith(f"{path}: {words[0]}")
-        for word in words:
-            assert word in line
+    for line, words in zip(refusal(path).splitlines(), wanted.splitlines(), strict=True):
+        assert line.startswith(f"{path}: {words.split(' … ')[0]}")
+        assert all(word in line for word in words.split(" … ")), line
 
 
 # ---- Valid vehicles --------------------------------------------------------------------------------------------------
 
 VALID: dict[str, dict[str, Any]] = {
     "as it is": {},
-    "an input for each thruster": {"inputs": GONE},
     "an axis that does not accelerate by itself": {"axes.heave.beta": quantity(0.0, "1")},
-    "a dead band for both directions": {"curves.frame.c_0_reverse": GONE},
-    "without yaw": {**_NO_BOOST, "axes.yaw": GONE, "body.I_r": GONE},
     "only heave": {
         **_NO_BOOST,
         "axes.surge": GONE,
@@ -378,15 +334,6 @@ def test_numbers_that_are_probably_wrong_give_a_warning(case: str, tmp_path: Pat
     with pytest.warns(UserWarning, match=re.escape(f"{path}: {words}")) as caught:
         load_vehicle(path)
     assert len(caught) == 1
-
-
-def test_roll_and_pitch_need_no_thruster(tmp_path: Path) -> None:
-    path = tmp_path / "rov.toml"
-    places = {f"thruster.{name}.position.value": [-0.2, y, 0.0] for name, y in (("l", -0.1), ("r", 0.1), ("s", 0.0))}
-    path.write_text(changed(places, SIX), encoding="utf-8")
-    layout = load_vehicle(path).layout
-    assert not layout.drivers(AXES["roll"])
-    assert not layout.signs(AXES["roll"])
 
 
 def test_a_coefficient_that_makes_the_mass_matrix_indefinite_cannot_be_set() -> None:

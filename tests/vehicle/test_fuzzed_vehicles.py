@@ -16,8 +16,9 @@ from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import BARE, REFIT
+from tests.commands import REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
+from tests.often import often
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING
 
@@ -70,9 +71,7 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=True)
 
 
-@pytest.mark.parametrize(
-    "examples", [15, pytest.param(100, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
-)
+@often("examples", 15, 100, 1000)
 def test_any_file_is_a_usable_vehicle_or_one_clear_line(examples: int, path: Path) -> None:
     usable = 0
 
@@ -96,9 +95,7 @@ def test_any_file_is_a_usable_vehicle_or_one_clear_line(examples: int, path: Pat
     assert usable > examples / 20, "the changes must leave some files as good as they were"
 
 
-@pytest.mark.parametrize(
-    "examples", [10, pytest.param(40, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
-)
+@often("examples", 10, 40, 300)
 def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
     tuned = 0
 
@@ -125,9 +122,7 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
     assert tuned > examples / 20, "the changes must leave some files as good as they were"
 
 
-@pytest.mark.parametrize(
-    "examples", [5, pytest.param(40, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
-)
+@often("examples", 5, 40, 300)
 def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path: Path) -> None:
     written = path.with_name("written.toml")
 
@@ -151,9 +146,7 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize(
-    "examples", [3, pytest.param(20, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
-)
+@often("examples", 3, 20, 100)
 def test_every_command_prints_the_same_lines_and_writes_nothing(
     examples: int, path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -191,10 +184,7 @@ RARE: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("arm.R.value", "0xfff")),
     "a key of 3000 parts": (lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'), ("vehicle.name",)),
     "tables in tables": (lambda text: text + "deep = " + "{a=" * 100_000, ("not TOML",)),
-    "a megabyte of one letter": (lambda _: "x" * 10**6, ("not TOML",)),
     "a control character": (_name(r'"Video\u001b[31mRay"'), ("vehicle.name", r"\x1b", "control character")),
-    "a character that XML does not allow": (_name(r'"Video\ufffeRay"'), ("vehicle.name", r"\ufffe")),
-    "a name without end": (_name(f'"{"x" * 1000}"'), ("vehicle.name", "100 characters")),
 }
 
 
@@ -209,13 +199,3 @@ def test_a_rare_mistake_is_one_clear_line(case: str, path: Path) -> None:
     check_refusal(message, path)
     for word in named:
         assert word in message
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("identifier", ["x" * 100, "int", "__init__"])
-def test_any_identifier_makes_an_fmu(identifier: str, path: Path) -> None:
-    text = BARE.read_text(encoding="utf-8")
-    path.write_text(text.replace('identifier = "bare"', f'identifier = "{identifier}"'), encoding="utf-8")
-    fmu = path.with_name("out.fmu")
-    assert main(["build", str(path), "-o", str(fmu), "--platform", "host"]) == 0
-    assert read_model_description(str(fmu)).modelName == identifier

@@ -37,18 +37,13 @@ def test_the_bounds_of_a_coefficient_are_included_and_told(unit: str, shown: str
     ("key", "hint"),
     {
         "I_x": "; write I_p in [body]",
-        "Izz": "; write I_r in [body]",
-        "X_udot": "; give -X_udot, which is positive, as m_a of [axes.surge]",
         "Zdotw": "; give -Z_wdot, which is positive, as m_a of [axes.heave]",
         "N_r|r|": "; give -N_r|r|, which is positive, as a_d of [axes.yaw]",
-        "K_|p|p": "; give -K_p|p|, which is positive, as a_d of [axes.roll]",
         "Xuu": "; give -X_u|u|, which is positive, as a_d of [axes.surge]",
         "M_q": "; give -M_q, which is positive, as b_d of [axes.pitch]",
         "Y_rdot": "; give its negative as m_a_vr in [cross]",
-        "N_vdot": "; give its negative as m_a_vr in [cross]",
         "N_v|v|": "; give its negative as a_d_rv in [cross]",
         "Y_r": "; give its negative as b_d_vr in [cross]",
-        "Y_|u|r": "",
         "Q_u": "",
     }.items(),
 )

@@ -1,11 +1,9 @@
 """Tables 6–8: V_ss and Tau from trajectories of the FMU against closed form, printed and measured values."""
 
-import re
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
-from itertools import product
 from math import e, isclose
 from pathlib import Path
 
@@ -13,10 +11,9 @@ import pytest
 from scipy.optimize import brentq
 
 from rov_fmu.cli import main
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ALONE
 from tests.fmi import OK
 from tests.fmi2 import Fmu
@@ -148,39 +145,6 @@ def test_files_hold_the_printed_cells(tables: Mapping[str, ResponseTable]) -> No
 # ---- rov-fmu tables -------------------------------------------------------------------------------------
 
 
-def test_command_prints_the_tables_side_by_side(
-    tables: Mapping[str, ResponseTable], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    assert main(["tables"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    assert max(map(len, out.splitlines()[4:-4])) <= 80, "the tables; paragraphs are not wrapped in a pipe"
-    for table in tables.values():
-        block = re.search(
-            rf"^Table {table.number}\. {table.axis.name.capitalize()}.*?(?=^Table |^non-linear:)", out, re.M | re.S
-        )
-        assert block
-        lines = iter(line.split() for line in block[0].splitlines() if re.match(r"\d+ %", line))
-        for quantity, row in product(("V_ss", "Tau"), table.rows):
-            words = next(lines)
-            assert words[0] == str(row.command)
-            cells = [getattr(getattr(row, model), quantity) for model in MODELS]
-            assert [words[3], words[6]] == [f"{cell.computed:.4f}" for cell in cells]
-            assert [words[2], words[5]] == [str(cell.printed or "-") for cell in cells]
-            assert words[8] == str(cells[0].measured or "-")
-            for word, deviation in ((words[4], cells[0].from_printed), (words[9], cells[1].from_measured)):
-                assert word.rstrip("*") == ("-" if deviation is None else f"{deviation:+.1%}")
-        assert next(lines, None) is None
-
-
-def test_tables_are_of_the_axes_of_the_paper(vehicle: Vehicle) -> None:
-    axes = tuple(one for one in vehicle.layout.axes if one.axis.name != "heave")
-    without_heave = replace(vehicle, layout=replace(vehicle.layout, axes=axes))
-    with pytest.raises(DataFileError, match="VideoRay Pro 4: Tables 6-8 are of surge, heave and yaw, it has no heave"):
-        load_tables(without_heave)
-
-
 def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "bare.toml"
     path.write_text(ALONE, encoding="utf-8")
@@ -193,13 +157,10 @@ def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 HEAVE, YAW, SURGE_STEADY = "table6_heave_response.csv", "table7_yaw_response.csv", "table4_surge_steady.csv"
 # The file, the text to replace, its replacement, and what the one line must contain.
-BAD_TABLES: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
-    "text for a number": (HEAVE, "1.76", "slow", ("line 2", "'non-linear Tau [s]'", "'slow'", "number")),
-    "negative velocity": (SURGE_STEADY, "0.31", "-0.31", ("line 2", "'forward [m/s]'", "= -0.31", "negative")),
-    "negative command": (HEAVE, "\n20,", "\n-20,", ("line 2", "'command [%]'", "= -20", "above 0")),
-    "command twice": (HEAVE, "\n30,", "\n20.0,", ("line 3", "'command [%]'", "= 20.0", "above")),
-    "other unit": (SURGE_STEADY, "m/s", "knot", ("line 1", "column 2", "'forward [knot]'", "'forward [m/s]'")),
-    "column too many": (SURGE_STEADY, "[m/s]", "[m/s],backward [m/s]", ("line 1", "column 3", "'backward [m/s]'")),
+BAD_TABLES: dict[str, tuple[str, str, str, str]] = {
+    "text for a number": (HEAVE, "1.76", "slow", "line 2 … 'non-linear Tau [s]' … 'slow' … number"),
+    "negative velocity": (SURGE_STEADY, "0.31", "-0.31", "line 2 … 'forward [m/s]' … = -0.31 … negative"),
+    "command twice": (HEAVE, "\n30,", "\n20.0,", "line 3 … 'command [%]' … = 20.0 … above"),
 }
 
 
@@ -211,18 +172,6 @@ def tables_with(tmp_path: Path, name: str, change: Callable[[str], bytes]) -> tu
     return vehicle_file, folder / name
 
 
-def check_refused(vehicle_file: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(DataFileError) as caught:
-        load_tables(load_vehicle(vehicle_file))
-    assert main(["tables", str(vehicle_file)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err == f"rov-fmu: {caught.value}\n"
-    assert len(err.splitlines()) == 1
-    for word in named:
-        assert word in err
-
-
 @pytest.mark.parametrize("case", BAD_TABLES)
 def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name, old, new, named = BAD_TABLES[case]
@@ -232,4 +181,8 @@ def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.C
         return text.replace(old, new, 1).encode()
 
     vehicle_file, table = tables_with(tmp_path, name, change)
-    check_refused(vehicle_file, (str(table), *named), capsys)
+    assert main(["tables", str(vehicle_file)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert all(word in err for word in (str(table), *named.split(" … ")))

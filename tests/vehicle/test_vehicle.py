@@ -80,56 +80,39 @@ def value(name: str, text: str) -> Callable[[str], str]:
 
 
 # How the file is changed, and what the one line must contain: the key, the value, what is allowed.
-BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
+BAD_FILES: dict[str, tuple[Callable[[str], str], str]] = {
     "unknown coefficient": (
         edit(r"(?=^R = )", 'mass = { value = 6.57, unit = "kg", source = "" }\n'),
-        ("arm.mass: there is no such key, only R, gamma",),
+        "arm.mass: there is no such key, only R, gamma",
     ),
-    "missing coefficient": (edit(r"^m_rov = .*$", ""), ("body.m_rov", "missing")),
     "number without unit and source": (
         edit(r"^R = .*$", "R = 0.22"),
-        ('arm.R = 0.22: must be { value = ..., unit = "m", source = ... }',),
+        'arm.R = 0.22: must be { value = ..., unit = "m", source = ... }',
     ),
-    "text for a number": (value("m_rov", '"heavy"'), ("body.m_rov.value", "'heavy'", "number")),
-    "negative mass": (value("m_rov", "-6.57"), ("body.m_rov", "-6.57", "0.001")),
-    "gamma in degrees": (value("gamma", "24.2"), ("arm.gamma", "24.2", "1.57")),
-    "infinity": (value("b_t", "inf"), ("curves.rear.b_t.value", "inf", "finite")),
-    "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("body.m_rov", "'lb'", "'kg'")),
+    "gamma in degrees": (value("gamma", "24.2"), "arm.gamma … 24.2 … 1.57"),
+    "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), "body.m_rov … 'lb' … 'kg'"),
     **{
         f"identifier {name}, which Windows reserves": (
             edit(r"^identifier = .*$", f'identifier = "{name}"'),
-            (f"vehicle.identifier = '{name}': must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0",),
+            f"vehicle.identifier = '{name}': must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0",
         )
-        for name in ("CON", "con", "Prn", "aux", "nUL", "COM0", "com1", "Lpt9")
+        for name in ("CON", "Prn", "com1")
     },
-    "blank name": (edit(r"^name = .*$", 'name = " "'), ("vehicle.name = ' ': must not be blank",)),
-    "commands in percent": (edit(r"^command_max = .*$", "command_max = 70.0"), ("validity.command_max", "70.0")),
-    "a list in a list in a list": (lambda text: text + "deep = " + "[" * 5000, ("not TOML",)),
-    "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), ("vehicle.data", "'nowhere'", "no such folder")),
-    "a decimal comma": (value("m_rov", "6,57"), ("not TOML", "(a number needs a decimal point)")),
-    "not TOML": (edit(r"^\[body\]$", "[body"), ("not TOML", "line ", ": [body")),
-    "no format": (edit("^format = 2$", ""), ("format: this key is missing: write format = 2",)),
+    "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), "vehicle.data … 'nowhere' … no such folder"),
+    "a decimal comma": (value("m_rov", "6,57"), "not TOML … (a number needs a decimal point)"),
+    "not TOML": (edit(r"^\[body\]$", "[body"), "not TOML … line  … : [body"),
+    "no format": (edit("^format = 2$", ""), "format: this key is missing: write format = 2"),
     "a number in a list of texts": (
         edit(r"^limits = \[", "limits = [3, "),
-        ("validity.limits = [3, ", "entry 1 must be text in quotes"),
+        "validity.limits = [3,  … entry 1 must be text in quotes",
     ),
-    "missing section": (
-        lambda text: text.split("[validity]")[0] + "[body]" + text.split("[body]")[1],
-        ("validity", "missing"),
-    ),
-    "an unknown table": (edit(r"^\[body\]$", "[bodyy]"), ("bodyy: there is no such key; did you mean body?",)),
-    "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
+    "another format": (edit("^format = 2$", "format = 3"), "format = 3 … must be 2"),
     "no range of commands": (
         edit(r"^command_max = .*$", "command_max = 0.2"),
-        ("validity.command_min", "0.2", "less than", "command_max"),
+        "validity.command_min … 0.2 … less than … command_max",
     ),
-    "missing unit": (
-        edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""),
-        ('arm.R.unit: this key is missing: write unit = "m"',),
-    ),
-    "identifier with a digit first": (edit(r"^identifier = .*$", 'identifier = "4pro"'), ("identifier", "'4pro'")),
-    "integer larger than a double": (value("b_t", "1" + 400 * "0"), ("curves.rear.b_t", "at most 308 digits")),
-    "an interval without ends": (value("m_rov", "6.57, interval = []"), ("m_rov.interval = []: must have 2 entries",)),
+    "integer larger than a double": (value("b_t", "1" + 400 * "0"), "curves.rear.b_t … at most 308 digits"),
+    "an interval without ends": (value("m_rov", "6.57, interval = []"), "m_rov.interval = []: must have 2 entries"),
 }
 
 
@@ -187,9 +170,9 @@ def test_only_files_that_are_read_are_inputs(
         assert f"would overwrite {target}" in capsys.readouterr().err
 
 
-def check_line(line: str, path: Path, named: tuple[str, ...]) -> None:
+def check_line(line: str, path: Path, named: str) -> None:
     assert len(line.splitlines()) == 1
-    for word in (str(path), *named):
+    for word in (str(path), *named.split(" … ")):
         assert word in line
 
 

@@ -1,6 +1,6 @@
 """The attitude in formulas: angles, quaternion and rotation matrix (rov_fmu/equation/attitude.py)."""
 
-from math import cos, inf, isnan, nan, pi, sin, tau
+from math import cos, pi, sin
 
 import pytest
 
@@ -8,13 +8,11 @@ from rov_fmu.equation.attitude import (
     QUATERNION,
     angle_formulas,
     quaternion_formulas,
-    quaternion_rates,
     rotation_formulas,
     start_angle_formulas,
     start_formulas,
 )
-from rov_fmu.equation.expression import compiled, of
-from rov_fmu.equation.step import unwrapped
+from rov_fmu.equation.expression import compiled
 
 ENTRIES = [f"R_{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
 ATTITUDES = {
@@ -56,30 +54,3 @@ def test_angles_become_a_quaternion_a_matrix_and_angles_again(angles: tuple[floa
         old = {name: sign * q[name] for name in QUATERNION}
         back = compiled(quaternion_formulas())({**R, **old})
         assert [back[f"next_{name}"] for name in QUATERNION] == pytest.approx([*old.values()], abs=1e-15)
-
-
-def test_the_quaternion_turns_by_half_its_product_with_the_rates() -> None:
-    q, rates = dict(zip(QUATERNION, (0.5, 0.1, -0.7, 0.3), strict=True)), {"p": 2.0, "q": 3.0, "r": 5.0}
-    found = compiled({f"der_{name}": rate for name, rate in quaternion_rates(frozenset("pqr")).items()})({**q, **rates})
-    assert [found[f"der_{name}"] for name in QUATERNION] == pytest.approx(
-        [
-            0.5 * (-0.1 * 2.0 + 0.7 * 3.0 - 0.3 * 5.0),
-            0.5 * (0.5 * 2.0 - 0.7 * 5.0 - 0.3 * 3.0),
-            0.5 * (0.5 * 3.0 + 0.3 * 2.0 - 0.1 * 5.0),
-            0.5 * (0.5 * 5.0 + 0.1 * 3.0 + 0.7 * 2.0),
-        ],
-        rel=1e-15,
-    )
-    assert quaternion_rates(frozenset("uvw")) == dict.fromkeys(QUATERNION, of(0.0))
-
-
-@pytest.mark.parametrize(
-    ("angle", "near", "expected"),
-    [(0.1, 0.0, 0.1), (0.1, 3.0, 0.1), (0.1, 3.5, 0.1 + tau), (-3.0, 3.0, -3.0 + tau), (3.0, -20.0, 3.0 - 4.0 * tau)],
-)
-def test_an_angle_is_unwrapped_to_the_nearest(angle: float, near: float, expected: float) -> None:
-    assert unwrapped(angle, near) == pytest.approx(expected, rel=1e-15)
-
-
-def test_an_angle_beyond_all_numbers_is_none() -> None:
-    assert all(isnan(unwrapped(*pair)) for pair in ((nan, 0.0), (0.0, inf), (inf, 0.0)))

@@ -1,13 +1,7 @@
 """The declarations of a vehicle's variables (rov_fmu/equation/catalogue.py and layout.py)."""
 
-import re
-from dataclasses import replace
-from math import inf, sin
+from math import sin
 
-import pytest
-
-import rov_fmu
-from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import (
     AXES,
     HEAVE,
@@ -16,64 +10,9 @@ from rov_fmu.equation.catalogue import (
     SURGE,
     SWAY,
     YAW,
-    cross_declaration,
-    cross_name,
-    cross_of,
 )
-from rov_fmu.equation.layout import Curve, Layout, Thruster, ThrustTable, VehicleAxis, arm, effect_along
-from rov_fmu.fmu.variables import variables
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.equation.layout import arm, effect_along
 from tests.vehicles import SIX, VIDEORAY, fin, thruster
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_only_the_vehicle_of_the_paper_cites_the_paper(name: str) -> None:
-    described = [v.description for v in variables(rov_fmu.load(name))]
-    assert all(re.findall(r"(?<=, )\(\d+\w?\)", text) == [] for text in described)
-    with_number = [text for text in described if re.search(r"equations? \(\d", text)]
-    assert all("of Enevoldsen et al. 2018" in text for text in with_number)
-    assert bool(with_number) == name.startswith("videoray")
-    assert any("Enevoldsen" in text for text in described) == name.startswith("videoray")
-
-
-def test_angles_are_shown_in_degrees_and_only_shares_in_percent() -> None:
-    shown = {v.name: v.display_unit for v in variables(SIX)}
-    expected: dict[str, str | None] = dict.fromkeys(("phi", "theta", "psi", "phi_0", "theta_0", "psi_0"), "deg")
-    expected |= dict.fromkeys((*QUATERNION, "alpha_u", "c_0_t200", "x", "X_ext", "F_a", "a_d_u"))
-    expected |= {"u_a": "%", "u": "knot", "V_N": "knot", "r": "deg/s", "der(x)": "knot"}
-    assert {name: shown[name] for name in expected} == expected
-    (late,) = (v for v in variables(_with_dead_time()) if v.name == "delayed_u_a")
-    assert (late.unit, late.display_unit) == ("1", "%")
-
-
-def _with_dead_time() -> Vehicle:
-    """Return the vehicle SIX with a dead time."""
-    return Vehicle(replace(SIX.layout, has_dead_time=True), {**SIX.coefficients, "T_d": 0.1})
-
-
-CROSS = {
-    "m_a_uv": ("kg", "Added mass m_a of surge and sway"),
-    "m_a_uq": ("kg.m", "Added mass m_a of surge and pitch"),
-    "m_a_pq": ("kg.m2", "Added mass m_a of roll and pitch"),
-    "b_d_qw": ("N.m.s/m", "Linear damping b_d in pitch by heave"),
-    "b_d_vp": ("N.s/rad", "Linear damping b_d in sway by roll"),
-    "a_d_pv": ("N.m.s2/m2", "Quadratic damping a_d in roll by sway"),
-    "Y_ur": ("N.s2/(m.rad)", "Lift in sway by surge and yaw"),
-    "M_uw": ("N.m.s2/m2", "Lift in pitch by surge and heave"),
-    "X_pq": ("N.s2/rad2", "Lift in surge by roll and pitch"),
-}
-
-
-@pytest.mark.parametrize("name", CROSS)
-def test_a_coefficient_of_several_axes_is_declared_by_its_name(name: str) -> None:
-    row = cross_of(name)
-    assert row
-    declared = cross_declaration(*row)
-    assert (declared.unit, declared.description) == CROSS[name]
-    assert (declared.minimum, declared.maximum) == (-1e6, 1e6)
-    assert cross_name(*row) == name
-
 
 # ---- Effects and commands ----
 
@@ -92,56 +31,6 @@ def test_a_force_acts_along_its_parts_and_about_the_axes_beside_it() -> None:
     assert arm(2.0, 0.5) == 2.0 * sin(0.5)
 
 
-def _layout(*thrusters: Thruster, mix: dict[str, dict[str, float]] | None = None) -> Layout:
-    return Layout((VehicleAxis(SURGE), VehicleAxis(YAW)), (Curve("c"),), thrusters, mix or {})
-
-
-PAIR = (thruster("l", "c", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)), thruster("r", "c", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)))
-
-
-def test_commands_that_drive_an_axis_have_the_sign_of_their_effect() -> None:
-    own = _layout(*PAIR)
-    assert (own.signs(SURGE), own.signs(YAW)) == ({"u_l": 1.0, "u_r": 1.0}, {"u_l": 1.0, "u_r": -1.0})
-    mixed = _layout(*PAIR, mix={"a": {"l": 0.5, "r": 0.5}, "b": {"l": 1.0, "r": -1.0}, "c": {"l": 0.0, "r": -1.0}})
-    assert mixed.gains["l"] == {"u_a": 0.5, "u_b": 1.0}
-    assert mixed.signs(SURGE) == {"u_a": 1.0, "u_c": -1.0}
-    assert mixed.driving(YAW, 0.5) == {"u_b": 0.5, "u_c": 0.5}
-    assert mixed.commands["u_a"].description == "Command u_a of thrusters l and r; saturates at ±1"
-
-
-@pytest.mark.parametrize(
-    ("pulse", "fraction"), [(1000.0, -1.0), (1200.0, -0.5), (1400.0, 0.0), (1650.0, 0.5), (1900.0, 1.0)]
-)
-def test_a_pulse_width_stands_for_a_fraction_on_each_side_of_neutral(pulse: float, fraction: float) -> None:
-    layout = replace(_layout(*PAIR), pulse=(1000.0, 1400.0, 1900.0))
-    assert layout.command_of(fraction) == pulse
-    assert layout.fraction_of(pulse) == fraction
-    assert (layout.fraction_of(900.0), layout.fraction_of(2000.0)) == (-1.0, 1.0)
-    assert _layout(*PAIR).command_of(fraction) == _layout(*PAIR).fraction_of(fraction) == fraction
-    declared = layout.commands["u_l"]
-    assert (declared.unit, declared.minimum, declared.maximum, declared.start) == ("us", 1000.0, 1900.0, 1400.0)
-    assert layout.usual_inputs["u_l"] == declared.nominal == 1400.0
-
-
-def test_a_voltage_is_bounded_by_the_tables_and_otherwise_only_below() -> None:
-    tables = tuple(ThrustTable("t", (-1.0, 1.0), (-1.0, 1.0), (1.0, 1.0), voltage) for voltage in (12.0, 14.0, 16.0))
-    with_tables = replace(_layout(*PAIR), curves=(Curve("c", ("k_t",), tables=tables),), voltage=15.0)
-    declared = with_tables.inputs["voltage"]
-    assert (declared.minimum, declared.maximum, declared.nominal, declared.start) == (12.0, 16.0, 10.0, 15.0)
-    without = replace(_layout(*PAIR), voltage=15.0).inputs["voltage"]
-    assert (without.minimum, without.maximum) == (0.0, inf)
-    assert "voltage" not in _layout(*PAIR).inputs
-
-
-def test_a_thrust_table_is_a_cubic_with_the_forces_and_slopes_of_its_points() -> None:
-    """Between -1 and 1 it is c^3 + c, and beyond that a straight line to 2 c + 2."""
-    table = ThrustTable("t", (-1.0, 1.0, 3.0), (-2.0, 2.0, 8.0), (4.0, 4.0, 2.0))
-    for c in (-1.0, -0.5, 0.0, 0.25, 1.0):
-        assert table.force(c) == pytest.approx(c**3 + c, abs=1e-15)
-    assert table.force(3.0) == 8.0
-    assert table.force(2.0) == 5.0 + (4.0 - 2.0) * 2.0 / 8.0  # the mean, and the slopes' difference by an eighth of 2
-
-
 def test_a_layout_is_extended_by_the_names_of_its_further_coefficients() -> None:
     extended = VIDEORAY.layout.extended(["m_a_u", "b_d_r_reverse", "c_0_top", "T_rear"])
     assert {form.axis.name: form.keys for form in extended.axes} == {
@@ -150,5 +39,5 @@ def test_a_layout_is_extended_by_the_names_of_its_further_coefficients() -> None
         "yaw": ("a_d", "b_d", "b_d_reverse"),
     }
     assert [curve.keys for curve in extended.curves] == [("a_t", "b_t", "T"), ("a_t", "b_t", "c_0")]
-    assert (extended.has_arm, _layout(*PAIR).has_arm) == (True, False)
+    assert (extended.has_arm, SIX.layout.has_arm) == (True, False)
     assert [curve.name for curve in VIDEORAY.layout.turning_curves] == ["rear"]

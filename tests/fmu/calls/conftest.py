@@ -12,6 +12,11 @@ Case = TypeVar("Case")
 WRAPPERS: dict[int, type[fmi.Fmu]] = {2: fmi2.Fmu, 3: fmi3.Fmu}
 
 
+def modes_of(version: int) -> list[tuple[int, str]]:
+    """Return the kinds of instances in a version of FMI, each with its modes."""
+    return fmi.EVERY_MODE if version == 2 else fmi3.EVERY_MODE
+
+
 def of_both_versions(two: str, three: str, is_two_long: bool = False) -> Any:
     """Return a fixture: the FMUs of FMI 2.0 and FMI 3.0, loaded for one file of tests, whose folders two others return.
 

@@ -3,16 +3,15 @@
 import ctypes
 from collections.abc import Iterator, Sequence
 from ctypes import c_size_t, c_void_p
+from itertools import product
 from math import inf, nan
 from typing import Any
 
 import pytest
 
-from tests import fmi2
 from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
-    DISCARD,
     ERROR,
     INITIALIZATION,
     INSTANTIATED,
@@ -31,8 +30,8 @@ from tests.fmi import (
     strings,
 )
 from tests.fmi3 import ABSENT, flags
-from tests.fmu.calls.conftest import failures
-from tests.fmu.calls.test_lifecycle import good_arguments, legal_functions, modes_of
+from tests.fmu.calls.conftest import failures, modes_of
+from tests.fmu.calls.test_lifecycle import good_arguments, legal_functions
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
 FOREIGN = ctypes.create_string_buffer(4096)
@@ -157,6 +156,10 @@ def bad_references(fmu: Fmu) -> Iterator[Case]:
         yield CS, STEP, "SetFloat64", (fmu.references(["time"]), 1, room(), 1)
         for n in (0, 2):
             yield CS, STEP, "GetOutputDerivatives", (u, 1, integers(1), room(2), n)
+        yield from (
+            (CS, STEP, f"Get{derivative}Derivative", (u, 1, u, 1, room(), seeds, room(), found))
+            for derivative, (seeds, found) in product(("Directional", "Adjoint"), ((0, 1), (1, 0)))
+        )
 
 
 def test_a_bad_argument_is_an_error_with_one_log_line_and_no_effect(fmu: Fmu) -> None:
@@ -208,18 +211,13 @@ def test_unusual_arguments_of_real_importers_work(fmu: Fmu) -> None:
 
 
 STOPS = [
-    (0.0, 1.0, 0.0, 1.0, OK),
     (0.0, 0.3, 0.2, 0.1, OK),  # 0.30000000000000004
-    (1e6, 1e6 + 0.3, 1e6 + 0.2, 0.1, OK),
     (0.0, 1.0, 0.9, 0.1 + 1.0e-9, OK),
     (0.0, 1.0, 0.9, 0.1 + 1.2e-9, ERROR),
-    (0.0, 1e-6, 9e-7, 1.0e-7 + 0.9e-15, OK),
     (0.0, 1e-6, 9e-7, 1.0e-7 + 1.2e-15, ERROR),
-    (0.0, 1.0, 1.0, 1e-6, ERROR),
     (0.0, 1e6, 1e6, 1e-2, ERROR),  # within 1e-9 of the stop time, but a whole step
     (0.0, 1e6, 1e6 - 0.9e-3, 1e-3, OK),
     (0.0, 1e6, 1e6 - 0.4e-3, 1e-3, ERROR),
-    (-2.0, -1.0, -1.1, 0.1 + 1.0e-9, OK),
     (-2.0, -1.0, -1.1, 0.1 + 1.2e-9, ERROR),
     (0.0, 0.0, 0.0, 1e-6, ERROR),
     (0.0, inf, 1e300, 1.0, OK),
@@ -244,11 +242,7 @@ def test_a_step_past_the_stop_time_is_refused_up_to_rounding(
 JUMPS: list[tuple[float, list[tuple[float, float, bool]]]] = [
     (0.0, [(0.1, 0.1, True), (0.2, 0.1, False), (0.5, 0.1, False)]),  # only the first of two jumps gives a warning
     (0.0, [(-1.4e-17, 0.1, False), (0.1, 0.1, False), (0.1, 0.1, True)]),  # repeated
-    (-2.0, [(-2.0, 0.5, False), (-1.0, 0.5, True)]),  # skipped
     (0.0, [(0.0, 0.1, False), (0.1 + 1e-11, 0.1, False)]),
-    (0.0, [(0.0, 0.1, False), (0.1 + 1e-9, 0.1, True)]),
-    (1e6, [(1e6 + 1e-4, 0.1, False)]),
-    (1e6, [(1e6 - 1e-2, 0.1, True)]),
     (1e9, [(1e9 + 1e-7, 1e-6, False)]),
     (1e9, [(1e9 + 1e-6, 1e-6, True)]),  # a whole step is not rounding
 ]
@@ -270,16 +264,3 @@ def test_a_repeated_or_skipped_communication_point_gives_one_warning(
             assert [(m.status, m.category) for m in rov.log] == [(WARNING, "logStatusWarning")] * warned
             rov.log.clear()
             assert rov.get(fmu.outputs) == regular.get(fmu.outputs)
-
-
-def test_status_after_a_step(fmu2: fmi2.Fmu) -> None:
-    time, flag = room(), integers(-7)
-    with fmu2.instance() as rov:
-        rov.start()
-        rov.step(0.0, 0.25)
-        rov.expect("fmi2GetRealStatus", 2, time)
-        rov.expect("fmi2GetBooleanStatus", 3, flag)
-        for function, kind in [("fmi2GetRealStatus", 3), ("fmi2GetBooleanStatus", 2), ("fmi2GetRealStatus", 99)]:
-            rov.expect(function, kind, time if "Real" in function else flag, status=DISCARD)
-        assert (time[0], flag[0]) == (0.25, 0)
-        assert {m.category for m in rov.log} == {"logStatusDiscard"}

@@ -1,7 +1,6 @@
 """The attitude of a vehicle with six axes in the FMU: its parameters, the quaternion, and the count of turns."""
 
 import random
-from collections.abc import Sequence
 from ctypes import c_bool, c_int, pointer
 from math import cos, pi, sin
 
@@ -20,13 +19,11 @@ from tests.fmi import (
     room,
 )
 from tests.fmu.calls.conftest import of_both_versions
-from tests.fmu.calls.test_derivatives import check_slopes
-from tests.vehicles import SIX, random_inputs, random_quaternion, random_state
+from tests.vehicles import SIX, random_inputs, random_state
 from verification.references.rigid_vehicle import QUATERNION
 
 ANGLES = ("phi", "theta", "psi")
 START = {"phi_0": 0.3, "theta_0": -0.8, "psi_0": 8.0}
-SPIN = {"p": 0.3, "q": -0.2, "r": 4.0}
 
 
 fmu = of_both_versions("six_dir", "six3_dir", is_two_long=True)
@@ -90,25 +87,6 @@ def test_a_quaternion_before_the_start_is_a_guess_that_the_angles_replace(fmu: F
                 instance.log.clear()
 
 
-def spins(rov: AnyInstance, steps: Sequence[int]) -> bytes:
-    return rov.trajectory(range(*steps), 0.4, lambda n: {"N_ext": 20.0, "M_ext": 0.3 * (-1.0) ** n})
-
-
-def test_a_saved_state_continues_with_the_same_bits_and_turns(fmu: Fmu) -> None:
-    with fmu.instance() as rov, fmu.instance() as another:
-        rov.start(START | SPIN)
-        spins(rov, (0, 20))
-        saved, turned = rov.save(), rov.get(["psi"])[0]
-        assert turned - 8.0 > 4.0 * pi
-        rest = spins(rov, (20, 30))
-        another.load(saved)
-        assert another.get(["psi"]) == [turned]
-        assert another.save() == saved
-        assert spins(another, (20, 30)) == rest
-        rov.load(saved)
-        assert spins(rov, (20, 30)) == rest
-
-
 # ---- Model Exchange ----
 
 
@@ -162,29 +140,3 @@ def test_a_quaternion_of_zero_is_refused(fmu: Fmu) -> None:
 
 
 # ---- Derivatives ----
-
-
-@pytest.mark.parametrize("points", [1, pytest.param(20, marks=pytest.mark.long)])
-def test_directional_derivatives_while_moving_are_the_slopes_of_the_equations(fmu: Fmu, points: int) -> None:
-    rng = random.Random(points)
-    for _ in range(points):
-        motion = random_inputs(rng, SIX) | random_state(rng, SIX) | random_quaternion(rng, rng.uniform(0.5, 2.0))
-        motion |= {
-            name: x if 0.2 < abs(x) < 1.0 else 0.5 for name, x in motion.items() if name in (*fmu.commands, *"uvwpqr")
-        }
-        with fmu.instance(MODEL_EXCHANGE) as rov:
-            rov.start(SIX.coefficients)
-            rov.expect("EnterContinuousTimeMode")
-            rov.set(motion)
-            for known in motion:
-                check_slopes(SIX, rov, {**motion, **SIX.coefficients}, known)
-
-
-def test_a_mass_matrix_that_is_not_positive_definite_is_refused(fmu: Fmu) -> None:
-    with fmu.instance() as rov:
-        rov.set({"m_a_uq": 1e4})
-        rov.initialize()
-        rov.refuse("ExitInitializationMode")
-        assert "the mass matrix of these parameters is not positive definite" in rov.log[-1].text
-        rov.set({"m_a_uq": 0.0})
-        rov.expect("ExitInitializationMode")

@@ -12,7 +12,6 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi3
 from tests.fmi import (
     CO_SIMULATION,
-    EVERY_MODE,
     INITIALIZATION,
     INSTANTIATED,
     MODEL_EXCHANGE,
@@ -23,7 +22,8 @@ from tests.fmi import (
     reals,
     room,
 )
-from tests.fmu.calls.conftest import WRAPPERS
+from tests.fmu.calls.conftest import WRAPPERS, modes_of
+from tests.often import often
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, State, Values, at_rest
 from verification.references.rigid_vehicle import calculated
 
@@ -48,11 +48,6 @@ _SOME = ("videoray_dir", "heavy3_dir", "everything_dir", "six3_dir")
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Return the FMU of the VideoRay, or of a vehicle with lag and coupling, with all effects, or with six axes."""
     return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))
-
-
-@pytest.fixture(scope="module", params=["videoray3_dir", "heavy3_dir", "six3_dir"])
-def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
-    return fmi3.Fmu(request.getfixturevalue(request.param))
 
 
 @pytest.fixture
@@ -86,14 +81,10 @@ def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
     return [motion | random_parameters(fmu, rng) for motion in motions]
 
 
-def bring(rov: AnyInstance, mode: str, point: dict[str, float]) -> None:
-    rov.set(point)
-    rov.reach(mode)
-
-
 def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> AnyInstance:
     rov = fmu.instance(kind)
-    bring(rov, mode, point)
+    rov.set(point)
+    rov.reach(mode)
     return rov
 
 
@@ -124,9 +115,7 @@ def check_slopes(rov: Vehicle, instance: AnyInstance, point: Values, known: str,
         assert d == pytest.approx(expected[name], rel=error, abs=0.01 * error * size), (name, known, side, point)
 
 
-@pytest.mark.parametrize(
-    "number", [1, pytest.param(6, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.weekly)]
-)
+@often("number", 1, 6, 60)
 def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """The knowns are all inputs, states and coefficients; the unknowns are all calculated variables."""
     for point, kind in product(points(fmu, number, seed=1), MODES):
@@ -159,57 +148,28 @@ def test_at_a_kink_the_derivative_is_one_sided(fmu: Fmu, rov: Vehicle) -> None:
             check_slopes(rov, instance, kink, known, inside)
 
 
-@pytest.mark.parametrize(
-    ("kind", "mode"), [c for c in EVERY_MODE if c[1] not in (INSTANTIATED, INITIALIZATION)], ids=str
-)
-def test_directional_derivatives_are_the_same_in_every_mode(fmu: Fmu, kind: int, mode: str) -> None:
-    unknowns = fmu.outputs + fmu.derivatives
-    for point in points(fmu, 5, seed=2):
-        with at_point(fmu, kind, INITIALIZATION, point) as rov, at_point(fmu, kind, mode, point) as later:
-            for known in fmu.inputs + given(fmu):
-                assert later.derivatives(unknowns, known) == rov.derivatives(unknowns, known)
-
-
-# ---- Adjoint derivatives ----
-
-
-@pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
-def test_adjoint_derivatives_agree_with_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
-    """(v J) u = v (J u) for the knowns of the mode."""
-    rng = random.Random(4)
-    unknowns = fmu3.outputs + fmu3.derivatives
-    for point in points(fmu3, 5, seed=2):
-        known = list(point) if mode == INITIALIZATION else fmu3.inputs + fmu3.states
-        u, v = ({name: rng.uniform(-1.0, 1.0) for name in names} for names in (known, unknowns))
-        with fmu3.instance(kind) as rov:
-            bring(rov, mode, point)
-            change, row = rov.derivatives(unknowns, u), rov.adjoint(unknowns, known, list(v.values()))
-            terms = [a * b for a, b in zip(v.values(), change, strict=True)]
-            combined = sum(a * b for a, b in zip(row, u.values(), strict=True))
-            assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
-
-
-@pytest.mark.parametrize("function", ["fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"])
-def test_the_numbers_of_seeds_and_sensitivities_must_match_the_variables(fmu3: fmi3.Fmu, function: str) -> None:
-    of, n_seed = fmu3.references, 2 if "Directional" in function else 3
-    arguments = (of(["u", "der(u)", "r"]), 3, of(["r", "u"]), 2)
-    with fmu3.instance() as rov:
-        rov.start({"u": 0.5, "r": 0.2})
-        for seeds, sensitivities in [(n_seed - 1, 5 - n_seed), (n_seed, 4 - n_seed), (0, 0)]:
-            found = room(5 - n_seed)
-            rov.refuse(function, *arguments, reals(1.0, 2.0, 3.0), seeds, found, sensitivities)
-            assert list(found) == list(room(5 - n_seed))
-            assert f"it takes {n_seed} and {5 - n_seed}" in rov.log[-1].text
-        rov.expect(function, *arguments, reals(1.0, 2.0, 3.0), n_seed, found, 5 - n_seed)
-        by_r, by_u = (rov.derivatives(["der(u)"], known)[0] for known in ("r", "u"))
-        expected = [2.0, by_r + 2.0 * by_u, 1.0] if n_seed == 2 else [2.0 * by_r + 3.0, 1.0 + 2.0 * by_u]
-        assert list(found) == pytest.approx(expected, rel=1e-13)
+def test_derivatives_are_the_same_in_every_mode_and_the_adjoint_ones_agree_with_them(fmu: Fmu) -> None:
+    """(v J) u = v (J u) for random u and v. In Initialization Mode the coefficients are knowns, too."""
+    rng, unknowns = random.Random(4), fmu.outputs + fmu.derivatives
+    for point, (kind, mode) in product(points(fmu, 2, seed=2), modes_of(fmu.VERSION)):
+        if mode == INSTANTIATED:
+            continue
+        with at_point(fmu, kind, INITIALIZATION, point) as first, at_point(fmu, kind, mode, point) as rov:
+            for name in fmu.inputs + given(fmu):
+                assert rov.derivatives(unknowns, name) == first.derivatives(unknowns, name)
+            if isinstance(rov, fmi3.Instance):
+                known = list(point) if mode == INITIALIZATION else fmu.inputs + fmu.states
+                u, v = ({name: rng.uniform(-1.0, 1.0) for name in names} for names in (known, unknowns))
+                row = rov.adjoint(unknowns, known, list(v.values()))
+                terms = [a * b for a, b in zip(v.values(), rov.derivatives(unknowns, u), strict=True)]
+                combined = sum(a * b for a, b in zip(row, u.values(), strict=True))
+                assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
 
 
 # ---- Derivatives by time ----
 
 
-@pytest.mark.parametrize("number", [8, pytest.param(300, marks=pytest.mark.weekly)])
+@often("number", 2, 8, 300)
 def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """By the chain rule, with the inputs held. Every fourth point is at rest."""
     for n, point in enumerate(points(fmu, number, seed=7)):
@@ -229,10 +189,9 @@ def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, n
             assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
 
 
-@pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])
-def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu, mode: str) -> None:
+def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu) -> None:
     n = len(fmu.states)
-    for point in points(fmu, 5, seed=8):
+    for point, mode in product(points(fmu, 3, seed=8), MODES[MODEL_EXCHANGE][1:]):
         with at_point(fmu, MODEL_EXCHANGE, mode, point) as rov:
             derivatives, states = room(n), room(n)
             rov.expect("GetContinuousStateDerivatives", derivatives, n)

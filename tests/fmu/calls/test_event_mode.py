@@ -58,17 +58,3 @@ def test_parameters_can_be_tuned_between_steps_with_a_warning_if_event_mode_is_u
         assert [(m.status, m.text.split()[:2]) for m in rov.log] == [(WARNING, ["fmi3SetFloat64:", "beta_u"])] * (
             kind == WITH_EVENTS
         )
-
-
-@pytest.mark.parametrize("kind", [MODEL_EXCHANGE, CO_SIMULATION])
-def test_the_time_is_a_variable(fmu3: Fmu, kind: int) -> None:
-    assert fmu3.variables["time"].causality == "independent"
-    with fmu3.instance(kind) as rov:
-        assert rov.time() == 0.0
-        rov.start(at=2.5)
-        assert rov.get(["u", "time", "der(u)"]) == [0.0, 2.5, 0.0]
-        if kind == MODEL_EXCHANGE:
-            rov.expect("SetTime", 2.75)
-        else:
-            rov.step(2.5, 0.25)
-        assert rov.time() == 2.75

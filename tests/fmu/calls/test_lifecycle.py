@@ -39,14 +39,8 @@ from tests.fmi import (
 )
 from tests.fmi2 import LAST_SUCCESSFUL_TIME, TERMINATED_STATUS
 from tests.fmi3 import ABSENT, flags
-from tests.fmu.calls.conftest import WRAPPERS, failures
+from tests.fmu.calls.conftest import WRAPPERS, failures, modes_of
 from verification.references import legal
-
-
-def modes_of(version: int) -> list[tuple[int, str]]:
-    """Return the kinds of instances in a version of FMI, each with its modes."""
-    return EVERY_MODE if version == 2 else fmi3.EVERY_MODE
-
 
 in_every_mode = pytest.mark.parametrize(
     ("version", "kind", "mode"),
@@ -267,65 +261,12 @@ def test_a_variable_can_be_read_in_every_mode_and_set_in_those_of_its_causality_
             inside(rov, mode, act)
 
 
-@pytest.mark.parametrize("kind", MODES)
-def test_calculated_variables_can_be_read_right_after_instantiation(fmu: Fmu, kind: int) -> None:
-    calculated = [name for name in fmu.outputs + fmu.derivatives if name not in fmu.states]
-    values = {"u_l": 0.5, "u_t": -0.25, "u": 0.4, "r": -0.2, "psi": 1.0, "beta_u": 0.5, "m_rov": 9.0}
-    with fmu.instance(kind) as rov:
-        assert rov.get(calculated) == [0.0] * len(calculated)  # at rest, nothing pushes
-        rov.set(values)
-        early = rov.get(calculated)
-        rov.start(values)
-        assert rov.get(calculated) == early
-        assert {name for name, value in zip(calculated, early, strict=True) if value == 0.0} == {"F_r", "der(z)"}
-
-
 def _warnings(rov: AnyInstance) -> list[str]:
     """Return the texts of the messages about more than events, all of which are warnings, and clear the log."""
     messages = [m for m in rov.log if m.category != "logEvents"]
     assert {(m.status, m.category) for m in messages} <= {(WARNING, "logStatusWarning")}
     rov.log.clear()
     return [m.text for m in messages]
-
-
-def test_a_call_against_the_standard_works_with_one_warning_that_a_reset_allows_again(fmu: Fmu) -> None:
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        for _ in range(2):
-            rov.refuse("GetFloat64", references(max(fmu.vr.values()) + 1), 1, *fmu.sized(room()))
-            assert [m.status for m in rov.log] == [ERROR]  # a refused call gives no warning
-            rov.log.clear()
-            for _ in range(3):
-                (start,) = rov.get(["beta_u"])
-            assert len(_warnings(rov)) == 1
-            rov.set({"u_l": 0.5, "u": 0.1})
-            rov.reach(CONTINUOUS)
-            before = rov.get(["der(u)"])
-            for value in (0.5, 0.25):
-                rov.set({"beta_u": value})
-            assert rov.get(["der(u)"])[0] == pytest.approx(before[0] * 0.25 / start)
-            (warning,) = _warnings(rov)
-            assert warning.startswith(f"{fmu.name('SetFloat64')}: beta_u ")
-            rov.expect("EnterEventMode")
-            rov.set({"beta_r": 0.5})
-            assert _warnings(rov) == []
-            rov.expect("Reset")
-            rov.log.clear()
-
-
-def test_a_state_does_not_contain_the_warnings_that_were_given(fmu: Fmu) -> None:
-    with fmu.instance() as rov, fmu.instance() as quiet:
-        new = rov.save()
-        rov.get(["u"])
-        assert rov.save() == new
-        rov.load(new)
-        rov.get(["u"])
-        assert len(_warnings(rov)) == 1
-        quiet.expect("SetDebugLogging", 0, 1, strings(b"logStatusWarning"))
-        quiet.get(["u"])
-        assert quiet.log == []
-        quiet.expect("SetDebugLogging", 1, 1, strings(b"logStatusWarning"))
-        quiet.get(["u"])  # a warning that was not logged has not been given
-        assert len(_warnings(quiet)) == 1
 
 
 @pytest.mark.parametrize(("kind", "mode"), EVERY_MODE)
@@ -431,17 +372,3 @@ def test_a_step_that_overflows_leads_to_error_mode_with_the_state_from_before(fm
         assert rov.mode() == STEP
         rov.step(0.5, 0.5)
         rov.expect("FreeFMUState", ctypes.byref(state))
-
-
-@pytest.mark.parametrize(("logging", "modes"), [(False, 0), (True, 4)])
-def test_without_logging_only_fmi_2_logs_errors_and_neither_logs_modes(fmu: Fmu, logging: bool, modes: int) -> None:
-    with fmu.instance(MODEL_EXCHANGE, logging=logging) as rov:
-        rov.reach(CONTINUOUS)
-        rov.expect("Terminate")
-        assert [(m.status, m.category) for m in rov.log if m.status == OK] == [(OK, "logEvents")] * modes
-        rov.log.clear()
-        for switched_on in (logging or fmu.VERSION == 2, True):
-            rov.refuse("ExitInitializationMode")
-            assert [m.category for m in rov.log] == ["logStatusError"] * switched_on
-            rov.log.clear()
-            rov.expect("SetDebugLogging", True, 1, strings(b"logStatusError"))

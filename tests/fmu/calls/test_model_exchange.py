@@ -1,6 +1,5 @@
 """Model Exchange: an integrator of the importer gives the trajectory of the exact steps, and there are no events."""
 
-from itertools import pairwise
 from math import inf, nan
 
 import fmpy
@@ -65,36 +64,6 @@ def test_cvode_gives_the_trajectory_of_co_simulation_within_its_tolerance(
     # The tolerance holds for one solver step; the errors of all steps add up to some hundred times as much.
     error = np.abs(np.array([result[name] for name in fmu.states]).T - exact)
     assert error.max() < 1000.0 * tolerance
-
-
-def test_event_mode_keeps_the_states_and_takes_inputs_and_tuning(fmu: Fmu) -> None:
-    n = len(fmu.states)
-    states = reals(*(0.25 * i - 0.7 for i in range(n)))
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        rov.reach(CONTINUOUS)
-        rov.expect("SetTime", 1.5)
-        rov.expect("SetContinuousStates", states, n)
-        before, beta = rov.get(["der(w)", "beta_w"])
-        rov.expect("EnterEventMode")
-        assert rov.get(fmu.states) == list(states)
-        rov.set({"u_t": 0.0, "beta_w": 2.0 * beta})
-        rov.update()
-        rov.expect("EnterContinuousTimeMode")
-        assert rov.get(fmu.states) == list(states)
-        assert rov.get(["der(w)"]) == pytest.approx([2.0 * before])
-
-
-def test_a_solver_may_go_back_in_time(fmu: Fmu) -> None:
-    with fmu.instance(MODEL_EXCHANGE) as rov:
-        rov.start(START | {"u_l": 0.4}, stop=1.0)
-        rov.expect("EnterContinuousTimeMode")
-        results, states = [], set()
-        for t in (0.0, 0.5, 0.25, -1e-9):
-            rov.expect("SetTime", t)
-            results.append(rov.get(fmu.derivatives))
-            states.add(rov.save())
-        assert all(a == b for a, b in pairwise(results))  # the model is autonomous
-        assert len(states) == 4  # and the time is part of the state
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])

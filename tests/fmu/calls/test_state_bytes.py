@@ -51,12 +51,9 @@ def test_no_byte_of_a_state_can_be_damaged(fmu: Fmu, serialized: bytes) -> None:
 
 def test_a_state_cut_short_extended_or_foreign_is_refused(fmu: Fmu, serialized: bytes) -> None:
     with fmu.instance() as rov:
-        for length in (0, 1, 8, len(serialized) // 2, len(serialized) - 1):
-            assert_refused(rov, serialized[:length])
-        for more in (b"\0", b"\0" * 8, serialized):
-            assert_refused(rov, serialized + more)
-        n = len(serialized)
-        for foreign in (bytes(n), b"\xff" * n, serialized[::-1], serialized[8:] + serialized[:8]):
+        for cut in (b"", serialized[:8], serialized[:-1], serialized + b"\0", serialized * 2):
+            assert_refused(rov, cut)
+        for foreign in (bytes(len(serialized)), serialized[8:] + serialized[:8]):
             assert_refused(rov, foreign)
             assert_refused(rov, foreign[:-8] + checksum(foreign[:-8]))
         guid = fmu.token
@@ -92,9 +89,9 @@ def test_values_that_no_run_can_reach_are_refused_even_with_the_right_checksum(f
 @pytest.mark.parametrize(
     ("word", "value"),
     [
-        *((0, interface) for interface in (2, 2**32, 2**63)),
-        *((1, mode) for mode in (0, 3, 4, 8, 17, 128, 2**32 + 16)),  # 4 and 8 are modes of Model Exchange
-        *((2, flags) for flags in (0, 2, 4, 2**32 + 1)),  # without an experiment there is no Step Mode
+        *((0, interface) for interface in (2, 2**32)),
+        *((1, mode) for mode in (0, 3, 4, 17, 2**32 + 16)),  # 4 is a mode of Model Exchange
+        *((2, flags) for flags in (0, 2, 4)),  # without an experiment there is no Step Mode
     ],
 )
 def test_a_mode_that_no_run_can_be_in_is_refused(fmu: Fmu, serialized: bytes, word: int, value: int) -> None:

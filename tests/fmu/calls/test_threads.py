@@ -52,23 +52,3 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
     assert counts["calls"] == calls
     assert 0.8 * calls < counts["accepted"] < 0.99 * calls  # refused calls are driven too
     assert counts["messages"] > 0.1 * calls
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("sanitizers", "file", "line", "fault", "report"),
-    [
-        ("thread", "step.c", "pieces = 0;\n    motion m;\n", "pieces = 0;\n    static motion m;\n", "data race"),
-        ("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
-    ],
-    ids=["shared variable", "lost instance"],
-)
-def test_a_shared_variable_or_a_lost_instance_would_be_reported(
-    vehicle: Vehicle, tmp_path: Path, sanitizers: str, file: str, line: str, fault: str, report: str
-) -> None:
-    sources = native_content(vehicle).sources
-    assert sources[file].count(line) == 1
-    faulty = {**sources, file: sources[file].replace(line, fault)}
-    run = run_threads(faulty, tmp_path, sanitizers, 8_000)
-    assert run.code != 0
-    assert report in run.errors

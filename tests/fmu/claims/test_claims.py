@@ -14,7 +14,7 @@ from pythonfmu import FmuBuilder
 
 from rov_fmu.build import build
 from rov_fmu.cli import main
-from rov_fmu.fmu.claims import measures
+from rov_fmu.fmu.claims import claims, measures
 from rov_fmu.fmu.claims.claims import CLAIMS, Proof, prove_claims
 from rov_fmu.fmu.claims.measures import Evidence
 from rov_fmu.fmu.claims.subject import Subject, opened
@@ -24,12 +24,11 @@ from rov_fmu.report.proof_page import proof_page
 from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.references.vehicles import IDENTIFIED
 
+TOOLS = Path(__file__).parents[3] / "verification/interoperability/.tools"
 Texts = Mapping[str, str]
 Capsys = pytest.CaptureFixture[str]
 Measure = Callable[[Subject], Evidence]
-VERSIONS = ["videoray_fmu", pytest.param("videoray3_fmu", marks=pytest.mark.long)]
 
-TOOLS = Path(__file__).parents[3] / "verification/interoperability/.tools"
 
 _SLAVE = """
 import os, random, time
@@ -88,13 +87,20 @@ def proof(videoray_fmu: Path) -> Proof:
     return prove_claims(videoray_fmu)
 
 
-def test_every_claim_that_applies_to_the_videoray_holds(proof: Proof) -> None:
+def test_every_claim_that_applies_to_the_videoray_holds_and_its_page_loads_nothing(proof: Proof) -> None:
     assert [one.result for _, one in proof.evidence] == ["holds"] * 4 + ["measured", "holds", "holds", "not checked"]
     figures = {claim.name: one.figure for claim, one in proof.evidence}
     assert float(figures["Expected results"]) < 1e-10
     assert float(figures["Step size"]) < 1e-14
     assert float(figures["Conservation"]) < 1e-14
     assert (figures["Repeatability"], figures["Limits"]) == ("100 of 100", "8 of 8")
+    page = proof_page(proof)
+    assert "default-src 'none'; style-src 'unsafe-inline'\"" in page
+    assert "<script" not in page
+    assert page.count("<svg") == 3
+    for claim, evidence in proof.evidence:
+        assert claim.sentence in page
+        assert f'<section class="claim {evidence.result.replace(" ", "-")}">' in page
 
 
 QUESTIONS = tomlkit.parse(Path(__file__).with_name("ten_questions.toml").read_text("utf-8")).unwrap()["question"]
@@ -112,26 +118,10 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
             serialization.Encoding.PEM, serialization.PrivateFormat.OpenSSH, serialization.NoEncryption()
         )
     )
-    return build(
-        load_vehicle(folder / "vehicle.toml"), folder / "harbour.fmu", platforms=["host"], sign=folder / "key"
-    ).path
-
-
-@pytest.fixture(scope="module")
-def identified_proof(identified: Path) -> Proof:
-    return prove_claims(identified)
-
-
-@pytest.fixture(scope="module")
-def texts(proof: Proof, identified: Path, identified_proof: Proof, tmp_path_factory: pytest.TempPathFactory) -> Texts:
-    """The words of the pages of the FMUs that the questions are about."""
-    path, vehicle_file = tmp_path_factory.mktemp("altered") / "harbour.fmu", f"{FOLDER}/vehicle/harbour_bluerov2.toml"
-    with zipfile.ZipFile(identified) as old, zipfile.ZipFile(path, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            new.writestr(name, content.replace(b"Harbour", b"Narbour", 1) if name == vehicle_file else content)
-    pages = {"videoray": proof, "identified": identified_proof, "altered": prove_claims(path)}
-    return {name: _text(one) for name, one in pages.items()}
+    vehicle, path = load_vehicle(folder / "vehicle.toml"), folder / "harbour.fmu"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.build.web_module", lambda _: b"")  # no question is about the page that flies
+        return build(vehicle, path, platforms=["host"], sign=folder / "key").path
 
 
 def _text(proof: Proof) -> str:
@@ -142,46 +132,26 @@ def _text(proof: Proof) -> str:
     return " ".join(" ".join(root.xpath("//body//text()")).split())
 
 
-@pytest.mark.parametrize("number", range(10))
-def test_the_page_answers_ten_questions(number: int, texts: Texts) -> None:
-    question = QUESTIONS[number]
-    assert question["answer"]
-    assert question["page"] in texts[question["of"]], question["question"]
-
-
-def test_an_axis_not_to_be_used_is_named_and_the_fmu_is_whole(
-    identified: Path, identified_proof: Proof, tmp_path: Path, capsys: Capsys
-) -> None:
-    """It is what the FMU says of itself. It is no promise, so nothing fails; the terminal and the head say it."""
-    assert [one.result for _, one in identified_proof.evidence] == [
-        *["holds"] * 4,
-        "measured",
-        "holds",
-        "holds",
-        "measured",
-    ]
-    assert identified_proof.evidence[-1][1].figure == "do not use yaw"
-    assert "2 are measured Cost of a step (" in _text(identified_proof)
-    assert "Unseen data (do not use yaw) Expected results" in _text(identified_proof)
-    assert main(["prove", str(identified), "--report", str(tmp_path / "page.html")]) == 0
-    assert re.search(r"unseen data +measured +do not use yaw", capsys.readouterr().out)
-
-
-def test_the_page_is_complete_and_loads_nothing(proof: Proof) -> None:
-    page = proof_page(proof)
-    assert "default-src 'none'; style-src 'unsafe-inline'\"" in page
-    assert "<script" not in page
-    assert page.count("<svg") == 3
-    for claim, evidence in proof.evidence:
-        assert claim.sentence in page
-        assert f'<section class="claim {evidence.result.replace(" ", "-")}">' in page
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_what_is_impossible_is_refused_in_both_versions(version: str, request: pytest.FixtureRequest) -> None:
-    found = measured(measures.limits, request.getfixturevalue(version))
-    assert (found.result, found.figure) == ("holds", "8 of 8")
-    assert [row[1] for row in found.rows] == ["8 of 8", "8 of 8", "20 of 20", "20 of 20", *["1 of 1"] * 4]
+def test_the_page_answers_ten_questions(proof: Proof, identified: Path, tmp_path: Path) -> None:
+    """Of an FMU that must not be used for yaw it says so. That is no promise of the FMU, so nothing fails."""
+    path, vehicle_file = tmp_path / "harbour.fmu", f"{FOLDER}/vehicle/harbour_bluerov2.toml"
+    with zipfile.ZipFile(identified) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content.replace(b"Harbour", b"Narbour", 1) if name == vehicle_file else content)
+    with pytest.MonkeyPatch.context() as patched:  # the alteration is a matter of the hashes alone
+        patched.setattr(claims, "CLAIMS", [one for one in CLAIMS if one.measure is measures.integrity])
+        of_altered = prove_claims(path)
+    found = prove_claims(identified)
+    results = [one.result for _, one in found.evidence]
+    assert results == [*["holds"] * 4, "measured", "holds", "holds", "measured"]
+    assert found.evidence[-1][1].figure == "do not use yaw"
+    pages = {"videoray": _text(proof), "identified": _text(found), "altered": _text(of_altered)}
+    assert "2 are measured Cost of a step (" in pages["identified"]
+    assert "Unseen data (do not use yaw) Expected results" in pages["identified"]
+    assert len(QUESTIONS) == 10
+    for question in QUESTIONS:
+        assert question["page"] in pages[question["of"]], question["question"]
 
 
 @pytest.mark.long
@@ -197,20 +167,15 @@ def test_a_vehicle_with_coupling_and_lag_keeps_its_energy(everything_dir: Path, 
 # ---- FMUs that break a claim -----------------------------------------------------------------------------------------
 
 
-def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
-    """The page is written all the same, and one line says what does not hold."""
+def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path) -> None:
     name = f"{FOLDER}/surge_70_tuned_expected.csv"
     fmu = altered(
         videoray_fmu, {name: lambda old: re.sub(rb"(\.\d\d\d)\d*\n$", rb"\g<1>1\n", old)}, tmp_path / "other.fmu"
     )
-    page = tmp_path / "page.html"
-    assert main(["prove", str(fmu), "--report", str(page)]) == 1
-    out, err = capsys.readouterr()
-    (line,) = [line for line in err.splitlines() if " fails: " in line]
-    assert line.startswith(f"rov-fmu: {fmu}: expected results fails: 62 of 63 results of 29")
-    assert "Experiment surge_70_tuned: x deviates by" in line
-    assert re.search(r"expected results +fails", out)
-    assert "Experiment surge_70_tuned: x deviates by" in page.read_text(encoding="utf-8")
+    found = measured(measures.expected, fmu)
+    assert found.result == "fails"
+    assert "62 of 63 results of 29" in found.sentence
+    assert "Experiment surge_70_tuned: x deviates by" in found.sentence
 
 
 _REFUSES = "self.u += 1.0 if h <= 0.0 or h != h or h > 1.0 else h * self.X_ext; return 0.0 < h <= 1.0"
@@ -221,13 +186,9 @@ _ACCEPTED = "Not refused: an input that is not a number, an infinite input, a pa
 @pytest.mark.parametrize(
     ("measure", "step", "ours", "result", "words"),
     [
-        ("step_size", _EXACT, False, "holds", ""),
         ("step_size", "self.u -= h * self.u", False, "fails", ""),
         ("step_size", "self.u = 1.0 if h < 0.9 else float('nan')", False, "fails", ""),
-        ("repeatability", _EXACT, False, "holds", "100 of 100"),
-        ("repeatability", "self.u = -self.u", False, "holds", "100 of 100"),
         ("repeatability", "self.u += self.noise * h", False, "fails", "1 of 100"),
-        ("conservation", _EXACT, True, "holds", ""),
         ("conservation", f"{_EXACT}; self.u *= 1.0 + 1e-4", True, "fails", "but rises"),
         ("conservation", f"{_EXACT}; self.u *= 1.0 - 1e-4", True, "fails", ""),
         ("conservation", _EXACT, False, "does not apply", _STRANGE),
@@ -243,16 +204,6 @@ def test_a_claim_fails_for_an_fmu_that_breaks_it(
     found = measured(getattr(measures, measure), slave(step, tmp_path, ours=ours))
     assert found.result == result, found.sentence
     assert words in found.sentence or found.figure == words
-
-
-def test_the_cost_of_a_slow_step_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measures, "_COST_SECONDS", 0.2)
-    found = measured(measures.cost, slave("time.sleep(0.002)", tmp_path))
-    assert found.result == "measured"
-    number, unit = found.figure.split()
-    assert unit == "ms"
-    assert 2.0 <= float(number) < 50.0
-    assert sum(found.curve["shares"]) == pytest.approx(1.0)
 
 
 def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

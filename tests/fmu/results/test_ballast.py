@@ -1,11 +1,14 @@
 """The mass, the ballast and their places change during a run: velocities go on, and an impossible mass is refused."""
 
+import json
 import struct
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from rov_fmu.interface.model import VehicleModel
+from tests.conftest import Made
 from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, STEP, WITH_EVENTS, Fmu
 from tests.fmu.calls.conftest import of_both_versions
 from tests.fmu.calls.test_state_bytes import checksum
@@ -20,16 +23,21 @@ BALLAST |= {"x_B": ROV["x_B"] + 0.01, "y_G": ROV["y_G"] - 0.005}
 IMPOSSIBLE = {"m_rov": 2.0 * ROV["m_rov"], "z_G": 50.0}
 
 
-fmu = of_both_versions("six_dir", "six3_dir")
+fmu = of_both_versions("six_dir", "six3_dir", is_two_long=True)
 
 
-@pytest.fixture(scope="module")
-def expected() -> list[float]:
-    """Return what the rigid body of 6x6 matrices is compared by after 20 s, restarted with the ballast at 10 s."""
+def _restarted(folder: Path) -> None:
+    """Write what the rigid body of 6x6 matrices is compared by after 20 s, restarted with the ballast at 10 s."""
     y: Any = places(ROV, ROV.layout.at_rest)
     for rov in (ROV, ROV.replaced(BALLAST)):
         y = rigid_vehicle.integrate(rov, INPUTS, y, 10.0)
-    return [float(x) for x in compared(ROV, list(y))]
+    (folder / "end.json").write_text(json.dumps([float(x) for x in compared(ROV, list(y))]), encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def expected(made_once: Made) -> list[float]:
+    found: list[float] = json.loads((made_once("ballast", _restarted) / "end.json").read_text(encoding="utf-8"))
+    return found
 
 
 @pytest.mark.parametrize("is_event", [False, True])

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-import numpy as np
 import pytest
 from lxml import etree
 
@@ -25,9 +24,8 @@ from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
-from tests.vehicles import SIX, a_vehicle, at_rest, four_axes, still
-from verification.references import reference, rigid_vehicle
-from verification.references.rigid_body import VELOCITIES, quaternion_of, rotation
+from tests.vehicles import at_rest, four_axes, still
+from verification.references import reference
 from verification.references.vehicles import IDENTIFIED
 
 _SCHEMAS = Path(fmpy.__file__).parent
@@ -173,33 +171,6 @@ def test_expected_values_are_right_to_their_last_digit(name: str, experiments: l
         _check(untuned(vehicle) if experiment.endswith("_untuned") else vehicle, files, experiment)
 
 
-@pytest.mark.long
-def test_expected_values_with_roll_and_pitch_are_those_of_the_rigid_body() -> None:
-    """A step, and the manoeuvre from a tilted start, of a vehicle with six axes."""
-    vehicle = a_vehicle(SIX)
-    files = reference_results(vehicle)
-    check_experiments_of_axes(vehicle, files)
-    angles = _parameters(files, "attitude.ssv")
-    assert angles.keys() == SIX.layout.initial.keys()
-    for name, start in (("roll_100", (0.0, 0.0, 0.0)), ("manoeuvre", [*angles.values()])):
-        stimuli, expected = (_rows(files, f"{name}{end}.csv") for end in ("", "_expected"))
-        state = at_rest(SIX) | dict(zip(QUATERNION, quaternion_of(*start), strict=True))
-        y, t = rigid_vehicle.places(SIX, state), 0.0
-        for row in expected[1:]:
-            inputs = still(SIX) | next(x for x in reversed(stimuli) if x["time"] <= t)
-            y, t = list(rigid_vehicle.integrate(SIX, inputs, y, row["time"] - t)), row["time"]
-            moved = dict(zip([*VELOCITIES, *QUATERNION, *"xyz"], y, strict=False))
-            assert moved.keys() - set(QUATERNION) <= row.keys()
-            assert [row[v] for v in moved if v not in QUATERNION] == pytest.approx(
-                [value for v, value in moved.items() if v not in QUATERNION], abs=1e-9
-            )
-            if "phi" in row:
-                found = rotation(quaternion_of(row["phi"], row["theta"], row["psi"]))
-                assert np.array(found, float) == pytest.approx(np.array(rotation(y[6:10])), abs=1e-9)
-    assert {name: expected[0][name.removesuffix("_0")] for name in angles} == pytest.approx(angles)
-    assert expected[0]["theta"] != expected[-1]["theta"]
-
-
 _HASH = """
 import hashlib
 from rov_fmu.fmu.reference_results import reference_results
@@ -209,6 +180,7 @@ print(hashlib.sha256(repr(sorted(reference_results(load_vehicle(EVERYTHING)).ite
 """
 
 
+@pytest.mark.long
 def test_expected_results_have_the_same_bytes_whatever_the_linear_algebra_of_the_processor() -> None:
     """OpenBLAS computes other last digits on other processors. The expected results must not contain any of its."""
     command = [sys.executable, "-c", _HASH]
