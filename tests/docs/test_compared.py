@@ -24,20 +24,6 @@ def numbers(row: tuple[str, ...]) -> list[float]:
     return [float(cell[0]) for cell in cells if cell]
 
 
-def test_the_page_has_the_drawings_and_all_tables_and_no_other(computed: dict[str, Table]) -> None:
-    """`python -m docs.reference` writes them."""
-    page = (ROOT / "docs" / "vehicles.md").read_text(encoding="utf-8")
-    assert re.findall(r"<!-- (drawings|table: \w+) -->\n\n\S", page) == [
-        "drawings",
-        *(f"table: {name}" for name in computed),
-    ]
-    assert page == reference.filled(page)
-    for name, table in computed.items():
-        assert len(table) > 3, name
-        assert {len(row) for row in table} == {len(table[0])}, name
-    assert all(f"`{name}`" in page for name in SHIPPED)
-
-
 def test_the_drawings_show_the_vehicles_as_they_are() -> None:
     """Their bytes depend on the version of Matplotlib, their elements do not."""
     assert {*reference.drawings()} == {*(ROOT / "docs" / "drawings").iterdir()}
