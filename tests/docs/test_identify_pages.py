@@ -31,6 +31,7 @@ def text(page: Path) -> str:
     return " ".join(page.read_text("utf-8").split())
 
 
+@pytest.mark.long
 def test_the_complete_rov_toml_makes_a_vehicle(tmp_path: Path) -> None:
     page = (DOCS / "vehicle-file.md").read_text("utf-8")
     (example,) = re.findall(r'```toml\n(\[vehicle\]\nname = "Tadpole".*?)```', page, re.DOTALL)

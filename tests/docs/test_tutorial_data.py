@@ -7,6 +7,7 @@ from click.testing import CliRunner
 from examples import tank_tests
 
 
+@pytest.mark.long
 def test_the_command_of_the_tutorial_writes_the_same_tank_tests_every_time(tmp_path: Path) -> None:
     folder, tmp_path = tmp_path / "by command", tmp_path / "by function"
     assert CliRunner().invoke(tank_tests.main, [str(folder)], catch_exceptions=False).exit_code == 0
