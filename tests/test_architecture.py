@@ -104,8 +104,6 @@ def _part(module: str) -> str:
     return [*module.split("."), ""][1]
 
 
-
-
 def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
     assert imports["rov_fmu"] == {"rov_fmu.interface.model"}, "which rov_fmu.load imports when it is called"
     try:
@@ -139,8 +137,6 @@ def test_the_page_shows_the_imports_that_exist(imports: dict[str, set[str]]) -> 
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     shown = re.findall(r"^\| `\w+` \| (?:–|`\w+`(?:, `\w+`)*) \|$", page, re.M)
     assert shown == rows, "the rows that the page needs:\n" + "\n".join(rows)
-
-
 
 
 def test_the_step_in_python_imports_only_the_standard_library() -> None:
