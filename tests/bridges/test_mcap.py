@@ -18,17 +18,12 @@ from scipy.spatial.transform import Rotation
 
 import rov_fmu
 from rov_fmu.bridges.mcap_logs import identification_mcap
-from rov_fmu.bridges.sitl import Flight, Setup
-from rov_fmu.bridges.sitl_frames import servos_of
-from rov_fmu.bridges.sitl_protocol import ServoPacket
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
-from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.log import Channel, Source
 from tests.folders import small_folder
 from tests.report.results import example
 
@@ -111,36 +106,6 @@ def test_frames(heavy: VehicleModel, angles: tuple[float, float, float]) -> None
     np.testing.assert_allclose(turned(first.pose), by_hand(*angles), atol=1e-12)
 
 
-def test_transform_is_the_pose(heavy: VehicleModel) -> None:
-    """/tf says the same as /pose, from `map` to `base_link`."""
-    found = messages(heavy.to_mcap(recorded(heavy, 1.0, {"u_1": 0.4, "u_7": -0.2})))
-    for (_, tf), (_, pose) in zip(found["/tf"], found["/pose"], strict=True):
-        (transform,) = tf.transforms
-        assert (transform.parent_frame_id, transform.child_frame_id) == ("map", "base_link")
-        assert str(transform.rotation) == str(pose.pose.orientation)
-        assert str(transform.translation) == str(pose.pose.position)
-
-
-def test_jets_leave_against_the_force() -> None:
-    """Each thruster that pushes has an arrow at its place, whose x axis points where the water goes."""
-    vehicle = rov_fmu.load("videoray")
-    result = recorded(vehicle, 1.0, {"u_l": 0.5, "u_t": -0.5})
-    _, scene = messages(vehicle.to_mcap(result))["/scene"][-1]
-    (entity,) = scene.entities
-    assert entity.frame_id == "base_link"
-    assert entity.frame_locked
-    pushing = [t for t in vehicle.layout.thrusters if t.name in ("l", "t")]
-    lengths = []
-    for thruster, arrow in zip(pushing, entity.arrows, strict=True):
-        force = result[f"F_{thruster.name}"][-1]
-        forward, starboard, down = thruster.direction.value
-        against = -np.sign(force) * np.array([forward, -starboard, -down])
-        np.testing.assert_allclose(turned(arrow.pose)[:, 0], against, atol=1e-12)
-        lengths.append((arrow.shaft_length + arrow.head_length) / abs(force))
-    assert lengths[0] == pytest.approx(lengths[1])
-    assert entity.arrows[0].pose.position.y > 0.0, "port"
-
-
 def test_without_the_library(heavy: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where foxglove-sdk is missing, a line says how to install it."""
     monkeypatch.setitem(sys.modules, "foxglove", None)
@@ -182,21 +147,6 @@ def test_identification() -> None:
     assert [values["t"] for _, values in found[f"{log}/commands"]] == commands.value.tolist()
 
 
-def test_measured_poses_of_a_log() -> None:
-    """The bow points north-west, up and to port: its direction and the depth are those of the angles."""
-    result, time = example(), np.arange(0.0, 5.0, 0.1)
-    phi, theta, psi = 0.2, 0.3, 2.0 * pi - pi / 4
-    angles = {"roll angle": phi, "pitch angle": theta, "heading": psi, "depth": 1.5}
-    channels = tuple(Channel(QUANTITIES[q], Source(q), time, np.full(len(time), x)) for q, x in angles.items())
-    log = replace(result.folder.logs[0], channels=channels)
-    found = messages(identification_mcap(replace(result, folder=replace(result.folder, logs=[log]))))
-    poses = found[f"/{log.file.replace('.', '_')}/pose"]
-    assert len(poses) == len(time)
-    pose = poses[0][1].pose
-    assert (pose.position.x, pose.position.y, pose.position.z) == (0.0, 0.0, -1.5)
-    np.testing.assert_allclose(turned(pose), by_hand(phi, theta, psi), atol=1e-12)
-
-
 def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """`rov-fmu identify --mcap` writes the file; another suffix is refused before the work begins."""
     folder = small_folder(tmp_path / "tests")
@@ -205,21 +155,3 @@ def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert "must end with .mcap" in refusal
     assert main(["identify", str(folder), "--mcap", str(tmp_path / "logs.mcap")]) == 0
     assert make_reader(BytesIO((tmp_path / "logs.mcap").read_bytes())).get_header()
-
-
-def test_a_flight_with_ardusub_is_a_motion(heavy: VehicleModel, tmp_path: Path) -> None:
-    """The log of a flight has the pulses of ArduSub as commands, and the motion that they cause."""
-    setup = Setup(heavy, servos_of(heavy.layout, None, {}), log=tmp_path / "flight.mcap", log_interval=0.1)
-    flight = Flight(setup, 1000)
-    for count in range(401):
-        flight.step(ServoPacket(100, count, (1700, 1300) + (1500,) * 14))
-    assert flight.log
-    flight.log.write(tmp_path / "flight.mcap")
-    found = messages((tmp_path / "flight.mcap").read_bytes())
-    assert found["/inputs"][0][1]["u_1"] == pytest.approx(0.5)
-    assert found["/inputs"][0][1]["u_2"] == pytest.approx(-0.5)
-    times = np.array([stamp for stamp, _ in found["/outputs"]]) * 1e-9
-    assert np.diff(times) == pytest.approx(0.1)
-    expected = heavy.simulate([0.0, *times], {"u_1": 0.5, "u_2": -0.5})
-    for name in ("u", "r", "F_1"):
-        assert [row[name] for _, row in found["/outputs"]] == pytest.approx(expected[name][1:], abs=1e-9)

@@ -24,13 +24,11 @@ from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
-from tests.vehicles import THRUST_EFFECTS, pulsed
 from verification.references.autopilot.ardusub import VECTORED_6DOF
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
@@ -110,10 +108,6 @@ def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
     curves = tuple(replace(curve, electric_current=None) for curve in HEAVY.layout.curves)
     without = Connection(setup_of(replace(HEAVY, layout=replace(HEAVY.layout, curves=curves))))
     assert b"battery" not in without.answer(packet(400, 0, NEUTRAL), HERE)
-    effects = load_vehicle(THRUST_EFFECTS)
-    table = {n: name.removeprefix("u_") for n, name in enumerate(effects.layout.commands, 1)}
-    powered = Connection(Setup(effects, servos_of(effects.layout, None, table), {"voltage": 13.0}))
-    assert b'"battery":{"voltage":13.0}' in powered.answer(packet(400, 0, NEUTRAL), HERE)
 
 
 def test_a_repeated_frame_gets_the_same_bytes_without_a_step() -> None:
@@ -260,18 +254,6 @@ def test_frames_and_tables() -> None:
     assert "u_8" not in heavy
 
 
-def test_pulses_of_a_vehicle_with_pulses() -> None:
-    """Its file says which pulse is full thrust; a pulse of 0 is none."""
-    plain = load_vehicle(SHIPPED["videoray"])
-    rov = pulsed(plain, (1000.0, 1400.0, 2000.0))
-    given, expected = Connection(setup_of(rov)), Connection(setup_of(plain))
-    for count in range(20):
-        one = given.answer(packet(400, count, [1700, 1200, 0] + [0] * 13), HERE)
-        other = expected.answer(packet(400, count, [1700, 1300, 0] + [0] * 13), HERE)
-    assert parsed(one)["velocity"] == pytest.approx(parsed(other)["velocity"], abs=1e-12)
-    assert parsed(one)["gyro"][2] != 0.0
-
-
 # ---- The command -----------------------------------------------------------------------------------------------------
 
 
@@ -325,45 +307,3 @@ def test_bad_options_are_one_line(options: str, said: str, capsys: pytest.Captur
     assert main(["sitl", *options.split()]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"rov-fmu: {said}")
-
-
-@pytest.mark.weekly
-def test_intervals_from_flights_cover_the_truth(tmp_path: Path) -> None:
-    """The 95 % intervals of drag and beta, identified from 20 flights with manoeuvres and sensor noise.
-
-    A flight takes half a minute. Each row of the log has the commands of one frame, because a mean command is not the
-    command of the mean thrust.
-    """
-    hits = []
-    for seed in range(20):
-        chance = np.random.default_rng(seed)
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        path = folder / "log_dive.csv"
-        setup = replace(setup_of(V_N=0.05, z=2.0), log=path, log_interval=0.02)
-        levels = chance.uniform(-0.4, 0.4, (10, 3)) * (chance.random((10, 3)) < 0.7)
-
-        def sticks(t: float) -> tuple[float, float]:
-            forward, lateral, _ = levels[int(t / 3.0) % 10].tolist()  # noqa: B023
-            return forward, lateral
-
-        with served(setup) as (connection, port):
-            autopilot = ArduSub(port, rate=50, depth=2.0, sticks=sticks)
-            for level in levels[:, 2]:
-                autopilot.heading, autopilot.depth = 3.0 * level, 2.0 + level
-                autopilot.fly(3.0)
-            autopilot.close()
-        connection.write_log()
-        header, *rows = path.read_text(encoding="utf-8").splitlines()
-        noise = {"m/s": 0.01, "m": 0.005, "rad": 0.005}  # 1 cm/s, 5 mm and 0.3 degrees
-        scales = [noise.get(title.partition("[")[2][:-1], 0.0) for title in header.split(",")]
-        values = np.array([row.split(",") for row in rows], float)
-        values += scales * chance.standard_normal(values.shape)
-        np.savetxt(path, values, "%.6g", ",", header=header, comments="")
-        (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
-        found = identify(load_tests(folder))
-        intervals = found.vehicle.intervals.items()
-        known = [(HEAVY[name], *limits) for name, limits in intervals if name.startswith(("a_d_", "b_d_", "beta_"))]
-        hits += [low <= true <= high for true, low, high in known]
-    assert len(hits) >= 20 * 12
-    assert 0.85 <= np.mean(hits) <= 0.99

@@ -32,7 +32,7 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 
 
 @pytest.mark.parametrize(
-    "moments", [pytest.param(5, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
+    "moments", [pytest.param(3, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
 )
 @pytest.mark.parametrize("names", [["the FMU"], ["the vehicle", "the report"]])
 def test_a_killed_command_leaves_whole_files_and_the_next_one_is_right(
@@ -49,14 +49,14 @@ def test_a_killed_command_leaves_whole_files_and_the_next_one_is_right(
     def contents(folder: Path) -> list[bytes]:
         return [(folder / command.name).read_bytes() for command in commands]
 
-    def whole() -> list[bytes]:
-        process = started(tmp_path / "whole")
+    def whole(folder: Path) -> list[bytes]:
+        process = started(folder)
         assert without_progress(process.communicate(timeout=300)[1]) == ""
         assert process.returncode == 0
-        return contents(tmp_path / "whole")
+        return contents(folder)
 
     began = time.monotonic()
-    expected = whole()
+    expected = whole(tmp_path / "whole")
     took = time.monotonic() - began
     for n in range(moments):
         folder = tmp_path / str(n)
@@ -65,7 +65,7 @@ def test_a_killed_command_leaves_whole_files_and_the_next_one_is_right(
             (folder / command.name).write_bytes(OLD)
         _kill(process, folder, took * (n / moments) ** 0.5 if n else None)
         assert all(content in (OLD, new) for content, new in zip(contents(folder), expected, strict=True))
-    assert whole() == expected
+    assert whole(folder) == expected
 
 
 # ---- Interrupted -----------------------------------------------------------------------------------------------------

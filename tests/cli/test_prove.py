@@ -20,16 +20,21 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE
 
 Capsys = pytest.CaptureFixture[str]
+Change = Callable[[bytes], bytes]
 Files = Mapping[str, str | None]
 """Texts of files by their name in the FMU, or beside the manifest; None leaves a file out."""
 
 
-def _with(fmu: Path, files: Files, path: Path) -> Path:
-    """Write a copy of an FMU with these files, and return its path. It has no hashes, so that it may differ."""
+def _with(fmu: Path, files: Files, path: Path, begin: str = "/", change: Change = bytes) -> Path:
+    """Write a copy of an FMU with these files, and with changed members whose name begins with `begin`.
+
+    It has no hashes, so that it may differ. Return its path.
+    """
     changed = {META_DATA: None} | {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
         for member in set(old.namelist()) - changed.keys():
-            new.writestr(member, old.read(member))
+            content = old.read(member)
+            new.writestr(member, change(content) if member.startswith(begin) else content)
         for name, text in changed.items():
             if text is not None:
                 new.writestr(name, text)
@@ -155,21 +160,6 @@ def test_what_deviates_or_fails_is_printed(
     assert err.endswith(" results are not as expected\n")
 
 
-Change = Callable[[bytes], bytes]
-
-
-def _changed(fmu: Path, begin: str, change: Change, path: Path) -> Path:
-    """Write a copy of an FMU in which the members whose name begins with `begin` are changed; return its path.
-
-    It has no hashes.
-    """
-    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
-        for member in {*old.namelist()} - {META_DATA}:
-            content = old.read(member)
-            new.writestr(member, change(content) if member.startswith(begin) else content)
-    return path
-
-
 @pytest.mark.parametrize("fmu", ["videoray_fmu", pytest.param("videoray3_fmu", marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("begin", "change", "reason"),
@@ -191,7 +181,7 @@ def _changed(fmu: Path, begin: str, change: Change, path: Path) -> Path:
 def test_the_reason_why_an_fmu_fails_is_given(
     fmu: str, begin: str, change: Change, reason: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    first = prove(_changed(request.getfixturevalue(fmu), begin, change, tmp_path / "other.fmu"))[0]
+    first = prove(_with(request.getfixturevalue(fmu), {}, tmp_path / "other.fmu", begin, change))[0]
     assert not first.passed
     assert re.match(reason, first.error)
     assert str(Path(tempfile.gettempdir())) not in first.error
@@ -199,7 +189,7 @@ def test_the_reason_why_an_fmu_fails_is_given(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a library that is cut off is not loaded")
 def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
-    fmu = _changed(videoray_fmu, "binaries/", lambda old: old[:20_000], tmp_path / "cut.fmu")
+    fmu = _with(videoray_fmu, {}, tmp_path / "cut.fmu", "binaries/", lambda old: old[:20_000])
     assert main(["prove", str(fmu)]) == 1
     out, err = capsys.readouterr()
     assert out == ""
@@ -222,7 +212,7 @@ def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: 
 def test_an_fmu_has_limits_of_time_and_memory(
     code: str, expected: str, foreign: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
-    fmu = _changed(foreign, "resources/counter.py", lambda old: old + code.encode(), tmp_path / "limited.fmu")
+    fmu = _with(foreign, {}, tmp_path / "limited.fmu", "resources/counter.py", lambda old: old + code.encode())
     begun = time.monotonic()
     assert main(["prove", str(fmu), "--time-limit", "1"]) == 1
     assert time.monotonic() - begun < 30.0
@@ -246,7 +236,7 @@ def test_an_fmu_that_hangs_is_ended_by_ctrl_c(foreign: Path, tmp_path: Path) -> 
     from tests.cli.test_interrupts import LINE, Command  # which needs a terminal of POSIX
 
     fmu, begun = tmp_path / "hangs.fmu", tmp_path / "begun"
-    _changed(foreign, "resources/counter.py", lambda old: old + _HANGS.encode(), fmu)
+    _with(foreign, {}, fmu, "resources/counter.py", lambda old: old + _HANGS.encode())
     with Command(["-m", "rov_fmu", "prove", str(fmu)], tmp_path, environment={"HANGS": str(begun)}) as proof:
         proof.wait_until(begun.exists)
         assert proof.press_ctrl_c() == LINE
@@ -264,7 +254,6 @@ def _exp(inner: str) -> str:
 
 BAD: dict[str, tuple[Files, str]] = {
     "no manifest": ({MANIFEST: None}, f"{MANIFEST}: there is no such file: the FMU carries no reference results"),
-    "another manifest": ({MANIFEST: "<a/>"}, f"{MANIFEST}: must begin with <fmiReferences>, and not with <a>"),
     "no XML": ({MANIFEST: "<fmiReferences>"}, f"{MANIFEST}: not XML: "),
     "an empty manifest": ({MANIFEST: "<fmiReferences/>"}, f"{MANIFEST}: names no experiment with expected results"),
     "no experiments": ({_EXP: None}, f"{_EXP}: there is no such file in the FMU"),
@@ -278,7 +267,6 @@ BAD: dict[str, tuple[Files, str]] = {
     ),
     "no expected results": ({_Y: None}, f"{_Y}: there is no such file in the FMU"),
     "an unknown variable": ({_Y: "time,q\n0,1\n"}, f"{_Y}, line 1, column 'q': the FMU has no such variable"),
-    "nothing but the time": ({_Y: "time\n0\n1\n"}, f"{_Y}: no columns beside the time"),
     "a file of 30 MB": ({_Y: "time,y\n" + "0,0\n" * 7_500_000}, f"{_Y}: has 30 MB; at most 20 MB are read"),
     "a tolerance that all meet": (
         {_EXP: _exp('stopTime="1" tolerance="1e300">')},
@@ -288,17 +276,11 @@ BAD: dict[str, tuple[Files, str]] = {
         {_EXP: "<Experiments>" + '<Experiment><References source="y.csv"/></Experiment>' * 1001 + "</Experiments>"},
         f"{MANIFEST}: names 1001 experiments; at most 1000 are run",
     ),
-    "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}, line 2, column 'y' = 'a': must be a finite number"),
     "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}, line 3: the time goes back"),
     "no time": ({_EXP: _exp('stopTime="0">')}, f"{_EXP}: experiment 'a': must go on from its start"),
-    "a word for a time": ({_EXP: _exp('stopTime="soon">')}, f"{_EXP}: experiment 'a': stopTime = 'soon': must be a"),
     "an unknown parameter": (
         {"k.ssv": '<ParameterSet><Parameter name="q"><Real value="1"/></Parameter></ParameterSet>'},
         f"{FOLDER}/k.ssv: the FMU has no variable 'q'",
-    ),
-    "a parameter without value": (
-        {"k.ssv": '<ParameterSet><Parameter name="k"/></ParameterSet>'},
-        f"{FOLDER}/k.ssv: parameter 'k': has no value",
     ),
     "a parameter in another unit": (
         {"k.ssv": '<ParameterSet><Parameter name="k"><Real value="1" unit="N"/></Parameter></ParameterSet>'},
@@ -323,15 +305,6 @@ def test_bad_input_is_one_line_that_names_the_file(case: str, foreign: Path, tmp
     assert err.count("\n") == 1
 
 
-def test_a_default_experiment_is_checked_as_the_others(foreign: Path, tmp_path: Path, capsys: Capsys) -> None:
-    experiment = '<Experiments name="x"><Experiment name="a"/></Experiments>'
-    fmu = _with(foreign, {_EXP: experiment}, tmp_path / "experiment.fmu")
-    default = b'<DefaultExperiment stopTime="10" stepSize="1e-9"/><ModelVariables>'
-    _changed(fmu, "modelDescription.xml", lambda old: old.replace(b"<ModelVariables>", default), tmp_path / "other.fmu")
-    assert main(["prove", str(tmp_path / "other.fmu")]) == 2
-    assert "experiment 'a': stepSize = 1e-09 s takes 1e+10 steps from 0 to 10 s" in capsys.readouterr().err
-
-
 def test_what_an_fmu_does_not_have_is_named(foreign: Path, videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
     assert main(["prove", str(foreign), "--interface", "model-exchange"]) == 2
     assert capsys.readouterr().err == f"rov-fmu: {foreign}: has no model-exchange, only co-simulation\n"
@@ -340,9 +313,3 @@ def test_what_an_fmu_does_not_have_is_named(foreign: Path, videoray_fmu: Path, t
     bare = _with(videoray_fmu, binaries, tmp_path / "bare.fmu")
     assert main(["prove", str(bare)]) == 2
     assert "has no binary for this machine" in capsys.readouterr().err
-
-
-def test_a_vehicle_is_no_fmu(capsys: Capsys) -> None:
-    assert main(["prove", "videoray"]) == 2
-    expected = "must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name"
-    assert capsys.readouterr().err == f"rov-fmu: videoray: {expected}\n"

@@ -10,7 +10,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify import identify as identification
 from rov_fmu.io.output import WriteError, check_replaced, sealed
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import REFIT, without_progress
+from tests.commands import without_progress
 from tests.folders import small_folder
 
 Capsys = pytest.CaptureFixture[str]
@@ -125,7 +125,3 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
         path.write_bytes(other.encode())
         with pytest.raises(WriteError):
             _check([path])
-
-
-def test_the_vehicle_that_ships_is_as_identify_wrote_it() -> None:
-    assert _check([REFIT]) == [f"{REFIT}: replaced the result of an earlier run"]

@@ -162,9 +162,7 @@ def test_a_checkout_that_is_not_installed_builds_the_same(videoray_fmu: Path, tm
     assert (tmp_path / "x.fmu").read_bytes() == videoray_fmu.read_bytes()
 
 
-@pytest.mark.parametrize(
-    "missing", ["click", "matplotlib", *(pytest.param(m, marks=pytest.mark.long) for m in ("fat_macho", "pydantic"))]
-)
+@pytest.mark.parametrize("missing", ["click", "matplotlib"])
 def test_a_dependency_that_is_not_there_is_named(missing: str, tmp_path: Path) -> None:
     ran = _checkout(tmp_path, missing)
     assert ran.returncode == 1

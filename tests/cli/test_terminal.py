@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -31,24 +30,11 @@ _VARIES = re.compile(r"\d+(?:[.:]\d+)*")
 """Times differ from run to run."""
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What a command showed on a terminal."""
+def on_a_terminal(arguments: Sequence[str], columns: int, folder: Path) -> tuple[str, list[tuple[str, ...]]]:
+    """Run a command in a folder, on a pseudo-terminal of some columns.
 
-    code: int
-    raw: str
-    """All characters, with the control sequences."""
-    moments: tuple[tuple[str, ...], ...]
-    """The lines of the screen after each piece of output."""
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """The lines of the screen at the end."""
-        return self.moments[-1]
-
-
-def on_a_terminal(arguments: Sequence[str], columns: int, folder: Path) -> Shown:
-    """Run a command in a folder, on a pseudo-terminal of some columns."""
+    Return all characters, with the control sequences, and the lines of the screen after each piece of output.
+    """
     ours, its = pty.openpty()
     fcntl.ioctl(its, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
     process = subprocess.Popen(
@@ -68,7 +54,8 @@ def on_a_terminal(arguments: Sequence[str], columns: int, folder: Path) -> Shown
             raw += piece
             moments.append(_lines(screen))
     os.close(ours)
-    return Shown(process.wait(), raw.decode(), tuple(moments) or ((),))
+    process.wait()
+    return raw.decode(), moments
 
 
 def _lines(screen: pyte.Screen) -> tuple[str, ...]:
@@ -141,24 +128,11 @@ MORE = [
 @pytest.mark.parametrize("words", [*COMMANDS, *(pytest.param(one, marks=pytest.mark.long) for one in MORE)])
 def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(words: str, columns: int, folder: Path) -> None:
     arguments = words.split()
-    shown = on_a_terminal(arguments, columns, folder)
-    assert max(len(line) for moment in shown.moments for line in moment) <= columns
-    at_the_end = "\n".join(shown.lines)
+    raw, moments = on_a_terminal(arguments, columns, folder)
+    assert max(len(line) for moment in moments for line in moment) <= columns
+    at_the_end = "\n".join(moments[-1])
     assert not re.search(r"✓|\d:\d\d:\d\d|[━╸╺⠀-⣿]|about \d+:\d\d left", at_the_end)
-    assert shown.raw.rfind("\x1b[?25l") <= shown.raw.rfind("\x1b[?25h"), "the cursor is back"
+    assert raw.rfind("\x1b[?25l") <= raw.rfind("\x1b[?25h"), "the cursor is back"
     if "--help" not in arguments:  # Click fills the lines of a help up to 80 columns
         seen = {_VARIES.sub("0", word) for word in at_the_end.split() if set(word) != {"─"}}  # rules are no words
         assert seen - words_in_a_pipe(arguments, folder) <= {"the", "widest", "of", *at_the_end.split("…")[1:]}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("columns", [80, 120])
-def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Path) -> None:
-    shown = on_a_terminal(["identify", "tests", "--report", "found.html"], columns, folder)
-    assert shown.code == 0
-    progress = [moment for moment in shown.moments if any("✓" in line for line in moment)]
-    for name in ("reading the folder", "identifying the vehicle"):
-        assert any(re.fullmatch(rf"✓ {name} +━+ +0:0\d:\d\d.*", line) for moment in progress for line in moment)
-    running = [moment[-1] for moment in progress]
-    assert any(re.search(r" \d+% 0:0\d:\d\d \d:\d\d:\d\d$", line) for line in running), running
-    assert len(shown.lines) <= 30

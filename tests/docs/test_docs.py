@@ -199,7 +199,18 @@ def run(workplace: Path, *command: str) -> str:
     return done.stdout
 
 
-SHELL_PAGES = [page for page in PAGES if runnable(page) and page not in NOTEBOOKS]
+def _lines_of(pages: Sequence[Path]) -> set[str]:
+    """All command lines of these pages, without comments."""
+    return {line.split("#")[0].strip() for page in pages for block in runnable(page) for line in lines(block)}
+
+
+STOPPING = ROOT / "docs" / "tutorial-stopping-distance.md"
+"""Its commands are run where their results are looked at, in test_tutorials.py."""
+SHELL_PAGES: list[Path] = []
+for one in PAGES:
+    if one not in (*NOTEBOOKS, STOPPING) and not _lines_of([one]) <= _lines_of(SHELL_PAGES):
+        SHELL_PAGES.append(one)
+"""The pages with a command that no page before them has."""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are written for a POSIX shell")
@@ -210,21 +221,19 @@ def test_commands_run(page: Path, workplace: Path) -> None:
         run(workplace, "bash", "-euc", block)
 
 
-def test_the_pages_with_commands_are_found() -> None:
-    pages = ("drive", "identify", "many-runs", "model", "platforms", "tune", "tutorial-stopping-distance")
-    assert {"README.md", *(f"docs/{page}.md" for page in pages)} <= {name(page) for page in SHELL_PAGES}
-    assert {f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables")} <= {
-        " ".join(module_of(words)[0]) for page in PAGES for words in commands(page)
-    }
-
-
 @pytest.mark.long
+@pytest.mark.filterwarnings("default:.*commands saturate")
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
-def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
+def test_programs_print_what_is_said(
+    page: Path, workplace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They run in this process, which has imported most of what they need."""
+    monkeypatch.chdir(workplace)
     for program in blocks(page, "python"):
         if OF_OMSIMULATOR in program and find_spec("OMSimulator") is None:
-            continue  # its package fetches its binaries as it is installed; the next test looks at what it prints
-        printed = run(workplace, sys.executable, "-c", program).splitlines()
+            continue  # its package fetches its binaries as it is installed; another test looks at what it prints
+        exec(compile(program, page.name, "exec"), {"__name__": "__main__"})
+        printed = capsys.readouterr().out.splitlines()
         said = re.findall(r"^ *print\(.*?  # (.*)$", program, re.MULTILINE)
         assert len(printed) == len(said) > 0
         for line, expected in zip(printed, said, strict=True):
@@ -232,15 +241,6 @@ def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
                 value = re.search(r"\d+\.(\d+) ", expected)
                 assert value, "a sentence that ends with a number and its unit"
                 assert f"{float(line):.{len(value[1])}f}" == value[0].strip()
-
-
-def test_the_program_for_omsimulator_is_python_and_ends_where_it_says(vehicle: Vehicle) -> None:
-    (program,) = (text for text in blocks(ROOT / "docs" / "drive.md", "python") if OF_OMSIMULATOR in text)
-    compile(program, "drive.md", "exec")
-    assert 'CRef("default", "rov", "u_t"), 0.3)' in program
-    assert "setStopTime(10)" in program
-    (*_, down) = course(vehicle, lambda _: {"u_t": 0.3}, 10.0, 0.1, 0.0)
-    assert f"# {down['z']:.4f} m\n" in program
 
 
 def course(
@@ -262,6 +262,8 @@ def test_the_first_simulations_end_where_the_pages_say(vehicle: Vehicle) -> None
     untuned = vehicle.replaced({"alpha_w": 1.0, "beta_w": 1.0})
     (*_, down) = course(untuned, lambda _: {"u_t": 0.3}, 20.0, 0.1, 0.0)
     assert f"positive down: {down['w']:.4f} m/s" in drive
+    (*_, down) = course(vehicle, lambda _: {"u_t": 0.3}, 10.0, 0.1, 0.0)
+    assert f'm")  # {down["z"]:.4f} m\n' in drive, "the program for OMSimulator"
 
 
 def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
@@ -279,21 +281,6 @@ def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
         off = max(hypot(a["x"] - b["x"], a["y"] - b["y"]) for a, b in pairs)
         in_r = max(abs(a["r"] - b["r"]) for a, b in pairs)
         assert f"| that of its {what} | {1000.0 * off:.0f} mm | {in_r:.{digits}f} rad/s |" in told
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_tab_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert f"{shell}_source" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
-    monkeypatch.setenv("COMP_WORDS", "rov-fmu build video")
-    monkeypatch.setenv("COMP_CWORD", "video" if shell == "fish" else "2")
-    said = []
-    for asked in ("source", "complete"):
-        monkeypatch.setenv("_ROV_FMU_COMPLETE", f"{shell}_{asked}")
-        with pytest.raises(SystemExit):
-            main([])
-        said.append(capsys.readouterr().out)
-    assert "_rov_fmu_completion" in said[0]
-    assert [vehicle for vehicle in SHIPPED if vehicle in said[1]] == ["videoray", "videoray_refit"]
 
 
 # ---- What is said elsewhere too --------------------------------------------------------------------------------------
@@ -315,18 +302,12 @@ def test_every_variable_is_told(kind: str) -> None:
     assert {name.removesuffix("_reverse") for name in names} <= told
 
 
-@pytest.mark.parametrize("page", [page for page in reference.PAGES if page.name != "vehicles.md"], ids=name)
-def test_tables_that_follow_from_the_code_are_as_it_has_them(page: Path) -> None:
+def test_tables_that_follow_from_the_code_are_as_it_has_them() -> None:
     """`python -m docs.reference` writes them."""
-    text = page.read_text(encoding="utf-8")
-    assert text == reference.filled(text)
-
-
-def test_every_such_table_stands_in_a_page() -> None:
-    pages = "".join(page.read_text(encoding="utf-8") for page in reference.PAGES)
-    for name, table in reference.tables().items():
-        assert len(table) > 2
-        assert f"<!-- table: {name} -->\n\n{reference.markdown(table)}\n\n<!-- end -->" in pages
+    pages = {page: page.read_text(encoding="utf-8") for page in reference.PAGES}
+    assert [page for page, text in pages.items() if text != reference.filled(text)] == []
+    tables = {**reference.tables(), **compared.tables()}
+    assert [name for name in tables if f"<!-- table: {name} -->\n\n|" not in "".join(pages.values())] == []
 
 
 def test_version_is_that_of_the_package() -> None:
@@ -347,8 +328,9 @@ def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() ->
     assert all(f"`pytest -m {marker}`" in contributing for marker in ("long", "interop", "weekly"))
     for line in lines(blocks(README, "sh")[0]):
         assert f"- run: {line.split('#')[0].strip()}\n" in workflow
-    assert site.endswith('pip install -e ".[docs]" && sphinx-build -W docs site\n')
-    assert all(".ci/build-site" in text for text in (every_change, workflow))
+    assert site.endswith('pip install -e ".[docs]" && sphinx-build -W docs site "${@:2}"\n')
+    assert '- run: .ci/build-site "$RUNNER_TEMP/docs"\n' in workflow, "with the notebooks executed"
+    assert "begin_beside site .ci/build-site" in every_change
 
 
 @pytest.mark.long
@@ -365,9 +347,7 @@ def test_the_site_is_complete_and_fetches_nothing() -> None:
     drawn = re.findall(r'src="_images/([^"]+)\.svg"', pages["vehicles.html"])
     assert {name for name in SHIPPED if name != "videoray_refit"} == {*drawn}
     assert {*_commands.commands} <= {*re.findall(r">rov-fmu</span> <span class=\"pre\">(\w+)<", pages["cli.html"])}
-    notebooks = {page.name: page.read_text(encoding="utf-8") for page in folder.glob("_downloads/*/*.ipynb")}
-    assert {f"{page.stem}.ipynb" for page in NOTEBOOKS} == set(notebooks)
-    assert all('"image/png"' in notebook for notebook in notebooks.values()), "executed, with their figures"
+    assert {f"{page.stem}.ipynb" for page in NOTEBOOKS} == {page.name for page in folder.glob("_downloads/*/*.ipynb")}
     for key in (*BODY, *ARM, *CURVE, *AXIS, *TUNING):
         assert f">{key}</span>" in pages["vehicle-file.html"]
     for title, page in pages.items():

@@ -8,6 +8,7 @@ from examples.hold_level import fly
 from verification.references.autopilot.ardusub import Hold
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:.*turns over")
 def test_the_example_flies_level() -> None:
     lines: list[str] = []

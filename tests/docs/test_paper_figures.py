@@ -2,7 +2,6 @@
 
 import re
 from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
-from examples.videoray.figures import COLUMNS, FORMATS, PaperFigure, main, paper_figures
+from examples.videoray.figures import COLUMNS, FORMATS, PaperFigure, paper_figures
 from tests.commands import ROOT
 
 FIGURES = {figure.name: figure for figure in paper_figures()}
@@ -50,19 +49,6 @@ def test_a_figure_is_as_wide_as_the_column_and_has_the_same_bytes_again(name: st
 def texts(picture: bytes) -> list[str]:
     """Return the texts of an SVG picture, which Matplotlib writes as comments beside their paths."""
     return [str(comment.text).strip() for comment in etree.fromstring(picture).iter(etree.Comment)]
-
-
-@pytest.mark.long
-def test_every_figure_has_its_caption_beside_it_and_the_folder_is_created(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = tmp_path / "for the" / "paper"
-    assert main([str(folder), "--format", "pdf"]) == 0
-    assert f"Wrote 9 figures to {folder}" in capsys.readouterr().out
-    wanted = {f"{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "txt")}
-    assert {path.name for path in folder.iterdir()} == wanted
-    for name, figure in FIGURES.items():
-        assert (folder / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
 
 
 def test_the_readme_shows_every_figure_that_is_drawn() -> None:

@@ -1,15 +1,13 @@
 """examples/station_keeping: the autopilot's promises, the closed loop, and that engines agree on it."""
 
 import zipfile
-from collections.abc import Callable, Iterator
 from functools import cache
-from math import degrees, pi, radians
+from math import degrees
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
@@ -18,14 +16,12 @@ from examples.station_keeping.engines import ENGINES, NAMES, Trajectory
 from examples.station_keeping.system import (
     DEFAULT,
     SEA,
-    STEP,
     build_system,
     parameter_sets,
     system_files,
 )
 from examples.systems import PARAMETER_SET
 from tests.conftest import Made, without_page
-from verification.references.fmpy_slave import keep_loaded
 
 SETS = tuple(parameter_sets())
 
@@ -46,139 +42,7 @@ def folder(made_once: Made) -> Path:
 plain = cache(engines.plain)
 
 
-class Fmu:
-    """An FMU that runs in FMPy, variables by name."""
-
-    def __init__(self, folder: Path, **values: float | bool) -> None:
-        description = fmpy.read_model_description(str(folder), validate=False)
-        self.variables = {v.name: v for v in description.modelVariables}
-        identifier = description.coSimulation.modelIdentifier
-        self.slave = FMU2Slave(
-            guid=description.guid, unzipDirectory=str(folder), modelIdentifier=identifier, instanceName=identifier
-        )
-        self.time = 0.0
-        self.slave.instantiate()
-        self.slave.setupExperiment(startTime=0.0)
-        self.slave.enterInitializationMode()
-        self.set(**values)
-        self.slave.exitInitializationMode()
-
-    def set(self, **values: float | bool) -> None:
-        for name, value in values.items():
-            variable = self.variables[name]
-            put = self.slave.setBoolean if variable.type == "Boolean" else self.slave.setReal
-            put([variable.valueReference], [value])
-
-    def get(self, *names: str) -> list[float]:
-        return list(self.slave.getReal([self.variables[name].valueReference for name in names]))
-
-    def step(self, times: int = 1, /, **values: float | bool) -> None:
-        self.set(**values)
-        for _ in range(times):
-            self.slave.doStep(currentCommunicationPoint=self.time, communicationStepSize=STEP)
-            self.time += STEP
-
-    def stop(self) -> None:
-        self.slave.terminate()
-        self.slave.freeInstance()
-
-
-Start = Callable[..., Fmu]
-
-
-@pytest.fixture
-def start(folder: Path) -> Iterator[Start]:
-    """Return a function that starts an FMU with values. All are stopped in the end."""
-    keep_loaded(folder / "Autopilot")
-    running = []
-
-    def start_one(name: str, **values: float | bool) -> Fmu:
-        running.append(Fmu(folder / name, **values))
-        return running[-1]
-
-    yield start_one
-    for fmu in running:
-        fmu.stop()
-
-
-COMMANDS = ("u_l", "u_r", "u_t")
-
-
 # ---- The autopilot ---------------------------------------------------------------------------------------------------
-
-
-def test_commands_keep_their_limits(start: Start) -> None:
-    autopilot = start(
-        "Autopilot", depth_hold=True, heading_hold=True, z_ref=50.0, psi_ref=3.0, surge=1.0, u_max=0.6, u_rate=2.0
-    )
-    rows = []
-    for n in range(1000):
-        if n == 300:
-            autopilot.set(z_ref=-50.0, psi_ref=-3.0, surge=-1.0)
-        autopilot.step()
-        rows.append(autopilot.get(*COMMANDS))
-    assert np.abs(rows).max() <= 0.6
-    assert rows[-1] == pytest.approx([-0.6, 0.6, -0.6])  # it ends at all limits
-    assert np.abs(np.diff(rows, axis=0)).max(axis=0) == pytest.approx(2.0 * STEP)  # and went there as fast as it may
-
-
-LOOPS = {
-    "depth": ("depth_hold", "z_ref", "z", "heave", "u_t"),
-    "heading": ("heading_hold", "psi_ref", "psi", "yaw", "u_l"),
-}
-"""The switch, target, measured value, stick and command of each loop."""
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_the_integral_does_not_wind_up(start: Start, loop: str) -> None:
-    switch, target, measured, _, command = LOOPS[loop]
-    away = 2.0
-
-    def steps_at_the_limit(T_t: float) -> int:
-        """It is held fast for a minute, comes free and passes the target: how long the command stays at its limit."""
-        autopilot = start("Autopilot", T_t=T_t, **{switch: True, target: away})
-        autopilot.step(round(60.0 / STEP))
-        assert autopilot.get(command) == [1.0]
-        for n in range(round(60.0 / STEP)):
-            autopilot.step(**{measured: min(2.0 * away, 0.01 * n)})
-            if autopilot.get(command)[0] < 1.0:
-                break
-        return n
-
-    free, wound_up = steps_at_the_limit(1.0), steps_at_the_limit(1e9)
-    assert free <= 200  # before it is there
-    assert wound_up >= 1000
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_a_hold_goes_on_without_a_jump(start: Start, loop: str) -> None:
-    switch, target, measured, stick, command = LOOPS[loop]
-    rate = 0.12
-    autopilot = start("Autopilot", **{stick: 0.45, target: 3.0})
-    for n in range(40):
-        autopilot.step(**{measured: rate * n * STEP})
-    (before,) = autopilot.get(command)
-    assert before == pytest.approx(0.45)
-    autopilot.step(**{measured: rate * 40 * STEP, switch: True})
-    assert autopilot.get(command) == pytest.approx([before], abs=1e-9)
-    autopilot.step(**{measured: rate * 41 * STEP})
-    assert autopilot.get(command) == pytest.approx([before], abs=0.15)  # then it starts towards the target
-    assert autopilot.get(command)[0] > before
-
-
-def test_a_compass_may_wrap(start: Start) -> None:
-    def commands(wrapped: bool) -> list[list[float]]:
-        autopilot = start("Autopilot", heading_hold=True, psi=radians(340.0), psi_ref=radians(20.0))
-        rows = []
-        for n in range(200):
-            psi = radians(340.0 + 0.25 * n)
-            autopilot.step(psi=psi % (2.0 * pi) if wrapped else psi)
-            rows.append(autopilot.get(*COMMANDS))
-        return rows
-
-    found = np.array(commands(True))
-    assert found == pytest.approx(np.array(commands(False)), abs=1e-9)
-    assert found[4, 0] > 0.0, "the short way round: to starboard, through north"
 
 
 # ---- The closed loop -------------------------------------------------------------------------------------------------

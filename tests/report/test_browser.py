@@ -17,7 +17,7 @@ from tests.report.pages import UNFOLD
 from tests.report.results import example
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    pass
 
 pytestmark = pytest.mark.interop
 
@@ -72,12 +72,6 @@ def test_a_page_asks_for_nothing_fits_and_is_accessible(
     assert (seen.messages, seen.requests) == ([], [url])
 
 
-def test_the_evidence_is_printed_on_few_pages(evidence: Path, visit: Callable[..., Visit]) -> None:
-    page = visit().page
-    page.goto(evidence.as_uri())
-    assert 2 <= len(re.findall(rb"/Type /Page\b", page.pdf(prefer_css_page_size=True))) <= 4
-
-
 # ---- The report of an identification ---------------------------------------------------------------------------------
 
 
@@ -120,42 +114,3 @@ def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, v
     seen.page.mouse.move(5, 5)
     assert seen.page.locator(".broad .values span").count() == 0
     assert (seen.problems(), seen.requests) == ([], [report.as_uri()])
-
-
-def test_a_plot_of_the_report_zooms_by_dragging_and_by_keys(report: Path, visit: Callable[..., Visit]) -> None:
-    seen = visit(width=1440)
-    seen.page.goto(report.as_uri())
-    plot, keys = seen.page.locator(".broad svg"), seen.page.keyboard
-    ticks = plot.locator(".zoomed").last.locator("text")
-    for action, place in (("hover", 0.3), ("down", 0), ("hover", 0.5), ("up", 0)):
-        if action == "hover":
-            plot.hover(position={"x": place * plot.evaluate("svg => svg.clientWidth"), "y": 60})
-        else:
-            getattr(seen.page.mouse, action)()
-    zoomed = [float(text) for text in ticks.all_text_contents()]
-    assert len(zoomed) >= 4
-    assert 0.0 < min(zoomed) < max(zoomed) < 40.0, "a fifth of the minute"
-    plot.dblclick(position={"x": 500, "y": 60})
-    assert plot.locator(".zoomed").count() == 0
-    plot.focus()
-    first = seen.page.locator(".broad .values span").first
-    shown = []
-    for _ in range(2):
-        keys.press("ArrowRight")
-        shown.append(first.inner_text())
-    assert shown[0] != shown[1]
-    for key, panels in (("+", 4), ("Escape", 0)):
-        keys.press(key)
-        assert plot.locator(".zoomed").count() == panels
-    assert not seen.problems()
-
-
-def test_without_scripts_the_report_has_its_plots(report: Path, browser: "Browser") -> None:
-    context = browser.new_context(java_script_enabled=False, viewport={"width": 1440, "height": 900})
-    page = context.new_page()
-    page.goto(report.as_uri())
-    box = page.locator(".broad svg").bounding_box()
-    assert box is not None
-    assert box["height"] > 200
-    assert page.locator(".values").count() == 0
-    context.close()

@@ -3,8 +3,6 @@
 import io
 import re
 from dataclasses import dataclass
-from decimal import Decimal
-from math import inf, nan
 from pathlib import Path
 from time import sleep
 
@@ -13,9 +11,8 @@ from rich.progress import Progress, TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
-from rov_fmu.report import templates
-from rov_fmu.report.console import console, paragraph, print_end, print_table, table, text
-from rov_fmu.report.progress import Parts, StudyParts, parts, per_second
+from rov_fmu.report.console import console, paragraph, print_end, print_table, table
+from rov_fmu.report.progress import Parts, StudyParts, parts
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -100,30 +97,3 @@ def test_a_pipe_gets_a_line_again_and_again(
     assert 1 <= len(found) <= 3, "none after the end"
     sleep(0.1)
     assert not capsys.readouterr().err
-
-
-@pytest.mark.parametrize(("rate", "words"), [(1120.4, "1,120 runs/s"), (10.0, "10 runs/s"), (0.25, "0.25 runs/s")])
-def test_a_rate_is_never_written_with_an_exponent(rate: float, words: str) -> None:
-    assert per_second(rate) == words
-
-
-@pytest.mark.parametrize(
-    ("value", "form", "written"),
-    [
-        (-1e-5, ".3f", "0.000"),
-        (-0.0, "", "0.0"),
-        (-1e-5, "+.1%", "+0.0%"),
-        (-0.0006, ".3f", "-0.001"),
-        (Decimal("0.10"), "", "0.10"),
-        (-inf, ".2f", "-inf"),
-        (nan, ".2f", "-"),
-        (None, "", "-"),
-    ],
-)
-def test_a_number_that_is_rounded_to_0_has_no_minus_sign(
-    value: float | Decimal | None, form: str, written: str
-) -> None:
-    assert text(value, form) == written
-    if isinstance(value, float):
-        page = written.replace("%", " %").replace("inf", "∞").replace("-", "–" if written == "-" else "−")
-        assert templates.text(value, form) == page

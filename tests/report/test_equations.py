@@ -111,7 +111,7 @@ def test_the_equations_shown_are_those_of_the_vehicle(kind: str) -> None:
     assert {name for name in rov.layout.calculated if not name.startswith("F_")} <= found
 
 
-@pytest.mark.parametrize("vehicles", [50, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("vehicles", [20, pytest.param(1000, marks=pytest.mark.long)])
 def test_the_equations_shown_are_those_of_any_vehicle(vehicles: int) -> None:
     rng = random.Random(2)
     for axes in ("uvwpqr", "uwq", "pq", "uvwpqr"):
@@ -139,37 +139,6 @@ def test_the_equations_of_the_paper_are_those_of_the_paper() -> None:
         "z' = w",
         "ψ' = r",
     ]
-
-
-@pytest.mark.parametrize(
-    ("layout", "lines"),
-    [
-        (
-            ROVS["everything"].layout,
-            [
-                "M_w w' = −α_w F_5 + Z_ext + F_0_w − b_d_w± w − a_d_w± |w| w  (18b)",
-                "c_2 = u_surge + u_sway + u_yaw",
-                "F_1* = sgn(c_1) (a_t_frame± m_1² + b_t_frame± m_1) where m_1 > 0, else 0  the maker's table",
-                "T_frame F_1' = F_1* − F_1",
-            ],
-        ),
-        (
-            SIX.layout,
-            [
-                "m_uq = (m_a_uq + m_rov z_G) / √(β_u β_q)",
-                "k_a = d_t200± |u_a|",
-                "z' = V_D + u R_31 + v R_32 + w R_33",
-                "ε_1' = 0.5 (η p + ε_2 r − ε_3 q)",
-                "θ = atan2(−R_31, √(R_32² + R_33²))",
-            ],
-        ),
-        (random_body(random.Random(1), "uwr").layout, ["m_ur = −m_rov y_G / √(β_u β_r)"]),
-    ],
-    ids=["lag, coupling, dead band and reverse", "six axes", "momenta along axes that it lacks"],
-)
-def test_every_effect_is_shown_as_in_a_book(layout: Layout, lines: list[str]) -> None:
-    shown = _text(layout)
-    assert [line for line in lines if line not in shown] == []
 
 
 @pytest.mark.parametrize("kind", ROVS)

@@ -13,10 +13,9 @@ from typing import Any
 import pytest
 from lxml import html
 
-from rov_fmu.fmu.archive import Content, native_content, python_content, web_module
+from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
-from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -27,7 +26,6 @@ from tests.report.pages import (
     rows,
     text_of,
 )
-from tests.vehicles import SIX, VEHICLES, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
@@ -112,27 +110,6 @@ def test_what_flies_is_small_and_its_script_alone_is_allowed(page: str, vehicle:
     check_live_section(page, vehicle)
 
 
-@pytest.mark.long
-def test_what_flies_for_another_vehicle_is_the_same_twice(heavy: Vehicle) -> None:
-    compiled = web_module(heavy.layout)
-    assert web_module(heavy.layout) == compiled
-    check_live_section(page_without_plots(heavy, module=compiled), heavy)
-
-
-def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
-    heavy: Vehicle, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    declared = [replace(v, start=500.0) if v.name == "Z_ext" else v for v in variables(heavy)]
-    monkeypatch.setattr("rov_fmu.report.page.live.variables", lambda _: declared)
-    root = html.fromstring(fly_page([Flown(heavy, b"")]))
-    letters = re.findall(r"\b[A-Z]\b", " ".join(kbd.text for kbd in root.get_element_by_id("live-keys").iter("kbd")))
-    assert len(set(letters)) == len(letters) == 2 * len(heavy.layout.axes)
-    start = {slider.get("name"): float(slider.get("value")) for slider in root.iter("input") if slider.get("name")}
-    starts = {v.name: v.start for v in declared}
-    assert start == {name: starts.get(name, 10.0) for name in start}, "the seabed, at 10 m, is of the page"
-    assert {*heavy.layout.inputs} <= {*start}
-
-
 def test_every_variable_and_coefficient_has_its_row(page: str, vehicle: Vehicle) -> None:
     table = rows(page)
     for v in variables(vehicle):
@@ -159,44 +136,11 @@ def test_published_tables_side_by_side(page: str, vehicle: Vehicle) -> None:
     assert "rear thrust is then negative below 27 %" in text, "by curve (8), the alternative"
 
 
-def test_a_page_without_data_pictures_and_live_section(pilchard_page: str) -> None:
-    check_is_whole(pilchard_page)
-    check_refers_to_itself_alone(pilchard_page)
-    root = html.fromstring(pilchard_page)
-    assert not list(root.iter("script"))
-    assert root.get_element_by_id("tables", None) is None
-    assert (len(list(root.iter("svg"))), len(list(root.iter("img")))) == (10, 0)
-    assert "printed" not in pilchard_page
-    assert "The rear thrust is negative below 27 %." in pilchard_page
-
-
 def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
     odd = replace(vehicle, name=ODD_NAME, description="<script>", data=None)
     root = html.fromstring(page_without_plots(odd))
     assert root.findtext(".//h1") == ODD_NAME
     assert not list(root.iter("script"))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("changes", "limits"),
-    [
-        ({"alpha_u": 0.0, "beta_w": 0.0, "R": 0.0, "a_d_u": 0.0, "b_d_w": 0.0, "a_t_top": -6.0}, (0.2, 0.201)),
-        ({"m_rov": 1e-3, "a_t_rear": 1e6}, (0.001, 0.002)),
-    ],
-)
-def test_any_coefficients_and_any_range_of_commands(
-    vehicle: Vehicle, changes: dict[str, float], limits: tuple[float, float]
-) -> None:
-    changed = replace(vehicle.replaced(changes), command_range=limits, data=None)
-    assert "The rear thrust is negative" not in documentation_page(changed)
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(None, "–"), (0.0, "0"), (-1e6, "−10⁶"), (1e-6, "10⁻⁶"), (2.5e7, "2.5·10⁷"), (0.0513, "0.0513")]
-)
-def test_number(value: float | None, text: str) -> None:
-    assert number(value) == text
 
 
 def test_the_page_of_each_kind_of_fmu_claims_what_that_does(vehicle: Vehicle, page: str) -> None:
@@ -249,48 +193,3 @@ def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_p
         m = 1.0 - k["c_0_t200"]
         force = 4.0 * (k[f"a_t_t200{end}"] * m**2 + k[f"b_t_t200{end}"] * m) + sign * k["F_0_w"]
         assert k["a_d_w"] * V**2 + k["b_d_w"] * V == pytest.approx(force, rel=2e-3)
-
-
-def test_the_page_of_six_axes_tells_of_attitude_and_weight() -> None:
-    page = page_without_plots(a_vehicle(SIX))
-    check_is_whole(page)
-    check_refers_to_itself_alone(page)
-    text = text_of(page)
-    for claim in (
-        "surge, sway, heave, roll, pitch and yaw are coupled by the terms of Coriolis and Munk",
-        "weight and buoyancy right the vehicle",
-        "The attitude is a quaternion from the body frame to the earth frame.",
-        "A thruster loses k times its speed of advance",
-    ):
-        assert claim in text, claim
-    for claim in ("Pitch, roll", "loss of thrust", "diagonal mass", "uoyancy is neutral", "heavy by 1 N"):
-        assert claim not in text, claim
-
-
-@pytest.mark.parametrize(
-    ("changes", "title"),
-    [
-        ({"name": "Other"}, "VideoRay Pro 4 beside Other"),
-        ({"version": "2"}, "VideoRay Pro 4 {version} beside VideoRay Pro 4 2"),
-        ({}, "VideoRay Pro 4 (old.toml) beside VideoRay Pro 4 (new.toml)"),
-    ],
-)
-def test_vehicles_of_the_same_name_are_told_apart(vehicle: Vehicle, changes: dict[str, Any], title: str) -> None:
-    flown = [Flown(vehicle, b"", "old.toml"), Flown(replace(vehicle, **changes), b"", "new.toml")]
-    root = html.fromstring(fly_page(flown))
-    title = title.format(version=vehicle.version)
-    assert [element.text for element in root.iter("title", "h1")] == [f"{title} \N{EN DASH} fly it", title]
-    assert f"The ghost is {title.split(' beside ')[1]}, under" in " ".join(root.text_content().split())
-
-
-@pytest.mark.parametrize("kind", ["coupled without lag, three commands, no heave", "surge and sway without yaw"])
-def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
-    vehicle = a_vehicle(VEHICLES[kind])
-    page = page_without_plots(vehicle)
-    check_refers_to_itself_alone(page)
-    text = text_of(page)
-    turns = ["psi", "ψ"] if "yaw" in kind else []
-    for name in ("Z_ext", "u_l", "F_t", "tau_rear", "m_a_w", "rear", "top thruster", *turns):
-        assert name not in text, name
-    for v in variables(vehicle):
-        assert v.name in text

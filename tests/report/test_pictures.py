@@ -5,22 +5,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from io import BytesIO
-from math import atan2, dist
 from typing import Any
 
-import numpy as np
 import pytest
 from lxml import etree
 from matplotlib.figure import Figure
 from matplotlib.image import imread
-from matplotlib.text import Annotation
 
 from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
-from rov_fmu.report.plots.drawing import draw_thrusters
-from rov_fmu.report.plots.geometry import scenes
-from rov_fmu.report.plots.png import png_file
 from rov_fmu.report.plots.svg import inline_svg, with_formulas
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -64,11 +58,6 @@ def test_the_icon_is_transparent_and_the_diagram_is_not() -> None:
     assert (decoded(shipped("videoray")["documentation/diagram.png"])[..., 3] == 1.0).all()
 
 
-def test_vehicles_have_pictures_of_their_own() -> None:
-    for path in (ICON, "terminalsAndIcons/icon.svg", "documentation/diagram.png"):
-        assert shipped("videoray")[path] != shipped("bluerov2_heavy")[path]
-
-
 @pytest.mark.parametrize(
     "foreign", ["$_$", "$x^$", r"$\frac{$", "\x1b[31mred $", "\0$a_$", "Kälte $^$ 温度", "</text>$\\"]
 )
@@ -109,35 +98,4 @@ def test_model_png_is_the_own_picture_or_else_the_icon(vehicle: Vehicle, content
     assert content_of(bare, shipped("videoray")).files["model.png"] == shipped("videoray")[ICON]
 
 
-@pytest.mark.parametrize("size", [(0.29, 0.57), (1.14, 0.58)])
-def test_a_png_has_the_pixels_asked_for_in_flat_colours(size: tuple[float, float]) -> None:
-    """Odd widths too, whose last row ends within a byte."""
-
-    def draw(figure: Figure) -> None:
-        ax = figure.subplots()
-        ax.set_axis_off()
-        ax.axvspan(0.0, 0.5, color="#0a5cad", linewidth=0.0)
-        ax.set_xlim(0.0, 1.0)
-
-    pixels = np.round(255 * decoded(png_file(draw, size, background="white"))).astype(int)
-    assert pixels.shape[:2] == (round(100 * size[1]), round(100 * size[0]))
-    assert (pixels[:, 1, :3] == [0x0A, 0x5C, 0xAD]).all()
-    assert (pixels[:, -1, :3] == 255).all()
-
-
 # ---- The thrusters in a drawing --------------------------------------------------------------------------------------
-
-
-def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehicle) -> None:
-    """An arrow begins at the thruster and points along its direction; in pixels y is down."""
-    ax = Figure(figsize=(6.0, 6.0)).subplots()
-    draw_thrusters(ax, heavy, scenes(heavy)["from above"])
-    arrows = [(a.xyann, a.xy) for a in ax.texts if isinstance(a, Annotation)]
-    names = {text.get_text() for text in ax.texts}
-    for thruster in heavy.layout.thrusters:
-        assert f"$F_{{{thruster.name}}}$" in names
-        ahead, aside, down = thruster.direction.value
-        if down == 0.0:
-            ((start, tip),) = [a for a in arrows if dist(a[0], thruster.place[:2]) < 0.03]
-            assert atan2(tip[1] - start[1], tip[0] - start[0]) == pytest.approx(atan2(aside, ahead), abs=0.2)
-    assert ax.yaxis_inverted()

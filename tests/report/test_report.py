@@ -8,7 +8,6 @@ from datetime import date
 from functools import partial
 from hashlib import sha256
 from io import StringIO
-from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, next_tests, told
@@ -26,10 +25,11 @@ from rov_fmu.report import report
 from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
-from rov_fmu.report.templates import number, readable, sentence, with_interval
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.report.templates import number, readable, with_interval
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
+from tests.conftest import Made
 from tests.report.conftest import Visit
 from tests.report.pages import (
     check_breaks_long_words,
@@ -50,8 +50,10 @@ SECTIONS = [
 
 
 @pytest.fixture(scope="module")
-def page() -> str:
-    return report_page(example())
+def page(made_once: Made) -> str:
+    """The report, which is drawn once in a run."""
+    folder = made_once("report", lambda folder: (folder / "report.html").write_text(report_page(example()), "utf-8"))
+    return (folder / "report.html").read_text("utf-8")
 
 
 def leave_plots_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,6 +98,7 @@ def test_the_page_is_whole_loads_nothing_and_answers_the_owners_questions_first(
     assert shown == [*verdicts, "What you can expect", "What to measure next", "Warnings"]
 
 
+@pytest.mark.interop
 def test_long_words_break(page: str, tmp_path: Path, visit: Callable[..., Visit]) -> None:
     check_breaks_long_words(page, tmp_path / "report.html", visit)
 
@@ -135,19 +138,6 @@ def test_ten_questions_of_an_owner_are_answered_before_anything_is_unfolded(monk
     assert told_first.index("First: Repair log_2.csv") < told_first.index("surge: good")
     assert words.index("First: Repair") < words.index("Surge: good") < words.index("What you can expect")
     assert "Repair" not in unfolded(report_page(example(), made=date(2026, 11, 23)))
-
-
-def test_findings_stand_under_their_headings(page: str) -> None:
-    made = example().vehicle.provenance
-    assert made
-    lists = {
-        ul.get("class"): [" ".join(li.text_content().split()) for li in ul] for ul in html.fromstring(page).iter("ul")
-    }
-    assert lists["warnings"] == [f"{sentence(warning)}." for warning in made.warnings]
-    assert lists["facts"] == [f"{sentence(fact)}." for fact in made.facts]
-    assert "doubts" not in lists
-    assert sentence("the thrust changes in log_1.csv") == "The thrust changes in log_1.csv"
-    assert sentence("a b.csv: 3 pulses of 0 or 65535 us, -55%") == "a b.csv: 3 pulses of 0 or 65535 µs, −55 %"
 
 
 ANSWER = (
@@ -190,16 +180,6 @@ def test_everything_that_was_found_has_its_row(page: str) -> None:
         assert f"{name}: SHA3-256 {digest}" in text_of(page)
 
 
-def test_predictions_answers_and_forces_have_their_plots(page: str) -> None:
-    shown = labels(page)
-    predicted = [label for label in shown if label.startswith("Prediction of")]
-    assert len(predicted) == len(set(predicted)) == 4
-    assert predicted[1] == "Prediction of surge: surge velocity of log_2.csv, whole log"
-    answered = [f"{one} over the command" for one in ("Steady velocity", "Time to 63 % of the steady velocity")]
-    assert {f"{one}: {axis.name}" for one in answered for axis in (SURGE, HEAVE, YAW)} <= {*shown}
-    assert "Force over the command: top" in shown
-
-
 # ---- Without plots ---------------------------------------------------------------------------------------------------
 
 
@@ -221,19 +201,7 @@ def test_a_report_of_almost_nothing_says_so() -> None:
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_numbers_that_are_not_known_are_dashes() -> None:
-    result = without_findings()
-    surge, *others = result.axes
-    points = tuple(replace(p, held_out=nan) for p in surge.points)
-    known = tuple(replace(one, interval=None) for one in surge.known)
-    answers = tuple(replace(a, rise=(inf, (inf, inf))) for a in surge.answers)
-    axis = replace(surge, points=points, known=known, answers=answers)
-    page = report_page(told(replace(result, axes=(axis, *others))))
-    assert not {"nan", "inf"} & {*re.findall(r"[a-z]+", text_of(page))}
-    assert ["a_d_u", "10", "not determined", "N·s²/m²", "20 within a factor of 2, from the base", "10 %"] in rows(page)
-
-
-def test_another_fit_is_compared_in_every_table_and_plot_that_it_has_numbers_for() -> None:
+def test_another_fit_is_compared_in_every_table_that_it_has_numbers_for() -> None:
     other = load_vehicle(VIDEORAY)
     axes = []
     for result in example().axes:
@@ -243,9 +211,7 @@ def test_another_fit_is_compared_in_every_table_and_plot_that_it_has_numbers_for
     page = report_page(replace(example(), against=other, axes=tuple(axes)))
     table = rows(page)
     assert f"“Compared” is {other.name}." in unfolded(page)
-    V, Tau = other.response(SURGE, 0.5)
-    (answer,) = [row for row in table if row[:2] == ["50 %", "compared"] and row[5] == "m/s" and float(row[2]) > 1.0]
-    assert [float(answer[2]), float(answer[6])] == pytest.approx([V, Tau], rel=1e-3)
+    V = other.response(SURGE, 0.5)[0]
     columns = {
         ("Forwardsurge",): (2, number(V, 3)),
         ("a_d_u",): (4, number(other["a_d_u"], 4)),
@@ -256,16 +222,7 @@ def test_another_fit_is_compared_in_every_table_and_plot_that_it_has_numbers_for
     for begin, (column, value) in columns.items():
         (row,) = [row for row in table if row[: len(begin)] == [*begin]]
         assert value in row[column], begin
-    plots = [svg for svg in html.fromstring(page).iter("svg") if "Main" not in svg.get("aria-label")]
-    assert all('"compared"' in html.tostring(svg, encoding="unicode").replace("&quot;", '"') for svg in plots)
     assert "compared" not in text_of(report_page(example()))
-
-
-def test_the_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
-    (half,) = [a for a in assess.answers_of_file(load_vehicle(SHIPPED["videoray_refit"]), HEAVE) if a.command == 0.5]
-    low, high = half.steady[1]
-    assert 0.8 < low / half.steady[0] < 0.99
-    assert 1.01 < high / half.steady[0] < 1.2
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -320,15 +277,6 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
     shown = unfolded(page).casefold()
     for sentence_ in (STOPPING, *made.warnings, *next_tests(example()), *example().axes[2].verdict.reasons):
         assert readable(sentence_).casefold() in shown
-
-
-def test_a_narrow_terminal_gets_several_tables_and_no_number_is_broken(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = printed(example(), monkeypatch, 40)
-    assert max(map(len, lines)) <= 40
-    speeds = [line for line in lines if line.startswith("bow to starboard (yaw)")]
-    assert len(speeds) == "".join(speeds).count("±30%") == 5
-    assert any("90 deg/s ±30%" in line for line in speeds)
-    assert "…" not in "".join(lines)
 
 
 # ---- The file, and the FMU -------------------------------------------------------------------------------------------

@@ -14,14 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.build import build
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.study import Results, study
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.folders import FORCE, HEAD, MASS, SPEED, TAU, beside
+from tests.folders import FORCE, HEAD, MASS, SPEED, TAU
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 from verification.references.pool import Array
@@ -33,7 +32,7 @@ PLANS = (
     ((0.0, 3.0), (0.45, 12.0), (0.2, 12.0), (0.0, 10.0), (0.7, 8.0), (0.0, 12.0)),
 )
 OFF, TIMES = 8.0, (1.0, 2.0, 4.0, 8.0, 9.0, 10.0, 12.0, 16.0)
-PLAN = f"""fmu = "{{fmu}}"
+PLAN = f"""vehicle = "found.toml"
 vary_from = "found.toml"
 stop_time = 16.0
 step = 0.5
@@ -100,26 +99,11 @@ def true_motion(k: Vehicle) -> dict[str, Array]:
     return {"u": u, "x": x, "stopping_distance": x[-1:] - x[TIMES.index(OFF)]}
 
 
-class Fmus:
-    """The FMUs of identified vehicles. Vehicles that differ only in coefficients that are drawn share one FMU."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder, self._made = folder, dict[object, Path]()
-
-    def of(self, vehicle: Vehicle) -> Path:
-        """Return the FMU for studies of a vehicle."""
-        key = tuple((name, name in vehicle.intervals or value) for name, value in vehicle.coefficients.items())
-        if key not in self._made:
-            path = self._folder / f"{len(self._made)}.fmu"
-            self._made[key] = build(vehicle, path, platforms=["host"]).path
-        return self._made[key]
-
-
 @pytest.mark.parametrize(
     ("kind", "vehicles", "width"),
     [
-        pytest.param("points", 15, 0.25, marks=pytest.mark.long),
-        pytest.param("recordings", 4, 0.1, marks=pytest.mark.long),
+        pytest.param("points", 8, 0.25, marks=pytest.mark.long),
+        pytest.param("recordings", 3, 0.1, marks=pytest.mark.long),
         pytest.param("points", 60, 0.25, marks=pytest.mark.weekly),
         pytest.param("recordings", 15, 0.1, marks=pytest.mark.weekly),
     ],
@@ -131,7 +115,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, schedul
 
     docs/studies.md gives the shares for 40 vehicles, which would take too long here.
     """
-    fmus, widths = Fmus(tmp_path), list[float]()
+    widths = list[float]()
     inside = {(level, of): list[float]() for level in LEVELS for of in ("u", "x", "stopping_distance")}
     for seed in range(vehicles):
         random, folder = np.random.default_rng([seed, len(kind)]), tmp_path / str(seed)
@@ -142,7 +126,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, schedul
         KINDS[kind](folder / "tests", k, random)
         found = identify(load_tests(folder / "tests")).vehicle
         write_vehicle(found, folder / "found.toml")
-        (folder / "plan.toml").write_text(PLAN.format(fmu=beside(fmus.of(found), folder), seed=seed), encoding="utf-8")
+        (folder / "plan.toml").write_text(PLAN.format(seed=seed), encoding="utf-8")
         results = study(folder / "plan.toml", folder / "results", scheduler=scheduler)
         assert results.warnings == ()
         for of, true in true_motion(k).items():

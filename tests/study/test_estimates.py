@@ -66,15 +66,6 @@ def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
     assert np.corrcoef(drawn.T) == pytest.approx(expected, abs=0.04)
 
 
-def test_what_the_fmu_does_not_take_is_not_drawn() -> None:
-    has = _has(MADE) | {"a_d_u": replace(_has(MADE)["a_d_u"], minimum=8.5, maximum=9.25)}
-    plan, found = _estimates(MADE, has)
-    a_d, b_d, _ = Design(plan, has, found.known).rows(0, 512).T
-    assert [a_d.min(), a_d.max()] == [8.5, 9.25]
-    at_most = a_d == 9.25
-    assert b_d[at_most].mean() == pytest.approx(5.0 - 0.8 * 0.3 / 0.5 * 0.25, abs=0.02), "what a fit with it held finds"
-
-
 # ---- Messages --------------------------------------------------------------------------------------------------------
 
 
@@ -103,20 +94,12 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
     narrow = has | {"b_d_u": replace(has["b_d_u"], minimum=6.0, maximum=7.0)}
     all_set = {"a_d_u": 9.0, "b_d_u": 5.0}
     for words, (_, estimates) in (
-        (
-            "a grid needs values or a range, but estimated coefficients have distributions",
-            _estimates(made, sampler="grid", runs=None),
-        ),
         ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
         ("b_d_u of this vehicle does not fit the FMU: it must be within 6 ... 7 N.s/m", _estimates(made, narrow)),
         ("nothing varies, because [set] gives every coefficient that has an interval", _estimates(made, set=all_set)),
     ):
         (line,) = estimates.check()
         assert line.startswith(f"vary_from = 'its.toml': {words}")
-    (line,) = _estimates(made, sampler="saltelli")[1].check()
-    assert line == (
-        "sampler = 'saltelli': Sobol indices need independent variables, but all varied variables are correlated"
-    )
 
 
 # ---- Done ------------------------------------------------------------------------------------------------------------

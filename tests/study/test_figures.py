@@ -63,23 +63,6 @@ def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there
     assert found[0] == 2.0, "the next run has nothing of this one's errors"
 
 
-@pytest.mark.parametrize("function", ["max", "min", "abs", "round", "sum", "mean", "sorted", "any", "all"])
-def test_a_function_is_numpys_and_hides_no_nan(function: str) -> None:
-    y = np.array([2.0, -7.0, nan, 1.0])
-    whole = Figures({"f": f"1.0 * sum({function}(y))"}, y).of({"y": y[[0, 1, 3]]})[0]
-    numpys = getattr(np, {"sorted": "sort"}.get(function, function))
-    assert whole == [float(np.sum(numpys(y[[0, 1, 3]])))]
-    if function not in ("any", "all"):
-        assert Figures({"f": f"sum({function}(y))"}, y).of({"y": y})[0] == pytest.approx([nan], nan_ok=True)
-
-
-def test_a_figure_that_is_nan_or_infinite_is_missing_with_this_reason() -> None:
-    for expression in ("Tau(0*y)", "overshoot(0*y)", "settling_time(0*y)", "log(-m)", "V_ss(0*y/0)"):
-        found, reason = Figures({"f": expression}, T).of({"y": FIRST, "m": 6.5})
-        assert (repr(found), reason) == ("[nan]", "f: is NaN")
-    assert Figures({"f": "max(y/0)"}, T).of({"y": FIRST[300:]})[1] == "f: is infinite"
-
-
 @pytest.mark.parametrize("function", ["V_ss", "Tau", "overshoot", "settling_time"])
 def test_a_time_that_no_run_has_is_refused_before_the_first_run_by_one_rule(function: str) -> None:
     reason = "there is no time {} s in a run from 0 to 40 s"

@@ -51,11 +51,3 @@ def test_a_run_is_written_by_its_number(tmp_path: Path, scheduler: str, capsys: 
     assert main([*given, "--mcap", "9"]) == 2
     assert "--mcap 9: there is no such run with outputs" in capsys.readouterr().err
     assert not (folder / "run-9.mcap").exists()
-
-
-def test_a_plan_of_a_foreign_fmu_has_no_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "plan.toml"
-    path.write_text(PLAN.replace("vehicle =", "fmu =").replace("bluerov2_heavy", "x.fmu"), encoding="utf-8")
-    (tmp_path / "x.fmu").touch()
-    assert main(["study", str(path), "-o", str(tmp_path / "results"), "--mcap", "0"]) == 2
-    assert "the plan must have `vehicle`" in capsys.readouterr().err

@@ -1,8 +1,6 @@
 """The page about a study shows what is in its data frames."""
 
 import re
-import warnings
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,8 +11,7 @@ from rov_fmu.cli import main
 from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
 from tests.folders import beside
-from tests.report.conftest import Visit
-from tests.report.pages import check_breaks_long_words, check_is_whole
+from tests.report.pages import check_is_whole
 
 
 @pytest.fixture(scope="module")
@@ -70,10 +67,6 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert study_page(results) == text, "the page is the same for the same results"
 
 
-def test_long_words_break(done: Path, tmp_path: Path, visit: Callable[..., Visit]) -> None:
-    check_breaks_long_words((done / "study.html").read_text(encoding="utf-8"), tmp_path / "study.html", visit)
-
-
 def test_a_grid_shows_figures_over_what_varies(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
     (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(videoray_fmu, tmp_path)}"
 stop_time = 2.0
@@ -103,50 +96,6 @@ T = "Tau(u)"
     assert head == ["u_l", "m_rov (kg)", "V", "way", "sway", "T"]
     shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
     assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
-
-
-@pytest.mark.parametrize(
-    ("sampler", "size"), [("saltelli", 1e308), pytest.param("grid", 3e-320, marks=pytest.mark.long)]
-)
-def test_extreme_values_and_foreign_text_do_not_cost_the_page(
-    sampler: str, size: float, foreign: Callable[..., Path], tmp_path: Path, scheduler: str
-) -> None:
-    """`wide` overflows in some runs, and y is infinite there; a plot of such numbers may be a line with the reason."""
-    with zipfile.ZipFile(foreign()) as old, zipfile.ZipFile(tmp_path / "strange.fmu", "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            if name == "modelDescription.xml":
-                content = content.replace(b'min="-10" max="10"', b'unit="$_$"').replace(
-                    b'start="0"/>', b'start="0" unit="$^{"/>'
-                )
-            new.writestr(name, content)
-    varied = {
-        "saltelli": f"b.uniform = [{-0.9 * size}, {0.9 * size}]\nu.uniform = [0.0, {size}]",
-        "grid": f"b.values = [{-0.9 * size}, 0.0, {0.9 * size}]\nu.values = [0.0, {size}]",
-    }
-    (tmp_path / "plan.toml").write_text(f"""fmu = "strange.fmu"
-stop_time = 2.0
-step = 0.5
-{"runs = 64" if sampler == "saltelli" else ""}
-sampler = "{sampler}"
-[set]
-fast = true
-[vary]
-{varied[sampler]}
-[keep]
-outputs = ["y"]
-[figures]
-"$_{{" = "u"
-"\\u001b[31m" = "b"
-wide = "y[-1]"
-""")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        arguments = [str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results"), "--scheduler", scheduler]
-        assert main(["study", *arguments]) == 0
-    page = html.parse(tmp_path / "results" / "study.html")
-    runs = Results(tmp_path / "results").runs
-    assert f"{len(runs)} of {len(runs)} runs, 0 failed" in page.xpath("string(//body)")
 
 
 def test_the_page_shows_which_sobol_indices_are_uncertain(
@@ -189,18 +138,6 @@ down = "a - u / 1000"
     assert -0.0005 < min(small) < -1e-5
     rows = pages[800].xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
     assert [row.text_content() for row in rows[1:3]] == ["0.000", "0.000"]
-
-
-@pytest.mark.long
-def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
-    done: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    failed = len(Results(done).failed)
-    assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
-    printed = capsys.readouterr()
-    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in printed.out.replace("\n", " ")
-    assert printed.err.endswith(f"\nrov-fmu: {done}: no run is complete with all its figures\n")
-    assert printed.err.startswith("rov-fmu: warning: the plan gives no input of the FMU (u): all keep their start ")
 
 
 def test_another_page_of_this_name_is_not_overwritten(

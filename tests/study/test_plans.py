@@ -11,7 +11,6 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
-from rov_fmu.vehicle.shipped import VIDEORAY
 from tests.folders import beside
 from tests.io.test_paths import WRONG as WRONG_PATHS
 
@@ -111,21 +110,6 @@ def test_a_mistake_is_a_line(text: str, message: str, tmp_path: Path, model: Mod
     first, *others = mistakes(plan, model)
     assert any(line.startswith(f"{plan}: {message}") for line in (first, *others))
     assert not (others and text.startswith(HEAD))
-
-
-def test_a_vehicle_file_is_seen_from_the_plan_and_not_from_where_the_command_stands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    shutil.copy(VIDEORAY, tmp_path / "mine.toml")
-    plan = tmp_path / "plans" / "plan.toml"
-    plan.parent.mkdir()
-    monkeypatch.chdir(tmp_path)
-    for name in ("mine.toml", "videory"):
-        plan.write_text(HEAD.replace('fmu = "videoray.fmu"', f'vehicle = "{name}"') + VARY + TAIL)
-        assert main(["study", str(plan), "-o", "results"]) == 2
-        reason = "there is no such file beside the plan, and no vehicle of this name ships, only bl"
-        assert f"{plan}: vehicle = '{name}': {reason}" in capsys.readouterr().err
-        assert not (tmp_path / "results").exists()
 
 
 @pytest.mark.parametrize("case", WRONG_PATHS)

@@ -10,7 +10,7 @@ from rov_fmu.cli import main
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.report.conftest import get, until
+from tests.report.conftest import until
 from tests.report.test_live import a_recording
 from tests.tank.readers.motion import DIVE
 from tests.tank.readers.writers import LOGS
@@ -94,29 +94,6 @@ def test_the_timeline_goes_to_any_time_and_the_charts_show_the_error(
     page.locator("input[name=u_t]").fill("0.5")
     until(page, "live.flight.replay === null")
     assert not page.locator("#live-timeline").is_visible(), "the pilot has control"
-
-
-@pytest.mark.interop
-def test_tuning_flies_the_recording_again_where_it_is_shown(csv: Path, replay: Callable[..., Any]) -> None:
-    page = replay(csv)
-    page.evaluate("live.flight.seek(12)")
-    page.locator("summary", has_text="Tuning").click()
-    page.locator("input[name=beta_w]").fill("0.3")
-    assert page.evaluate("live.flight.time") == 12.0
-    assert page.evaluate(ERRORS)[1] > 0.01
-
-
-@pytest.mark.interop
-def test_forces_on_the_body_are_flown_as_loads(tmp_path: Path, replay: Callable[..., Any]) -> None:
-    forces = {"X_ext [N]": 8.0, "Z_ext [N]": 4.0, "N_ext [N.m]": 0.2}
-    (tmp_path / "dive.csv").write_text(a_recording(forces), encoding="utf-8")
-    (tmp_path / "rov.toml").write_text("[logs]\nwrench = true\n", encoding="utf-8")
-    page = replay(tmp_path / "dive.csv")
-    errors = page.evaluate(ERRORS)
-    assert len(errors) == 3
-    assert max(errors) < 1e-7, "numbers of a recording have nine decimals"
-    page.evaluate("() => { live.flight.seek(11); live.takeOver(); }")
-    assert get(page, "X_ext", "Z_ext", "N_ext") == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.interop

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.report.conftest import get, until
+from tests.report.conftest import get
 from tests.report.pages import UNFOLD
 from tests.report.test_live import BOX
 
@@ -27,15 +27,6 @@ def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) ->
     assert get(page, "z") == pytest.approx([2.0 - 0.55 * page.evaluate("live.vehicle.size")])
     assert "(on the seabed)" in page.inner_text("#live-readings")
     assert "bedded" in page.get_attribute("#live-picture", "class")
-
-
-def test_the_keys_stand_on_the_picture_until_the_first_input(page: Any) -> None:
-    hint = page.locator("#live-hint")
-    assert hint.is_visible()
-    assert "W S surge" in " ".join(hint.inner_text().split())
-    page.keyboard.down("KeyW")
-    until(page, "live.flight.begun && !live.changed || live.flight.time > 0.1")
-    assert not hint.is_visible()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -72,27 +63,3 @@ def test_picture_instruments_column_and_an_even_grid_of_charts_are_on_one_screen
     page.evaluate(UNFOLD)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert axe.run(page).response["violations"] == []
-
-
-@pytest.mark.parametrize(
-    ("choice", "value", "words"),
-    [
-        ("velocities", "live.flight.pilot.model.get('u').toFixed(3)", "surge: u"),
-        ("positions", "live.flight.pilot.distances[0].toFixed(2)", "surge: distance"),
-        ("thrust", "live.flight.pilot.model.get('F_l').toFixed(2)", "left rear: F_l"),
-    ],
-)
-def test_the_charts_can_be_chosen(choice: str, value: str, words: str, page: Any) -> None:
-    page.select_option("#live-view", choice)
-    title, expected = page.evaluate(f"""() => {{
-        live.pause(true);
-        live.flight.set({{ u_l: 0.5 }});
-        live.flight.advance(3);
-        live.draw();
-        return [document.querySelector("#live-charts svg .title").textContent, {value}];
-    }}""")
-    assert title.startswith(f"{words} {expected} "), title
-    hidden = page.evaluate(
-        "[...document.querySelectorAll('#live-view option')].filter((o) => o.hidden).map((o) => o.value)"
-    )
-    assert hidden == ["measured", "error", "force"]

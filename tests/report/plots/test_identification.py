@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.result import Prediction
-from rov_fmu.report.plots.identification import plot_answers, plot_overview, plot_prediction
+from rov_fmu.report.plots.identification import plot_answers, plot_prediction
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.report.results import FILES, example, log, prediction
+from tests.report.results import example, prediction
 
 
 def lines(ax: Axes) -> dict[str, tuple[list[float], list[float]]]:
@@ -52,35 +52,6 @@ def test_a_prediction_has_its_measured_and_predicted_values_and_the_band() -> No
     assert band[:, 1].max() == pytest.approx((p.predicted + 1.96 * p.deviation).max(), rel=1e-3)
     assert band[:, 1].min() == pytest.approx((p.predicted - 1.96 * p.deviation).min(), rel=1e-3)
     assert ax.get_title(loc="left") == "Depth (m)"
-
-
-def test_a_prediction_has_the_compared_one_and_knots_beside_metres_per_second() -> None:
-    p = prediction(SURGE, "surge velocity")
-    ax = drawn(replace(p, compared=p.predicted + 1.0))
-    assert lines(ax)["compared"][1] == pytest.approx((p.predicted + 1.0)[:: len(p.time) // 400].tolist())
-    (knots,) = ax.child_axes
-    assert knots.get_ylabel() == "knots"
-    ax.set_ylim(0.0, 1852.0 / 3600.0)
-    ax.figure.draw_without_rendering()  # type: ignore[union-attr]
-    assert knots.get_ylim() == pytest.approx((0.0, 1.0))
-    assert not drawn(prediction(HEAVE, "depth")).child_axes
-
-
-def test_the_large_picture_has_a_panel_for_each_axis_and_one_for_all_commands() -> None:
-    shown = [result.predictions[0] for result in example().axes]
-    figure = Figure()
-    plot_overview(figure, shown, log(FILES[1], full=0.5))
-    assert [ax.get_title(loc="left") for ax in figure.axes] == [
-        "Distance (m)",
-        "Depth (m)",
-        "Heading (°)",
-        "Commands (%)",
-    ]
-    time, commands = lines(figure.axes[-1])["u_t"]
-    assert (time[0], time[-1]) == (shown[0].time[0], shown[0].time[-1])
-    assert set(commands) == {50.0, 100.0}
-    legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == ["measured", "predicted, with 95 % band"]
 
 
 # ---- Over the command ------------------------------------------------------------------------------------------------
