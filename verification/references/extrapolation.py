@@ -98,6 +98,14 @@ def leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) 
     return best, max(errors, default=mpfr(0))
 
 
+def growth(error: Number, tolerance: float) -> Number:
+    """Return the factor of the length of the next step after a step with this error."""
+    if not gmpy2.is_finite(error):
+        return mpfr(0.1)
+    ideal = mpfr(0.9) * (mpfr(tolerance) / error) ** (mpfr(1) / 31) if error else mpfr(4)
+    return min(mpfr(4), max(mpfr(0.1), ideal))
+
+
 def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], Number]:
     """Return the signs of the velocities in the step, and a time after which a velocity that is zero has its sign."""
     n = len(system.names)
@@ -161,11 +169,9 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
                 paths = [path + abs(remaining * rate) for path, rate in zip(paths, _pace(start, n), strict=True)]
                 break
             end, error = leap(rates, y, start, size)
-            scale = mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else mpfr(4)
-            if not gmpy2.is_finite(error) or error > _TOLERANCE:
-                size *= max(mpfr(0.1), scale) if gmpy2.is_finite(error) else mpfr(0.1)
+            taken, size = size, size * growth(error, _TOLERANCE)
+            if not error <= _TOLERANCE:
                 continue
-            taken = size
             for a in range(n):
                 low = soon if y[a] == 0 else mpfr(0)
                 high = taken if signs[a] * end[a] < 0 else _dip(rates, y, end, a, signs[a], taken)
@@ -176,7 +182,6 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
             paths = [path + step for path, step in zip(paths, steps, strict=True)]
             y, remaining = end, remaining - taken
             fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
-            size *= min(mpfr(4), scale)
         names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in equations.lags)]
         planar, depth, turn = map(plain, paths)
         return Ended(
