@@ -69,7 +69,7 @@ class Heyoka:
         integrator, end, seconds = self._integrator, start.copy(), 0
         for command in commands:
             at = self._at(command, end)
-            values, initial = [_value(formula, at) for formula in self._parameters], self._initial(at)
+            initial, values = self._beginning(at)
             integrator.time = 0.0
             integrator.state[:], integrator.pars[:] = initial, values
             began = time.thread_time_ns()
@@ -93,11 +93,11 @@ class Heyoka:
 
     def begun(self, command: Reals, state: Reals) -> tuple[list[float], list[float]]:
         """Return the states of the equation and the parameters with which a held command begins at a state."""
-        at = self._at(command, state)
-        return self._initial(at), [_value(formula, at) for formula in self._parameters]
+        return self._beginning(self._at(command, state))
 
-    def _initial(self, at: dict[str, float]) -> list[float]:
-        return [at.get(name, 0.0) for name in self._equation.states]
+    def _beginning(self, at: dict[str, float]) -> tuple[list[float], list[float]]:
+        values = [_value(formula, at) for formula in self._parameters]
+        return [at.get(name, 0.0) for name in self._equation.states], values
 
     def _end(self, at: dict[str, float], state: Reals) -> Reals:
         """Return the states of the vehicle. Forces that lag and the quaternion are not states of the equation."""
