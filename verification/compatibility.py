@@ -92,13 +92,7 @@ def _write_fmu(folder: Path, name: str, version: int, platforms: str | None) -> 
     vehicle, flown = load_vehicle(SHIPPED[name]), manoeuvre(name)
     fmu = folder / f"{name}.fmu"
     build(vehicle, fmu, platforms=platforms, fmi=version)
-    starts = sorted(flown.phases)
-    corners = [  # a held command is two rows at the same time, because importers interpolate linearly
-        [time, *flown.inputs_at(start).values()]
-        for start, end in zip(starts, [*starts[1:], TIMES[-1]], strict=True)
-        for time in (start, end)
-    ]
-    _write_csv(folder / f"{name}_in.csv", ["time", *vehicle.layout.inputs], corners)
+    _write_csv(folder / f"{name}_in.csv", ["time", *vehicle.layout.inputs], flown.corners)
     names = ["time", *recorded(vehicle)]
     _write_csv(folder / f"{name}_ref.csv", names, [[row[key] for key in names] for row in flown.reference])
     options = {"StartTime": 0.0, "StopTime": TIMES[-1], "StepSize": STEP, "RelTol": TOLERANCE}

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterable
+from filecmp import cmpfiles
 from importlib import metadata
 from pathlib import Path
 from uuid import NAMESPACE_URL, uuid5
@@ -54,15 +55,10 @@ def fmus(folder: Path, vehicles: Iterable[str] = tuple(SHIPPED), platforms: str 
 
 def differences(first: Path, second: Path) -> list[str]:
     """Return a line about each file of two folders that is in one only, or has other bytes."""
-    names = sorted({path.name for folder in (first, second) for path in folder.iterdir()})
-    lines = []
-    for name in names:
-        both = [folder / name for folder in (first, second)]
-        if not all(path.is_file() for path in both):
-            lines.append(f"{name}: only one of the two builds wrote this file")
-        elif both[0].read_bytes() != both[1].read_bytes():
-            lines.append(f"{name}: the two builds have other bytes")
-    return lines
+    names = {path.name for folder in (first, second) for path in folder.iterdir()}
+    _, other, alone = cmpfiles(first, second, names, shallow=False)
+    lines = [f"{name}: the two builds have other bytes" for name in other]
+    return sorted([*lines, *(f"{name}: only one of the two builds wrote this file" for name in alone)])
 
 
 def digest(content: bytes) -> str:

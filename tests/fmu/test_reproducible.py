@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter
+from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter, pinned_environment
 from tests.commands import ROOT
+from tests.conftest import Made
 
 _SOME = ("--platform", "linux64", "--platform", "win64")
 _BUILDS = {"native": _SOME, "fmi3": ("--fmi", "3", *_SOME), "pythonfmu": ("--backend", "pythonfmu")}
@@ -26,11 +27,10 @@ _CHECKOUT = str(ROOT / "build_fmu.py")
 
 
 @pytest.fixture(scope="module")
-def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def pinned(made_once: Made, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Return the hashes of builds by this Python from the checkout, with the versions of constraints.txt."""
-    folder = tmp_path_factory.mktemp("pinned")
-    python = environment(folder / "venv", "-c", CONSTRAINTS, ROOT).python
-    return {flavour: _built(folder, flavour, str(python), _CHECKOUT) for flavour in _BUILDS}
+    python, folder = pinned_environment(made_once, tmp_path_factory).python, tmp_path_factory.mktemp("checkout")
+    return {flavour: _built(folder, flavour, python, _CHECKOUT) for flavour in _BUILDS}
 
 
 @pytest.mark.parametrize(

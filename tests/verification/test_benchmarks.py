@@ -12,16 +12,31 @@ import pytest
 from lxml import etree
 
 from rov_fmu.vehicle.vehicle import Vehicle
-from verification.benchmarks import page, sections, steps, taylor
-from verification.benchmarks.fleet import INSTANCES, Variations, in_c, instances
-from verification.benchmarks.plain_c import CORE, CVODE, EULER, FMU, FMU_3, FMU_3_SET, HEYOKA, RK4, PlainC, measurable
-from verification.benchmarks.steps import TOLERANCES, Job, Measured, TaylorPlan, cost_at
+from verification.benchmarks import taylor
+from verification.benchmarks.jobs import Job, Measured
+from verification.benchmarks.plain_c import (
+    ADAMS,
+    BDF,
+    CORE,
+    EULER,
+    FMU,
+    FMU_3,
+    FMU_3_SET,
+    HEYOKA,
+    RK4,
+    PlainC,
+    measurable,
+)
+from verification.benchmarks.runs import Variations, instances
+from verification.benchmarks.steps import Steps
 from verification.benchmarks.work import Work
 from verification.references import reference
 
 ROOT = Path(__file__).parent.parent.parent
 COMMANDS = 8
 _OURS = (CORE, FMU, FMU_3, FMU_3_SET)
+_CVODE = (ADAMS, BDF)
+_TOLERANCES = (1e-6, 1e-9)
 
 in_plain_c = pytest.mark.skipif(not measurable(), reason="the C programs are written for Linux on x86-64")
 
@@ -35,13 +50,13 @@ class Small:
     """All methods on a few commands, with and without reversals."""
 
     def __init__(self, vehicle: Vehicle, plain_c: PlainC) -> None:
-        self.work = Work(vehicle, False, 1.0, COMMANDS, COMMANDS)
-        self.ahead = Work(vehicle, True, 1.0, COMMANDS, COMMANDS, ahead=True)
-        self.long = Work(vehicle, False, 100.0, COMMANDS, 4)
+        self.work = Work(vehicle, 1.0, COMMANDS, COMMANDS)
+        self.one_way = Work(vehicle, 1.0, COMMANDS, COMMANDS, one_way=True)
+        self.long = Work(vehicle, 100.0, COMMANDS, 4)
         self.jobs = [
             *(self.ours(method, h) for method in _OURS for h in (0.01, 1.0, 100.0)),
             *(self.explicit(method, steps) for method in (EULER, RK4) for steps in (50, 100)),
-            *(self.solver(method, tolerance) for method in CVODE for tolerance in TOLERANCES),
+            *(self.solver(method, tolerance) for method in _CVODE for tolerance in _TOLERANCES),
         ]
         self.measured = Measured(plain_c, self.jobs, 2)
 
@@ -49,7 +64,7 @@ class Small:
         return Job(method, 1.0, self.long if h > 1.0 else self.work, h)
 
     def explicit(self, method: str, steps: int) -> Job:
-        return Job(method, float(steps), self.ahead, 1.0)
+        return Job(method, float(steps), self.one_way, 1.0)
 
     def solver(self, method: str, tolerance: float) -> Job:
         return Job(method, tolerance, self.work, 1.0)
@@ -99,16 +114,16 @@ def test_explicit_methods_are_of_their_order(small: Small, method: str, order: i
 
 @pytest.mark.long
 @in_plain_c
-@pytest.mark.parametrize("method", CVODE)
+@pytest.mark.parametrize("method", _CVODE)
 def test_cvode_keeps_near_its_tolerance(small: Small, method: str) -> None:
-    for tolerance in TOLERANCES:
+    for tolerance in _TOLERANCES:
         assert 0.1 * tolerance < small.measured.error(small.solver(method, tolerance)) < 300.0 * tolerance
 
 
 @pytest.mark.long
 @in_plain_c
 def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, plain_c: PlainC) -> None:
-    runs = in_c(plain_c, Variations(vehicle, 20), 2)
+    runs = Variations(vehicle, 20).in_c(plain_c, 2)
     assert runs.count == 20
     assert 0.0 < runs.rate < inf
     assert 0.0 < runs.error < 1e-11  # at 0 the C would be compared with itself
@@ -117,10 +132,9 @@ def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, p
 @pytest.mark.long
 @in_plain_c
 def test_many_instances_are_stepped_and_small(plain_c: PlainC) -> None:
-    assert INSTANCES == (1, 100, 10_000)
-    seconds, memory = instances(plain_c, 2).T
-    assert all((seconds > 0.0) & (seconds < 1e-3))
-    assert all((memory > 0) & (memory < 4096))
+    (_, *numbers), _, (_, *sizes) = instances(plain_c, 2)
+    assert numbers == ["1", "100", "10,000"]
+    assert all(0 < int(size.removesuffix(" B").replace(",", "")) < 4096 for size in sizes)
 
 
 def test_cost_at_an_error_lies_between_the_settings() -> None:
@@ -130,34 +144,23 @@ def test_cost_at_an_error_lies_between_the_settings() -> None:
         error=lambda job: found[job][0],
         seconds={job: np.array([cost, 2.0 * cost]) for job, (_, cost) in found.items()},
     )
-    assert cost_at(cast(Any, measured), cast(Any, list(found)), 1e-9) == pytest.approx([10.0, 20.0])
+    assert Measured.cost_at(cast(Any, measured), cast(Any, list(found)), 1e-9) == pytest.approx([10.0, 20.0])
 
 
 @pytest.mark.long
 @in_plain_c
-def test_heyoka_solves_the_same_equations(vehicle: Vehicle, plain_c: PlainC) -> None:
+def test_heyoka_solves_the_same_equations(vehicle: Vehicle, heavy: Vehicle, plain_c: PlainC) -> None:
     """To rounding, in steps of every length; its cost over ours stands in the last row."""
     pytest.importorskip("heyoka")
-    plan = TaylorPlan(vehicle, COMMANDS, COMMANDS)
-    measured = Measured(plain_c, plan.jobs, 2)
-    for method in (CORE, HEYOKA):
-        for h, job in plan.rows[method].items():
-            assert measured.error(job) < (1e-11 if h > 1.0 else 1e-12), (method, h)
-    *_, heyoka, ratios = sections.taylor(plan, measured)
+    table = Steps(vehicle, heavy, COMMANDS, COMMANDS).one_way
+    measured = Measured(plain_c, [*table.jobs.values()], 2)
+    for (method, h), job in table.jobs.items():
+        assert measured.error(job) < (1e-11 if h > 1.0 else 1e-12), (method, h)
+    *_, heyoka, ratios = table.section(measured)
     assert heyoka[0].startswith("heyoka, loop in C++")
     assert ratios[0] == "heyoka / ours"
-    for h, ratio in zip(plan.rows[HEYOKA], ratios[1:], strict=True):
-        times = measured.seconds[plan.rows[HEYOKA][h]] / measured.seconds[plan.rows[CORE][h]]
-        assert ratio == page.digits(float(np.median(times)))
-
-
-def test_without_heyoka_its_row_says_so(vehicle: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(steps, "installed", lambda: False)
-    plan = TaylorPlan(vehicle, COMMANDS, COMMANDS)
-    measured = SimpleNamespace(cost=lambda _: 1e-7, error=lambda _: 1e-15)
-    *_, last = sections.taylor(plan, cast(Any, measured))
-    assert last == [f"heyoka: {taylor.NOT_INSTALLED}"]
-    assert "rov-fmu[benchmarks]" in last[0]
+    job, other = table.jobs[HEYOKA, 0.01], table.jobs[CORE, 0.01]
+    assert float(ratios[2]) == pytest.approx(np.median(measured.seconds[job] / measured.seconds[other]), rel=0.01)
 
 
 @pytest.mark.long
@@ -166,16 +169,8 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
     picture = tmp_path / "cost_error.svg"
     command = [sys.executable, "-m", "verification.benchmarks", "--quick", "--picture", str(picture)]
     printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, encoding="utf-8").stdout
-    for part in (
-        "turning",
-        "fmi3DoStep",
-        "RK4",
-        "PythonFMU",
-        "Model Exchange",
-        "memory of each",
-        "by two workers",
-        "build, cold",
-    ):
+    parts = ("turning", "fmi3SetFloat64", "RK4", "Model Exchange", "memory of each", "A study by two workers", "kept")
+    for part in (*parts, "heyoka / ours" if taylor.installed() else taylor.NOT_INSTALLED):
         assert part in printed, printed
     times_ours = next(line.split()[4] for line in printed.splitlines() if line.startswith("CVODE BDF  "))
     assert float(times_ours) > 10.0, printed
@@ -188,7 +183,7 @@ def test_many_vehicles_are_measured_in_each_way(vehicle: Vehicle, cores: int) ->
     ways = {taylor.OURS, taylor.LANES, taylor.TURNING, *(taylor.BATCHES if taylor.installed() else ())}
     assert {way: len(costs) for way, costs in found.seconds.items()} == dict.fromkeys(ways, 2)
     assert all(costs.min() > 0.0 for costs in found.seconds.values())
-    headings, *rows = sections.many(vehicle.name, [found], 0.8)
+    headings, *rows = taylor.section(vehicle.name, [found], 0.8)
     assert headings[1:] == ["1 s"]
     assert [row[0] for row in rows[:3]] == [taylor.OURS, taylor.LANES, taylor.TURNING]
     assert float(rows[-1][1]) == pytest.approx(found.ratio(taylor.LANES, [taylor.OURS]), rel=0.01)

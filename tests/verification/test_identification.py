@@ -16,9 +16,8 @@ from rov_fmu.tank.arrays import Array
 from tests.commands import ROOT
 from verification.identification import __main__ as command
 from verification.identification.data import Recorded, Recording, Split, load
-from verification.identification.datasets.exjobb import EXJOBB
+from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH, TINY, Simulated
-from verification.identification.datasets.tauv import TAUV
 from verification.identification.methods.identified import Identified
 from verification.identification.methods.least_squares import LeastSquares
 from verification.identification.methods.unchanged import ConstantVelocity, Unchanged

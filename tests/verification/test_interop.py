@@ -5,7 +5,7 @@ import re
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from itertools import pairwise
 from math import nan
 from pathlib import Path
@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.commands import ROOT
+from tests.conftest import Made
 from verification.interoperability.__main__ import main
 from verification.interoperability.importers import EXACT, HERE, IMPORTERS, RUNNERS, Importer, pinned
 from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre, ResultError
@@ -228,19 +229,25 @@ def test_no_registry_is_named() -> None:
 # ---- The matrix ------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="session")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
-    return cache(partial(build_fmu, folder=tmp_path_factory.mktemp("FMU für Tests")))
+@pytest.fixture
+def fmu(made_once: Made) -> Callable[[str, int], Path]:
+    """Return a function that builds the FMU of a vehicle for a version of FMI, once in a run."""
+
+    def built(vehicle: str, fmi: int) -> Path:
+        folder = made_once(f"{vehicle} für FMI {fmi}", partial(build_fmu, vehicle, fmi))
+        return folder / f"{vehicle}{fmi}.fmu"
+
+    return built
 
 
-# The identified vehicle flies nearly as the BlueROV2 Heavy does, so weekly.yml flies it.
+HARDEST = ("every_option", "bluerov2_heavy")
+"""The vehicles of the run on every change: an importer flies the first of these that it can. weekly.yml flies all."""
+
+
 @pytest.mark.interop
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
-@pytest.mark.parametrize("name", [name for name in MANOEUVRES if name != "identified"])
-def test_importer(importer: Importer, fmu: Callable[[str, int], Path], name: str) -> None:
-    manoeuvre = MANOEUVRES[name]
-    if not importer.suits(manoeuvre.rov.layout):
-        pytest.skip("it sets no inputs in events, or sets them late")
+def test_importer(importer: Importer, fmu: Callable[[str, int], Path]) -> None:
+    manoeuvre = next(m for name in HARDEST if importer.suits((m := MANOEUVRES[name]).rov.layout))
     outcome = run(importer, fmu(manoeuvre.vehicle, importer.fmi), TOOLS, manoeuvre)
     if outcome.verdict is Verdict.NOT_RUN:
         pytest.skip(outcome.reason)

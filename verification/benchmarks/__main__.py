@@ -2,14 +2,13 @@
 
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
 import fmpy
 from rich.console import Console
-from rich.status import Status
 
 from rov_fmu.build import build
 from rov_fmu.c.compile import BuildError, host_platform
@@ -18,14 +17,11 @@ from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from verification.references.fmpy_slave import fmpy_slave
 
-from . import archive, fleet, importer, picture, sections
+from . import picture, runs, taylor
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
-from .steps import HeavyPlan, Measured, Plan, TaylorPlan
-from .studies import Study
-from .taylor import STEPS, many_vehicles
+from .steps import Steps
 from .work import Work
 
 
@@ -39,23 +35,21 @@ class Effort:
     manoeuvres: int = 5  # repetitions of what Python steps
     runs: int = 100_000
     runs_in_fmpy: int = 2000
-    loads: int = 20
-    study_runs: tuple[int, ...] = (10_000, 1000, 100_000)  # one that is compared with the runs alone, then few and many
-    all_platforms: bool = True
+    study_runs: tuple[int, ...] = (1000, 10_000, 100_000)
 
 
-_HOW = """Medians of repetitions in turn: processor time on one core, of builds and loading the time on the clock.
+_HOW = """Medians of repetitions in turn: processor time on one core.
 A cell's second number is the error at the end of a held command against 50 digits, in SI units. Commands are held
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
 fmi3SetFloat64.
 """
-_FLEETS = {0.8: load_vehicle(VIDEORAY), 1.0: load_vehicle(SHIPPED["bluerov2_heavy"])}
-"""Vehicles by the promised ratio of the cost of many of them to that of heyoka's best batches."""
-_QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, (200, 100, 400), all_platforms=False)
+_QUICK = Effort(3, 1024, 8, 1, 1000, 100, (100, 400))
+_PROMISED = (0.8, 1.0)
+"""The largest ratio of the cost of many vehicles to that of heyoka's best batches: VideoRay, BlueROV2 Heavy."""
 
 
 @click.command(help=__doc__)
-@click.option("--quick", is_flag=True, help="Few repetitions, only this machine's binary: to see that all of it runs.")
+@click.option("--quick", is_flag=True, help="Few repetitions: to see that all of it runs.")
 @click.option(
     "--picture",
     "picture_file",
@@ -75,64 +69,37 @@ def _command(quick: bool, picture_file: Path | None) -> None:
 
 
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
-    rov, say = load_vehicle(VIDEORAY), Console(stderr=True).status
-    plain_c = PlainC(rov, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
-    if plain_c:
+    say = Console(stderr=True).status
+    rov, heavy = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["bluerov2_heavy"])
+    plain_c = None
+    if measurable():
         with say("steps in plain C"):
-            plan = Plan(rov, effort.commands, effort.known)
-            measured = Measured(plain_c, plan.jobs, effort.repetitions)
-            yield from sections.plain_c(plan, measured)
+            plain_c, heavy_c = (PlainC(one, Path(tempfile.mkdtemp(dir=folder))) for one in (rov, heavy))
+            steps = Steps(rov, heavy, effort.commands, effort.known)
+            steps.measure(plain_c, heavy_c, effort.repetitions)
+            yield from steps.sections()
             if picture_file:
-                write_whole(Output(picture_file, picture.cost_error_picture(plan, measured).encode()))
-        with say("a vehicle with six axes and lag in plain C"):
-            heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
-            heavier = HeavyPlan(heavy, effort.commands, max(4, effort.known // 4))
-            heavy_c = PlainC(heavy, Path(tempfile.mkdtemp(dir=folder)))
-            measured_heavy = Measured(heavy_c, heavier.jobs, effort.repetitions)
-            yield sections.heavy(heavier, measured_heavy)
-        with say("heyoka beside it"):
-            series = TaylorPlan(rov, effort.commands, effort.known)
-            yield sections.taylor(series, measured_series := Measured(plain_c, series.jobs, effort.repetitions))
+                write_whole(Output(picture_file, picture.cost_error_picture(steps).encode()))
     else:
         yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
-    yield from _many(effort, say)
-    with say("building"):
-        native, python = folder / "native.fmu", folder / "python.fmu"
-        build(rov, python, backend="pythonfmu")
-        builds = {"for this machine": archive.build(native, ["host"])}
-        if effort.all_platforms:
-            builds["for all platforms"] = archive.build(folder / "all.fmu", [])
-        folders = {name: folder / name for name in (importer.NATIVE, importer.PYTHONFMU)}
-        loaded = archive.load(native, folders[importer.NATIVE], effort.loads)
-        fmpy.extract(str(python), str(folders[importer.PYTHONFMU]))
-    with say("a manoeuvre through FMPy"):
-        manoeuvre = Work(rov, straight=False, hold=1.0, commands=round(importer.STOP), starts=1)
-        simulated = importer.simulate(folders, manoeuvre, effort.manoeuvres)
-        yield sections.through_fmpy(simulated, importer.step_through(folders, manoeuvre, effort.manoeuvres))
-    with say("many instances and runs"):
-        variations, runs = fleet.Variations(rov, effort.runs), {}
-        if plain_c:
-            yield sections.instances(fleet.instances(plain_c, effort.repetitions))
-            runs["plain C"] = fleet.in_c(plain_c, variations, effort.repetitions)
-        slave = fmpy_slave(folders[importer.NATIVE])
-        runs["FMPy"] = fleet.through_fmpy(slave, variations, effort.runs_in_fmpy, effort.manoeuvres)
-        slave.freeInstance()
-        yield sections.variations(runs)
-    with say("studies"):
-        study, (beside, *others) = Study(native, folder), effort.study_runs
-        pairs = [*study.pairs(beside, effort.manoeuvres)]
-        yield sections.studies(pairs, [study.cost(count, workers=2) for count in sorted([beside, *others])])
-    yield from sections.archive(builds, loaded)
-    if plain_c:
-        yield sections.promises(plan, measured, heavier, measured_heavy, series, measured_series)
-
-
-def _many(effort: Effort, say: Callable[[str], Status]) -> Iterator[Section]:
-    for limit, rov in _FLEETS.items():
-        with say(f"many of {rov.name}"):
+    for limit, one in zip(_PROMISED, (rov, heavy), strict=True):
+        with say(f"many of {one.name}"):
             for cores in sorted({1, usable_cores()}):
-                found = [many_vehicles(rov, h, effort.repetitions, cores) for h in STEPS]
-                yield sections.many(rov.name, found, limit)
+                found = [taylor.many_vehicles(one, h, effort.repetitions, cores) for h in taylor.STEPS]
+                yield taylor.section(one.name, found, limit)
+    with say("many instances and runs"):
+        native, unzipped = folder / "native.fmu", folder / "native"
+        build(rov, native, platforms=["host"])
+        fmpy.extract(str(native), str(unzipped))
+        variations, rates = runs.Variations(rov, effort.runs), {}
+        if plain_c:
+            yield runs.instances(plain_c, effort.repetitions)
+            rates["plain C"] = variations.in_c(plain_c, effort.repetitions)
+        rates["FMPy"] = variations.through_fmpy(unzipped, effort.runs_in_fmpy, effort.manoeuvres)
+        yield runs.variations(rates)
+        yield runs.simulate(unzipped, Work(rov, 1.0, round(runs.STOP), 1), effort.manoeuvres)
+    with say("studies"):
+        yield runs.studies(native, folder, effort.study_runs)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -6,26 +6,28 @@ from matplotlib.figure import Figure
 
 from rov_fmu.report.plots.svg import LIGHT, svg_file
 
+from .jobs import SOLVERS, TARGET
 from .page import digits, duration
-from .plain_c import ADAMS, BDF, CORE, EULER, RK4
-from .steps import NAMES, TARGET, Measured, Plan, compared
+from .plain_c import ADAMS, BDF, EULER, RK4
+from .steps import Steps
 
 NAME = "cost_error.svg"
 _SIZE = (7.2, 4.7)  # inches
 _CURVES = {
     EULER: ("forward Euler", "grey"),
     RK4: ("RK4", "blue"),
-    ADAMS: (NAMES[ADAMS], "violet"),
-    BDF: (NAMES[BDF], "teal"),
+    ADAMS: (SOLVERS[ADAMS], "violet"),
+    BDF: (SOLVERS[BDF], "teal"),
 }
 
 
-def cost_error_picture(plan: Plan, measured: Measured) -> str:
+def cost_error_picture(steps: Steps) -> str:
     """Draw the cost of a held command over its error while turning, as SVG."""
-    return svg_file(partial(_draw, plan, measured), _SIZE, salt=NAME) + "\n"
+    return svg_file(partial(_draw, steps), _SIZE, salt=NAME) + "\n"
 
 
-def _draw(plan: Plan, measured: Measured, figure: Figure) -> None:
+def _draw(steps: Steps, figure: Figure) -> None:
+    measured, ours = steps.measured, steps.ours
     ax = figure.subplots()
     ax.set(
         xscale="log",
@@ -39,14 +41,13 @@ def _draw(plan: Plan, measured: Measured, figure: Figure) -> None:
     ax.set_xticks([1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
     ax.minorticks_off()
     ax.set_title("Velocities and pose, turning", loc="left")
-    ours, top = plan.job(CORE, 1.0), 0.0
-    cost = measured.cost(ours)
+    cost, top = measured.cost(ours), 0.0
     for method, (name, role) in _CURVES.items():
-        jobs, color = plan.sweeps[method], LIGHT[role]
+        jobs, color = steps.sweeps[method], LIGHT[role]
         errors, costs = [measured.error(job) for job in jobs], [measured.cost(job) for job in jobs]
         times = ""
         if min(errors) < TARGET:
-            reached, ratio = compared(measured, jobs, ours)
+            reached, ratio = measured.compared(jobs, ours)
             times = f": {digits(ratio, 2)} times ours"
             top = max(top, reached)
             ax.plot(TARGET, reached, "o", color="white", markeredgecolor=color, markersize=6.0, zorder=6)

@@ -1,155 +1,94 @@
-"""The cost and the error of a step in plain C: ours, forward Euler, RK4 and CVODE on the same commands."""
+"""All that is measured in plain C: steps of the VideoRay and the BlueROV2 Heavy, costs at equal error, and promises."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache
-from itertools import chain
+from collections.abc import Iterator
 
 import numpy as np
 
 from rov_fmu.vehicle.vehicle import Vehicle
 
-from .plain_c import ADAMS, BDF, CORE, CVODE, EULER, FMU, FMUS, HEYOKA, RK4, PlainC, Reals
-from .taylor import installed
-from .work import Work
+from .jobs import SOLVERS, STEPS, SUBSTEP, SWEEPS, TARGET, H, Measured, Table
+from .page import Section, digits, duration, error
+from .plain_c import ADAMS, BDF, CORE, FMU, FMU_3_SET, FMU_SET, HEYOKA, RK4, PlainC
+from .taylor import NOT_INSTALLED, installed
 
-TARGET = 1e-9
-"""The error of a held command of 1 s at which costs are compared (SI units)."""
-SUBSTEP = 0.01
-"""The longest sub-step of the explicit methods (s)."""
-H = (0.001, 0.01, 1.0, 100.0)
-TOLERANCES = (1e-6, 1e-9)
-NAMES = {RK4: "RK4", BDF: "CVODE BDF", ADAMS: "CVODE Adams"}
-METHODS = [
-    *((method, 0.0) for method in (*FMUS, CORE, RK4, EULER)),
-    *((method, tolerance) for method in CVODE for tolerance in TOLERANCES),
-]
-"""The rows of the table, with the solvers' tolerances."""
-_SWEEP = {
-    EULER: [10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5],
-    RK4: [3.0, 5.0, *(10.0 * 2**n for n in range(9))],
-    **{method: [10.0**-n for n in range(3, 14)] for method in CVODE},
-}
-_FEW = 8
-_PASS = 4e-3
-"""Seconds of one measurement. It is short, so that each minute has measurements of all methods."""
+FINE = 1e-12
+"""The error at which the Heavy is compared with RK4."""
+_SHORT = (0.001, SUBSTEP)
+_TO_RK4 = {"turning": (1.5, 1.7), "straight": (2.2, 2.2), "heavy": (16.0, 16.0)}
+"""The promised largest ratio of a step's cost to RK4's, for the lengths of _SHORT."""
+_TO_OURS = {RK4: 5.0, ADAMS: 8.0, BDF: 18.0}
+"""The promised smallest ratio of each method's cost to ours, for a command of 1 s at the error TARGET."""
 
 
-@dataclass(frozen=True)
-class Job:
-    """A method with sub-steps or a tolerance, in communication steps of h s."""
+class Steps:
+    """The tables, and the jobs of other methods with ever smaller errors."""
 
-    method: str
-    setting: float
-    work: Work
-    h: float
+    def __init__(self, rov: Vehicle, heavy: Vehicle, commands: int, known: int) -> None:
+        series = [CORE, *([HEYOKA] if installed() else [])]
+        self.turning = Table("VideoRay, turning", rov, [CORE, FMU_SET, FMU_3_SET, RK4], commands, known)
+        self.straight = Table("VideoRay, straight", rov, [CORE, FMU, RK4], commands, known, straight=True)
+        self.one_way = Table("VideoRay, turning one way", rov, series, commands, known, one_way=True)
+        self.heavy = Table("BlueROV2 Heavy, six axes and lag", heavy, [CORE, RK4], commands, max(4, known // 4))
+        self.sweeps = {method: self.turning.sweep(method, settings) for method, settings in SWEEPS.items()}
+        self.finer = self.heavy.sweep(RK4, [float(2**n) for n in range(8)], SUBSTEP)
+        self.ours = self.turning.jobs[CORE, 1.0]
 
-    def hold(self, plain_c: PlainC, start: int, commands: int) -> tuple[float, Reals]:
-        """Hold commands from the known start of the first one. Return seconds per step, and the final state."""
-        held, state = self.work.array[start : start + commands], self.work.states[start]
-        steps = round(self.work.hold / self.h)
-        return plain_c.hold(self.method, self.setting, self.h, steps, held, state)
+    def measure(self, plain_c: PlainC, heavy_c: PlainC, repetitions: int) -> None:
+        """Measure all jobs."""
+        tables = (self.turning, self.straight, self.one_way)
+        jobs = [job for some in (*(t.jobs.values() for t in tables), *self.sweeps.values()) for job in some]
+        self.measured = Measured(plain_c, jobs, repetitions)
+        self.measured_heavy = Measured(heavy_c, [*self.heavy.jobs.values(), *self.finer], repetitions)
 
-    def commands(self, plain_c: PlainC) -> int:
-        """Return the number of commands to time: many of cheap ones, so that branches stay unpredictable."""
-        seconds = self.hold(plain_c, 0, _FEW)[0] * self.work.hold / self.h
-        return min(self.work.commands, max(_FEW, round(_PASS / seconds)))
+    def sections(self) -> Iterator[Section]:
+        """Yield the tables, the costs at equal error, and what is promised."""
+        for table in (self.turning, self.straight, self.one_way):
+            yield table.section(self.measured)
+        if HEYOKA not in self.one_way.methods:
+            yield [[f"heyoka: {NOT_INSTALLED}"]]
+        yield self.heavy.section(self.measured_heavy)
+        section = [["ours, to rounding", duration(self.measured.cost(self.ours)), "1"]]
+        for method, name in SOLVERS.items():
+            cost, times = self.measured.compared(self.sweeps[method], self.ours)
+            section.append([name, duration(cost), digits(times)])
+        yield [[f"A command of 1 s to {error(TARGET)}", "turning", "times ours"], *section]
+        yield self._promises()
 
-
-class Measured:
-    """The seconds per communication step in each repetition, and the error, by job."""
-
-    def __init__(self, plain_c: PlainC, jobs: Sequence[Job], repetitions: int) -> None:
-        self.ends = {job: [job.hold(plain_c, n, 1)[1].tolist() for n in range(job.work.starts)] for job in jobs}
-        commands = {job: job.commands(plain_c) for job in jobs}
-        turns = [
-            [job.hold(plain_c, 0, commands[job])[0] for job in jobs[:: (-1) ** n]][:: (-1) ** n]
-            for n in range(repetitions)
+    def _promises(self) -> Section:
+        """Return the promises with what is measured. Ratios and differences are medians over the repetitions."""
+        turning, straight, heavy, one_way = (t.jobs for t in (self.turning, self.straight, self.heavy, self.one_way))
+        m, slow = self.measured, self.measured_heavy
+        found: list[tuple[str, float, str, float]] = []
+        for (name, limits), jobs, by in zip(_TO_RK4.items(), (turning, straight, heavy), (m, m, slow), strict=True):
+            ratios = [by.ratio(jobs[CORE, h], jobs[RK4, h]) for h in _SHORT]
+            found += [
+                (f"{name} step to one of RK4, {1000 * h:g} ms", ratio, "≤", limit)
+                for h, ratio, limit in zip(_SHORT, ratios, limits, strict=True)
+            ]
+        with_fmi = m.ratio(turning[FMU_SET, SUBSTEP], turning[RK4, SUBSTEP])
+        worst = max(m.error(jobs[CORE, h]) for jobs in (turning, straight) for h in (SUBSTEP, 1.0))
+        layer = float(np.median(m.seconds[straight[FMU, SUBSTEP]] - m.seconds[straight[CORE, SUBSTEP]]))
+        found += [
+            ("turning, with fmi2SetReal and fmi2DoStep, to RK4, 10 ms", with_fmi, "≤", 2.0),
+            ("its error after 1 s, in steps of 10 ms and 1 s", worst, "≤", 1e-13),
+            ("straight step of 100 s, µs", 1e6 * m.cost(straight[CORE, 100.0]), "≤", 2.0),
+            ("what FMI adds to a step of 10 ms, ns", 1e9 * layer, "≤", 20.0),
+            (f"RK4 to ours of the Heavy, to {error(FINE)}", self._finer(), "≥", 2.0),
         ]
-        self.seconds = dict(zip(jobs, np.array(turns).T, strict=True))
+        for method, limit in _TO_OURS.items():
+            times = m.compared(self.sweeps[method], self.ours)[1]
+            found.append((f"{SOLVERS[method]} to ours, at {error(TARGET)} a command of 1 s", times, "≥", limit))
+        for h, step in zip(H, STEPS, strict=True):
+            ratio = m.ratio(turning[FMU_3_SET, h], turning[FMU_SET, h])
+            found.append((f"turning, set and step, FMI 3.0 to FMI 2.0, {step}", ratio, "≤", 1.05))
+        for h in _SHORT if HEYOKA in self.one_way.methods else ():
+            times = m.ratio(one_way[HEYOKA, h], one_way[CORE, h])
+            found.append((f"heyoka to ours, turning, {1000 * h:g} ms", times, "≥", 4.0))
+        rows = []
+        for what, value, sign, limit in found:
+            is_kept = value <= limit if sign == "≤" else value >= limit
+            rows.append([what, f"{value:.3g}", f"{sign} {limit:g}", "kept" if is_kept else "NOT KEPT"])
+        return [["Promised", "measured", "promised", ""], *rows]
 
-    def error(self, job: Job) -> float:
-        """Return the largest error at the end of a held command."""
-        return job.work.error(self.ends[job])
-
-    def cost(self, job: Job) -> float:
-        """Return the median seconds per communication step."""
-        return float(np.median(self.seconds[job]))
-
-
-class Plan:
-    """The jobs of the table and, for the picture, of cost over error of a held command of 1 s."""
-
-    def __init__(self, rov: Vehicle, commands: int, starts: int) -> None:
-        @cache
-        def work(straight: bool, long: bool, ahead: bool) -> Work:
-            known = 4 if ahead else starts // 4 if long else starts
-            return Work(rov, straight, 100.0 if long else 1.0, commands, known, ahead)
-
-        self._work = work
-        self.sweeps = {
-            method: [self.job(method, 1.0, setting=setting) for setting in settings]
-            for method, settings in _SWEEP.items()
-        }
-        rows = [
-            self.job(method, h, straight, setting)
-            for straight in (False, True)
-            for method, setting in METHODS
-            for h in H
-        ]
-        ahead = [self.job(method, h, ahead=True) for method in (FMU, CORE) for h in H]
-        self.jobs = list(dict.fromkeys([*rows, *ahead, *chain.from_iterable(self.sweeps.values())]))
-
-    def job(self, method: str, h: float, straight: bool = False, setting: float = 0.0, ahead: bool = False) -> Job:
-        """Return the job of one cell. `ahead`: all commands are positive, so no velocity reverses."""
-        setting = setting or (max(1.0, round(h / SUBSTEP)) if method in (EULER, RK4) else 1.0)
-        return Job(method, setting, self._work(straight or ahead, h > 1.0, ahead), h)
-
-
-class HeavyPlan:
-    """The jobs of a vehicle with six axes and lag: our steps, and RK4 with ever shorter steps."""
-
-    def __init__(self, rov: Vehicle, commands: int, starts: int) -> None:
-        short, long = (Work(rov, False, hold, commands, known) for hold, known in ((1.0, starts), (100.0, starts // 4)))
-        works = {h: long if h > 1.0 else short for h in H}
-        self.ours = {h: Job(CORE, 1.0, work, h) for h, work in works.items()}
-        self.rk4 = {h: Job(RK4, max(1.0, round(h / SUBSTEP)), work, h) for h, work in works.items()}
-        self.sweep = [Job(RK4, float(2**n), short, SUBSTEP) for n in range(8)]
-        self.jobs = list(dict.fromkeys([*self.ours.values(), *self.rk4.values(), *self.sweep]))
-
-
-class TaylorPlan:
-    """The jobs of the comparison with heyoka, while no velocity reverses."""
-
-    def __init__(self, rov: Vehicle, commands: int, starts: int) -> None:
-        def job(method: str, h: float) -> Job:
-            hold, known = (100.0, starts // 4) if h > 1.0 else (1.0, starts)
-            setting = max(1.0, round(h / SUBSTEP)) if method == RK4 else 1.0
-            work = Work(rov, False, hold, commands, known, one_way=True)
-            return Job(method, setting, work, h)
-
-        methods = (CORE, RK4, *((HEYOKA,) if installed() else ()))
-        self.rows = {method: {h: job(method, h) for h in H} for method in methods}
-        self.jobs = [job for row in self.rows.values() for job in row.values()]
-
-
-def cost_at(measured: Measured, jobs: Sequence[Job], target: float = TARGET) -> Reals:
-    """Return the seconds at which a method reaches an error, in each repetition.
-
-    The cost is interpolated between settings, on logarithmic axes. A setting is left out if another one is as exact and
-    cheaper.
-    """
-    errors = np.array([measured.error(job) for job in jobs])
-    costs = np.array([measured.seconds[job] for job in jobs])
-    exact_first = np.argsort(errors)
-    typical = np.median(costs, axis=1)[exact_first]
-    best = exact_first[typical <= np.minimum.accumulate(typical)]
-    return np.array(
-        [np.exp(np.interp(np.log(target), np.log(errors[best]), np.log(repetition))) for repetition in costs[best].T]
-    )
-
-
-def compared(measured: Measured, jobs: Sequence[Job], ours: Job, target: float = TARGET) -> tuple[float, float]:
-    """Return the median seconds of a method at an error, and their ratio to ours."""
-    costs = cost_at(measured, jobs, target)
-    return float(np.median(costs)), float(np.median(costs / measured.seconds[ours]))
+    def _finer(self) -> float:
+        return self.measured_heavy.compared(self.finer, self.heavy.jobs[CORE, SUBSTEP], FINE)[1]

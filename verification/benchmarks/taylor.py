@@ -8,7 +8,7 @@ commands must not turn any velocity back. It computes no thrust and looks for no
 import copy
 import time
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +22,8 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.expression import Expression, compiled
 from rov_fmu.equation.terms import ONE, Term, equation_of
 from rov_fmu.vehicle.vehicle import Vehicle
+
+from .page import Section, digits, duration
 
 NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'
 Reals = NDArray[np.float64]
@@ -67,7 +69,7 @@ class Heyoka:
         integrator, end, seconds = self._integrator, start.copy(), 0
         for command in commands:
             at = self._at(command, end)
-            values, initial = [_value(formula, at) for formula in self._parameters], self._initial(at)
+            initial, values = self._beginning(at)
             integrator.time = 0.0
             integrator.state[:], integrator.pars[:] = initial, values
             began = time.thread_time_ns()
@@ -91,11 +93,11 @@ class Heyoka:
 
     def begun(self, command: Reals, state: Reals) -> tuple[list[float], list[float]]:
         """Return the states of the equation and the parameters with which a held command begins at a state."""
-        at = self._at(command, state)
-        return self._initial(at), [_value(formula, at) for formula in self._parameters]
+        return self._beginning(self._at(command, state))
 
-    def _initial(self, at: dict[str, float]) -> list[float]:
-        return [at.get(name, 0.0) for name in self._equation.states]
+    def _beginning(self, at: dict[str, float]) -> tuple[list[float], list[float]]:
+        values = [_value(formula, at) for formula in self._parameters]
+        return [at.get(name, 0.0) for name in self._equation.states], values
 
     def _end(self, at: dict[str, float], state: Reals) -> Reals:
         """Return the states of the vehicle. Forces that lag and the quaternion are not states of the equation."""
@@ -216,3 +218,22 @@ def many_vehicles(rov: Vehicle, h: float, repetitions: int, cores: int = 1) -> M
                 seconds[way].append(cost)
                 taken[way] = count if finite else np.nan
     return Many(cores, h, {way: np.array(costs[1:]) for way, costs in seconds.items()}, taken)
+
+
+def section(name: str, found: Sequence[Many], limit: float) -> Section:
+    """Return the cost of many vehicles that are stepped together, and the ratio to the best of heyoka's batches.
+
+    At 10 ms the promised ratio is at most `limit`.
+    """
+    where = "one core" if found[0].cores == 1 else f"{found[0].cores} cores"
+    rows = [[f"Many of {name}, {where}, each and step", *(f"{one.h:g} s" for one in found)]]
+    for way in found[0].seconds:
+        cells = [duration(float(np.median(one.seconds[way]))) for one in found]
+        if way in found[0].taken:
+            steps = [f"{n:.3g} steps" if np.isfinite(n) else "not finite" for n in (one.taken[way] for one in found)]
+            cells = [f"{cell}  {n}" for cell, n in zip(cells, steps, strict=True)]
+        rows.append([way, *cells])
+    if installed():
+        ratios = (digits(one.ratio(LANES, BATCHES)) for one in found)
+        rows.append([f"lanes / best of heyoka, promised ≤ {limit:g} at 0.01 s", *ratios])
+    return [*rows, ["lanes / one after the other", *(digits(one.ratio(LANES, [OURS])) for one in found)]]

@@ -30,13 +30,11 @@ class Work:
     """Commands of -1 ... 1, each held for `hold` s; the first `starts` of them from known states."""
 
     rov: Vehicle
-    straight: bool
-    """The first two commands are the same, so that the heading of the VideoRay stays."""
     hold: float
     commands: int
     starts: int
-    ahead: bool = False
-    """All commands are positive, so that no velocity reverses."""
+    straight: bool = False
+    """The first two commands are the same, so that the heading of the VideoRay stays."""
     one_way: bool = False
     """All commands are positive and the first is at least the second: the VideoRay turns and no velocity reverses."""
 
@@ -55,7 +53,7 @@ class Work:
         if self.one_way:
             drawn = np.abs(drawn)
             drawn[:, :2] = -np.sort(-drawn[:, :2])
-        return np.abs(drawn) if self.ahead else drawn
+        return drawn
 
     @cached_property
     def sequence(self) -> list[Values]:

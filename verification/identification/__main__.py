@@ -17,9 +17,8 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from verification.identification.data import DataSet, Recorded, load
-from verification.identification.datasets.exjobb import EXJOBB
+from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH
-from verification.identification.datasets.tauv import TAUV
 from verification.identification.methods.identified import Identified
 from verification.identification.methods.least_squares import LeastSquares
 from verification.identification.methods.output_error import OutputError

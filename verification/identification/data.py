@@ -94,6 +94,14 @@ class Recorded:
         return found[expected]
 
 
+def published(folder: Path) -> Recorded:
+    """Return the recordings that a folder describes: recordings.toml, rov.toml, and tables of tank tests."""
+    told = read_toml(folder / "recordings.toml", DataFileError)
+    rov = (folder / ROV_FILE).read_text(encoding="utf-8")
+    tables = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.csv"))}
+    return Recorded(folder.name, told["origin"], rov, told["recordings"], tables)
+
+
 # ---- Recordings ------------------------------------------------------------------------------------------------------
 
 

@@ -10,15 +10,13 @@ from itertools import product
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Column, Table
+from rich.table import Table
 
-from .importers import HERE, KITS, VERSIONS, Importer, chosen
+from .importers import HERE, KITS, VERSIONS, chosen
 from .install import InstallError, install
 from .manoeuvre import MANOEUVRES
-from .page import PageError, write_table
+from .page import PageError, matrix, write_table
 from .run import Outcome, Verdict, build_fmu, run
-
-STYLES = {Verdict.DIFFERS: "red", Verdict.FAILED: "red", Verdict.NOT_RUN: "yellow"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -106,26 +104,11 @@ def _install(kit: str, tools: Path, console: Console) -> int:
 
 
 def _show(outcomes: Sequence[Outcome], console: Console) -> None:
-    """Print a table with a row for each importer and a column for each vehicle, then the reasons and logs."""
-    vehicles = dict.fromkeys(outcome.vehicle for outcome in outcomes)
-    table = Table(
-        "importer",
-        "version",
-        "FMI",
-        "interface",
-        *(Column(name, justify="right") for name in vehicles),
-        title="The largest difference, 30 s, SI units",
-        title_justify="left",
-    )
-    rows: dict[Importer, list[str]] = {}
-    for outcome in outcomes:
-        shown = "" if outcome.difference is None else f"{outcome.difference:.1e}"
-        if outcome.verdict is not Verdict.AGREES:
-            shown = f"{shown} {outcome.verdict.value}".strip()
-        style = STYLES.get(outcome.verdict, "default")
-        rows.setdefault(outcome.importer, []).append(f"[{style}]{shown}[/]")
-    for importer, cells in rows.items():
-        table.add_row(importer.title, importer.version, f"{importer.fmi}.0", importer.interface, *cells)
+    """Print the table of the page, then the reasons and logs."""
+    heads, *rows = matrix(outcomes)
+    table = Table(*heads, title="The largest difference, 30 s, SI units", title_justify="left")
+    for row in rows:
+        table.add_row(*row)
     console.print(table)
     for outcome in outcomes:
         if outcome.reason:

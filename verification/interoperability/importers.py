@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,47 +26,35 @@ After a jump of the command its error of the force is at most h ΔF / (2 e T), w
 0.15 s.
 """
 _TOLERANCES: Mapping[str, float | None] = {
+    "exact": EXACT,
     "solver": 1e-5,  # of a solver with error control, in Model Exchange
     "single": 2e-6,  # of outputs in single precision: half a unit in the last place of numbers up to 64
     "Euler": _EULER,
     "only checks": None,
 }
-
-
-@dataclass(frozen=True)
-class Kit:
-    """What importers have in common that are installed in the same way. Names in braces are filled in."""
-
-    pin: str
-    """The file that pins the version."""
-    proof: str
-    """A file among the tools that exists when this version is installed."""
-    command: tuple[str, ...]
-    """The command, without the arguments of the importer."""
-
-
-_KITS = {
-    "python": Kit(
-        "requirements.txt",
-        "{environment}/lib/python3*/site-packages/{module}-{version}.dist-info",
-        ("{tools}/{environment}/bin/python", "-m", "verification.interoperability.runners.{program}"),
-    ),
-    "java": Kit(
-        "runners/{program}/pom.xml",
-        "java/{program}/{package}-{version}.jar",
-        ("java", "-cp", "{tools}/java/{program}/*", "{runners}/{program}/Fly.java"),
-    ),
-    "rust": Kit(
-        "runners/{module}/Cargo.toml",
-        "rust/{package}-{version}/debug/fly",
-        ("{tools}/rust/{package}-{version}/debug/fly",),
-    ),
+_KITS: Mapping[str, Toml] = {
+    "python": {
+        "pin": "requirements.txt",
+        "proof": "{environment}/lib/python3*/site-packages/{module}-{version}.dist-info",
+        "command": ["{tools}/{environment}/bin/python", "-m", "verification.interoperability.runners.{program}"],
+    },
+    "java": {
+        "pin": "runners/{program}/pom.xml",
+        "proof": "java/{program}/{package}-{version}.jar",
+        "command": ["java", "-cp", "{tools}/java/{program}/*", "{runners}/{program}/Fly.java"],
+    },
+    "rust": {
+        "pin": "runners/{module}/Cargo.toml",
+        "proof": "rust/{package}-{version}/debug/fly",
+        "command": ["{tools}/rust/{package}-{version}/debug/fly"],
+    },
 }
+"""What importers have in common that are installed in the same way."""
 
 
 @dataclass(frozen=True)
 class Importer:
-    """One row of the matrix."""
+    """One row of the matrix. Names in braces are filled in."""
 
     name: str
     """The name on the command line."""
@@ -79,12 +67,15 @@ class Importer:
     program: str
     """Its program or folder among the runners."""
     pin: str
+    """The file that pins the version."""
     proof: str
-    command: tuple[str, ...]
+    """A file among the tools that exists when this version is installed."""
+    command: Sequence[str]
     """The command, to run in a folder with rov.fmu and the manoeuvre."""
+    arguments: Sequence[str] = ()
     tolerance: float | None = EXACT
     """The tolerance of outputs at communication points (SI units); None when the importer only checks the FMU."""
-    needs: tuple[str, ...] = ()
+    needs: Sequence[str] = ()
     """The programs of the system that it needs besides those of its kit."""
     fmi: int = 2
     """The version of the FMU that it loads."""
@@ -116,7 +107,7 @@ class Importer:
 
     def command_line(self, tools: Path) -> list[str]:
         """Return the command with all paths filled in."""
-        return [self._filled(part, tools) for part in self.command]
+        return [self._filled(part, tools) for part in (*self.command, *self.arguments)]
 
     def _filled(self, text: str, tools: Path) -> str:
         return text.format(
@@ -147,23 +138,11 @@ def environment(requirements: str) -> str:
 
 def _rows_of(row: Toml) -> Iterator[Importer]:
     """Yield an importer with an FMU of each version that it loads."""
-    kit, arguments, versions = _KITS[row["kit"]], row.get("arguments", []), row.get("fmi", [2])
+    versions, tolerance = row.get("fmi", [2]), _TOLERANCES[row.get("tolerance", "exact")]
     for fmi in versions:
-        yield Importer(
-            "-".join([row["program"], *arguments]) + ("-fmi3" if fmi == 3 and len(versions) > 1 else ""),
-            row["title"],
-            row["interface"],
-            row["kit"],
-            row["package"],
-            row["program"],
-            row.get("pin", kit.pin),
-            row.get("proof", kit.proof),
-            (*row.get("command", kit.command), *arguments),
-            _TOLERANCES[row["tolerance"]] if "tolerance" in row else EXACT,
-            tuple(row.get("needs", ())),
-            fmi,
-            row.get("has_discrete_inputs", True),
-        )
+        other = ["fmi3"] if fmi == 3 and len(versions) > 1 else []
+        name = "-".join([row["program"], *row.get("arguments", []), *other])
+        yield Importer(**{**_KITS[row["kit"]], **row, "name": name, "fmi": fmi, "tolerance": tolerance})
 
 
 IMPORTERS = [one for row in read_toml(HERE / "importers.toml", FileError)["importer"] for one in _rows_of(row)]

@@ -86,13 +86,17 @@ class Manoeuvre:
             ("time", *layout.inputs, "detour"),
             ((t, *self.inputs_at(t).values(), int(t == DETOUR)) for t in TIMES),
         )
+        _write(folder / "jumps.csv", ("time", *layout.inputs), self.corners)
+
+    @property
+    def corners(self) -> list[list[float]]:
+        """The time and all inputs at the start and the end of each phase, for importers that interpolate linearly."""
         starts = sorted(self.phases)
-        corners = [
-            (t, self.inputs_at(start))
+        return [
+            [time, *self.inputs_at(start).values()]
             for start, end in zip(starts, [*starts[1:], TIMES[-1]], strict=True)
-            for t in (start, end)
+            for time in (start, end)
         ]
-        _write(folder / "jumps.csv", ("time", *layout.inputs), ((t, *inputs.values()) for t, inputs in corners))
 
     @cached_property
     def reference(self) -> list[dict[str, float]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rov_fmu.io.output import Output, write_whole
 
-from .run import Outcome
+from .run import Outcome, Verdict
 
 _TABLE = re.compile(r"(?<=<!-- matrix -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
@@ -26,29 +26,29 @@ def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     if not _TABLE.search(text):
         raise PageError(f"{page}: there is no <!-- matrix --> with an <!-- end --> after it")
-    content = f"\n{table(outcomes)}\n\nRun on {date.today()}.\n\n"
+    heads, *rows = matrix(outcomes)
+    lines = [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
+    content = "\n".join(["", *lines, "", f"Run on {date.today()}.", "", ""])
     write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()))
 
 
-def table(outcomes: Sequence[Outcome]) -> str:
-    """Return the table in Markdown: one row for an importer in one mode, with the larger difference of both FMIs."""
+def matrix(outcomes: Sequence[Outcome]) -> list[list[str]]:
+    """Return the headings, and a row for an importer in one mode, with the larger difference of both FMIs."""
     vehicles = [*dict.fromkeys(one.vehicle for one in outcomes)]
     rows: dict[tuple[str, str], list[Outcome]] = {}
     for one in outcomes:
         title = f"{one.importer.title} {one.importer.version}"
         rows.setdefault((title, one.importer.interface), []).append(one)
-    lines = [["importer", "FMI", "interface", *vehicles], ["---"] * (3 + len(vehicles))]
+    lines = [["importer", "FMI", "interface", *vehicles]]
     for (title, interface), row in rows.items():
         versions = ", ".join(f"{n}.0" for n in sorted({one.importer.fmi for one in row}))
         cells = [_cell([one for one in row if one.vehicle == vehicle]) for vehicle in vehicles]
         lines.append([title, versions, interface, *cells])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return lines
 
 
 def _cell(outcomes: Sequence[Outcome]) -> str:
-    """Return what an importer gave for a vehicle: the difference, or the verdict where there is none."""
-    if not outcomes:
-        return "–"
-    if outcomes[0].difference is None:
-        return outcomes[0].verdict.value
-    return f"{max(one.difference or 0.0 for one in outcomes):.0e}"
+    """Return what an importer gave for a vehicle: the difference, and the verdict where it is another than agrees."""
+    differences = [one.difference for one in outcomes if one.difference is not None]
+    verdicts = dict.fromkeys(one.verdict.value for one in outcomes if one.verdict is not Verdict.AGREES)
+    return " ".join([*([f"{max(differences):.0e}"] if differences else []), *verdicts]) or "–"

@@ -3,8 +3,9 @@
 They use a vehicle's declarations (axes, curves, thrusters, inputs) and numbers, but no formula of rov_fmu/equation/.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -14,23 +15,32 @@ from scipy.interpolate import PchipInterpolator
 from rov_fmu.equation.layout import Curve, Thruster, ThrustTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
-Number = Any  # an mpmath number
+Number = Any  # a float, or a number of mpmath or gmpy2
 PLACES = {"u": 0, "v": 1, "w": 2}
 """The component of a thruster's direction along each velocity."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis without coupling: v' = C - B v - A |v| v + the accelerations by the lagging forces."""
+    """An axis without coupling: v' = push + load - B v - A |v| v + the accelerations by the lagging forces."""
 
     ahead: tuple[Number, Number]
     """A and B for v > 0."""
     astern: tuple[Number, Number]
     """A and B for v < 0."""
-    C: Number
-    """The acceleration by loads and by the thrusters without lag."""
-    lagging: Mapping[str, Number]
+    push: Number
+    """The acceleration by the thrusters without lag."""
+    load: Number
+    """The acceleration by loads."""
+    lagging: Sequence[Number]
     """The acceleration by 1 N of each thruster with a lag."""
+    inertia: Number
+    """m/β."""
+
+    @property
+    def constant(self) -> Number:
+        """The acceleration at rest, without lagging forces."""
+        return self.push + self.load
 
 
 @dataclass(frozen=True)
@@ -43,39 +53,76 @@ class Lag:
 
 @dataclass(frozen=True)
 class Equations:
-    """The numbers of a vehicle under held inputs: axes and inertias by velocity, lags by thruster."""
+    """The numbers of a vehicle with held commands: axes by velocity, and lags by thruster.
+
+    A state is a list: the velocities, x, y, z, psi, and the forces with a lag. Its numbers may be of any kind.
+    """
 
     axes: Mapping[str, Axis]
     lags: Mapping[str, Lag]
-    inertias: Mapping[str, Number]
-    """m/β of each axis, for the coupling."""
     coupled: bool
 
-    def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float]) -> dict[str, Number]:
-        """Return the time derivatives of a state."""
-        found: dict[str, Number] = {}
-        u, v, w, r, psi = (state.get(name, 0) for name in ("u", "v", "w", "r", "psi"))
-        for name, axis in self.axes.items():
-            V = state[name]
-            A, B = axis.astern if mp.re(V) < 0 else axis.ahead
-            sign = -1 if mp.re(V) < 0 else 1
-            lagging = sum(gain * state[f"F_{thruster}"] for thruster, gain in axis.lagging.items())
-            found[name] = axis.C + lagging - B * V - sign * A * V * V
+    def of(self, number: Callable[[Number], Number]) -> "Equations":
+        """Return the equations with other numbers."""
+
+        def axis(one: Axis) -> Axis:
+            pairs = [(number(A), number(B)) for A, B in (one.ahead, one.astern)]
+            gains = [number(gain) for gain in one.lagging]
+            return Axis(pairs[0], pairs[1], number(one.push), number(one.load), gains, number(one.inertia))
+
+        axes = {name: axis(one) for name, one in self.axes.items()}
+        lags = {name: Lag(number(lag.target), number(lag.T)) for name, lag in self.lags.items()}
+        return Equations(axes, lags, self.coupled)
+
+    @cached_property
+    def places(self) -> list[int]:
+        """The places of u, v, w and r among the velocities; -1 for an axis that there is not."""
+        names = [*self.axes]
+        return [names.index(name) if name in names else -1 for name in ("u", "v", "w", "r")]
+
+    def level(self, velocities: Sequence[Number]) -> list[Number]:
+        """Return u, v, w and r."""
+        return [velocities[n] if n >= 0 else 0 for n in self.places]
+
+    def accelerations(
+        self, velocities: Sequence[Number], forces: Sequence[Number], signs: Sequence[int] = (), thrust: Number = 1
+    ) -> list[Number]:
+        """Return the accelerations with some forces of the lagging thrusters.
+
+        The signs are those of the velocities, which choose the drag. `thrust` is a factor of the thrust without lag.
+        """
+        signs = signs or [-1 if V < 0 else 1 for V in velocities]
+        found = []
+        for axis, V, sign in zip(self.axes.values(), velocities, signs, strict=True):
+            A, B = axis.astern if sign < 0 else axis.ahead
+            lagging = sum(gain * F for gain, F in zip(axis.lagging, forces, strict=True))
+            found.append(thrust * axis.push + axis.load + lagging - (B + sign * A * V) * V)
         if self.coupled:
-            M_u, M_v, M_r = (self.inertias[name] for name in ("u", "v", "r"))
-            found["u"] += M_v * v * r / M_u
-            found["v"] -= M_u * u * r / M_v
-            found["r"] -= (M_v - M_u) * u * v / M_r
-        if "u" in self.axes or "v" in self.axes:
-            found["x"] = u * mp.cos(psi) - v * mp.sin(psi) + inputs["V_N"]
-            found["y"] = u * mp.sin(psi) + v * mp.cos(psi) + inputs["V_E"]
-        if "w" in self.axes:
-            found["z"] = w
-        if "r" in self.axes:
-            found["psi"] = r
-        for name, lag in self.lags.items():
-            found[f"F_{name}"] = (lag.target - state[f"F_{name}"]) / lag.T
+            (u, v, _, r), (U, S, _, R) = self.level(velocities), self.places
+            M_u, M_v, M_r = (self.axes[name].inertia for name in ("u", "v", "r"))
+            found[U] += M_v / M_u * v * r
+            found[S] -= M_u / M_v * u * r
+            found[R] -= (M_v - M_u) / M_r * u * v
         return found
+
+    def derivatives(
+        self, y: Sequence[Number], sin_cos: Callable[[Number], tuple[Number, Number]], signs: Sequence[int] = ()
+    ) -> list[Number]:
+        """Return the time derivatives of a state without a current. `sin_cos` is that of the heading."""
+        n = len(self.axes)
+        u, v, w, r = self.level(y[:n])
+        s, c = sin_cos(y[n + 3])
+        lagging = [(lag.target - F) / lag.T for lag, F in zip(self.lags.values(), y[n + 4 :], strict=True)]
+        return [*self.accelerations(y[:n], y[n + 4 :], signs), u * c - v * s, u * s + v * c, w, r, *lagging]
+
+    def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float]) -> dict[str, Number]:
+        """Return the time derivatives of a state by name, in numbers of mpmath."""
+        names = [*self.axes, "x", "y", "z", "psi", *(f"F_{name}" for name in self.lags)]
+        y = [state.get(name, mp.zero) for name in names]
+        found = dict(zip(names, self.derivatives(y, lambda psi: (mp.sin(psi), mp.cos(psi))), strict=True))
+        for name, current in (("x", "V_N"), ("y", "V_E")):
+            found[name] += inputs.get(current, 0)
+        return {name: found[name] for name in state if name in found}
 
 
 def _limited(command: Number) -> Number:
@@ -168,29 +215,34 @@ def effect(rov: Vehicle, thruster: Thruster, velocity: str) -> Number:
 
 def equations(rov: Vehicle, inputs: Mapping[str, Number]) -> Equations:
     """Return the equations of a vehicle with these inputs, in the current precision of mpmath."""
+    return driven(rov, steady_forces(rov, inputs), inputs)
+
+
+def driven(rov: Vehicle, F: Mapping[str, Number], loads: Mapping[str, Number]) -> Equations:
+    """Return the equations of a vehicle with these steady forces of the thrusters and loads such as X_ext."""
     k = {name: mp.mpf(value) for name, value in rov.coefficients.items()}
-    F = steady_forces(rov, inputs)
     lag_of = {curve.name: k[f"T_{curve.name}"] for curve in rov.layout.curves if "T" in curve.keys}
     lags = {t.name: Lag(F[t.name], lag_of[t.curve]) for t in rov.layout.thrusters if t.curve in lag_of}
-    axes, inertias = {}, {}
+    axes = {}
     for velocity in (form.axis.velocity for form in rov.layout.axes):
         mass = (k["I_r"] if velocity == "r" else k["m_rov"]) + k.get(f"m_a_{velocity}", 0)
         alpha, beta = k[f"alpha_{velocity}"], k[f"beta_{velocity}"]
         external = {"u": "X_ext", "v": "Y_ext", "w": "Z_ext", "r": "N_ext"}[velocity]
         by = {t.name: alpha * effect(rov, t, velocity) for t in rov.layout.thrusters}
         held = mp.fsum(gain * F[name] for name, gain in by.items() if name not in lags)
-        load = mp.mpf(inputs[external]) + k.get(f"F_0_{velocity}", 0)
+        load = mp.mpf(loads.get(external, 0)) + k.get(f"F_0_{velocity}", 0)
         drag = [k[f"{key}_{velocity}"] for key in ("a_d", "b_d")]
         reverse = (k.get(f"{key}_{velocity}_reverse") for key in ("a_d", "b_d"))
         astern = [forward if other is None else other for forward, other in zip(drag, reverse, strict=True)]
         axes[velocity] = Axis(
             (beta * drag[0] / mass, beta * drag[1] / mass),
             (beta * astern[0] / mass, beta * astern[1] / mass),
-            beta * (held + load) / mass,
-            {name: beta * gain / mass for name, gain in by.items() if name in lags},
+            beta * held / mass,
+            beta * load / mass,
+            [beta * by[name] / mass for name in lags],
+            mass / beta if beta else mp.inf,
         )
-        inertias[velocity] = mass / beta if beta else mp.inf
-    return Equations(axes, lags, inertias, rov.layout.coupled)
+    return Equations(axes, lags, rov.layout.coupled)
 
 
 def calculated(rov: Vehicle, values: Mapping[str, Number]) -> dict[str, Number]:

@@ -35,72 +35,41 @@ class Ended:
 
 
 class _System:
-    """The equations for a state that is a list: the velocities, then x, y, z, psi, then the lagging forces."""
+    """The equations in numbers of gmpy2. The heading of a state is relative to the start."""
 
     def __init__(self, equations: Equations, psi: float) -> None:
-        self.names = list(equations.axes)
-        self.lagging = list(equations.lags)
+        self.held, self.psi = equations.of(real), mpfr(psi)
+        self.axes, self.lags = [*self.held.axes.values()], [*self.held.lags.values()]
+        self.names = [*equations.axes]
         self.first_force = len(self.names) + 4
-        self.axes = [
-            (
-                real(axis.C),
-                [
-                    (n, real(axis.lagging[name]))
-                    for n, name in enumerate(self.lagging, self.first_force)
-                    if axis.lagging[name] != 0
-                ],
-                [(real(a), real(b)) for a, b in (axis.ahead, axis.astern)],
-            )
-            for axis in equations.axes.values()
-        ]
-        self.lags = [(real(lag.target), real(lag.T)) for lag in equations.lags.values()]
-        self.psi = mpfr(psi)
-        self.places = [self.names.index(name) if name in self.names else -1 for name in ("u", "v", "w", "r")]
-        self.factors: list[Number] = []
-        if equations.coupled:
-            M_u, M_v, M_r = (equations.inertias[name] for name in ("u", "v", "r"))
-            self.factors = [real(M_v / M_u), real(M_u / M_v), real((M_v - M_u) / M_r)]
 
     def rates(self, signs: Sequence[int]) -> Rates:
         """Return the function that gives the time derivatives, with the drag for velocities of these signs."""
-        drags = [drag[sign < 0] for (_, _, drag), sign in zip(self.axes, signs, strict=True)]
-        drags = [(sign * A, B) for (A, B), sign in zip(drags, signs, strict=True)]
-        U, V, W, R = self.places
-        zero, first = mpfr(0), self.first_force
-
-        def derivatives(y: Sequence[Number]) -> list[Number]:
-            found = []
-            for a, (C, lagging, _) in enumerate(self.axes):
-                A, B = drags[a]
-                found.append(C + sum(gain * y[n] for n, gain in lagging) - (B + A * y[a]) * y[a])
-            u, v, w, r = (zero if n < 0 else y[n] for n in (U, V, W, R))
-            if self.factors:
-                for n, factor, term in zip((U, V, R), self.factors, (v * r, -u * r, -u * v), strict=True):
-                    found[n] += factor * term
-            s, c = gmpy2.sin_cos(self.psi + y[len(found) + 3])
-            found += [u * c - v * s, u * s + v * c, w, r]
-            found += [(target - F) / T for (target, T), F in zip(self.lags, y[first:], strict=True)]
-            return found
-
-        return derivatives
+        return lambda y: self.held.derivatives(y, lambda turned: gmpy2.sin_cos(self.psi + turned), signs)
 
     def first_step(self, y: Sequence[Number]) -> Number:
         """Return a time (s) in which little changes, because shortening a long first step is expensive."""
-        rates = [1 / T for _, T in self.lags] + [abs(y[n]) for n in self.places if n >= 0]
-        for a, (C, lagging, drags) in enumerate(self.axes):
-            lags = ((gain, y[n], self.lags[n - self.first_force][0]) for n, gain in lagging)
-            force = abs(C) + sum(abs(gain) * (abs(now) + abs(target)) for gain, now, target in lags)
-            rates += [B + 2 * A * abs(y[a]) + gmpy2.sqrt(A * force) for A, B in drags] + [gmpy2.sqrt(force)]
-        rates += [factor * sum(abs(x) for x in y[: len(self.names)]) for factor in map(abs, self.factors)]
+        rates = [1 / lag.T for lag in self.lags] + [abs(V) for V in self.held.level(y)]
+        largest = [abs(F) + abs(lag.target) for F, lag in zip(y[self.first_force :], self.lags, strict=True)]
+        for axis, V in zip(self.axes, y, strict=False):
+            force = abs(axis.constant) + sum(abs(gain) * F for gain, F in zip(axis.lagging, largest, strict=True))
+            drags = (axis.ahead, axis.astern)
+            rates += [B + 2 * A * abs(V) + gmpy2.sqrt(A * force) for A, B in drags] + [gmpy2.sqrt(force)]
+        if self.held.coupled:
+            u, v, r = (self.held.axes[name].inertia for name in ("u", "v", "r"))
+            speed = sum(abs(V) for V in y[: len(self.names)])
+            rates += [abs(factor) * speed for factor in (v / u, u / v, (v - u) / r)]
         return mpfr(0.1) / (sum(rates) or mpfr("1e-9"))
 
     def is_settled(self, rates: Sequence[Number], y: Sequence[Number]) -> bool:
         """Return True when every remaining change is far below the required precision."""
-        sizes = [abs(C) + abs(y[a]) * drag[0][1] + y[a] ** 2 * drag[0][0] for a, (C, _, drag) in enumerate(self.axes)]
-        axes = zip(rates, sizes, strict=False)
-        forces = zip(self.lags, y[self.first_force :], strict=True)
-        return all(abs(rate) <= _SETTLED * size for rate, size in axes) and all(
-            abs(target - F) <= _SETTLED * abs(target) for (target, _), F in forces
+        sizes = [
+            abs(axis.constant) + abs(V) * axis.ahead[1] + V**2 * axis.ahead[0]
+            for axis, V in zip(self.axes, y, strict=False)
+        ]
+        return all(abs(rate) <= _SETTLED * size for rate, size in zip(rates, sizes, strict=False)) and all(
+            abs(lag.target - F) <= _SETTLED * abs(lag.target)
+            for lag, F in zip(self.lags, y[self.first_force :], strict=True)
         )
 
 
@@ -127,6 +96,14 @@ def leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) 
     sizes = [abs(a) + abs(b) + abs(h * c) for a, b, c in zip(y, best, start, strict=True)]
     errors = [abs(a - b) / size for a, b, size in zip(best, second, sizes, strict=True) if size]
     return best, max(errors, default=mpfr(0))
+
+
+def growth(error: Number, tolerance: float) -> Number:
+    """Return the factor of the length of the next step after a step with this error."""
+    if not gmpy2.is_finite(error):
+        return mpfr(0.1)
+    ideal = mpfr(0.9) * (mpfr(tolerance) / error) ** (mpfr(1) / 31) if error else mpfr(4)
+    return min(mpfr(4), max(mpfr(0.1), ideal))
 
 
 def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], Number]:
@@ -178,7 +155,7 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
         system = _System(equations, state.get("psi", 0.0))
         n = len(system.names)
         y = [mpfr(state[name]) for name in system.names] + [mpfr(0)] * 4
-        y += [mpfr(state[f"F_{name}"]) for name in system.lagging]
+        y += [mpfr(state[f"F_{name}"]) for name in equations.lags]
         fastest, paths = [abs(x) for x in y[:n]], [mpfr(0)] * 3
         remaining = mpfr(h)
         size = system.first_step(y)
@@ -192,11 +169,9 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
                 paths = [path + abs(remaining * rate) for path, rate in zip(paths, _pace(start, n), strict=True)]
                 break
             end, error = leap(rates, y, start, size)
-            scale = mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else mpfr(4)
-            if not gmpy2.is_finite(error) or error > _TOLERANCE:
-                size *= max(mpfr(0.1), scale) if gmpy2.is_finite(error) else mpfr(0.1)
+            taken, size = size, size * growth(error, _TOLERANCE)
+            if not error <= _TOLERANCE:
                 continue
-            taken = size
             for a in range(n):
                 low = soon if y[a] == 0 else mpfr(0)
                 high = taken if signs[a] * end[a] < 0 else _dip(rates, y, end, a, signs[a], taken)
@@ -207,8 +182,7 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
             paths = [path + step for path, step in zip(paths, steps, strict=True)]
             y, remaining = end, remaining - taken
             fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
-            size *= min(mpfr(4), scale)
-        names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in system.lagging)]
+        names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in equations.lags)]
         planar, depth, turn = map(plain, paths)
         return Ended(
             {name: plain(x) for name, x in zip(names, y, strict=True)},
@@ -235,8 +209,7 @@ def _steady_end(system: _System, y: Sequence[Number], rates: Sequence[Number], h
         end[n + 1] += (east * s + north * (1 - c)) / r
     end[n + 2] += rates[n + 2] * h
     end[n + 3] += r * h
-    for place, (target, _) in enumerate(system.lags, system.first_force):
-        end[place] = target
+    end[system.first_force :] = [lag.target for lag in system.lags]
     return end
 
 

@@ -264,9 +264,9 @@ _Numbers = dict[str, Number]
 
 def _uncoupled(equation: Equations, state: Mapping[str, float], h: float) -> tuple[_Numbers, _Numbers, _Numbers]:
     """Return the state of a vehicle without coupling and lag, its largest velocities and the lengths of its paths."""
-    still = Axis((0, 0), (0, 0), mp.zero, {})
+    still = Axis((0, 0), (0, 0), mp.zero, mp.zero, (), mp.inf)
     axes = {name: equation.axes.get(name, still) for name in ("u", "v", "w", "r")}
-    forms = {name: (*form.ahead, form.C, state.get(name, 0.0), h, form.astern) for name, form in axes.items()}
+    forms = {name: (*form.ahead, form.constant, state.get(name, 0.0), h, form.astern) for name, form in axes.items()}
     ends = {name: axis(*form) for name, form in forms.items()}
     with mp.workdps(max(end.digits for end in ends.values())):
         u, v, r = (Motion(*forms[name]) for name in ("u", "v", "r"))

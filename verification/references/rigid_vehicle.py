@@ -14,7 +14,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import equations, rigid_body
 from .equations import commands, steady_forces
-from .extrapolation import BITS, leap, plain, real
+from .extrapolation import BITS, growth, leap, plain, real
 from .rigid_body import (
     VELOCITIES,
     Body,
@@ -166,9 +166,7 @@ def step(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
             end, error = leap(rates, y, rates(y), size)
             if error <= _TOLERANCE:
                 y, rest = end, rest - size
-            size *= min(
-                mpfr(4), max(mpfr(0.1), mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else 4)
-            )
+            size *= growth(error, _TOLERANCE)
         return [plain(x) for x in y]
 
 
