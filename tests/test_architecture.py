@@ -45,7 +45,6 @@ MAY_IMPORT = {
 
 LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
-    "tests": 13,
     "tests/fmu": 14,
     "tests/fmu/calls": 16,
     "tests/equation": 14,

@@ -33,7 +33,7 @@ outputs = ["y"]
 [figures]
 end = "y[-1]"
 twice = "2 * y[-1]"
-odd = "y[99]"
+odd = "y[y > 1e9][0]"
 offset = "2.0 + 0*b"
 """)
     assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
