@@ -66,7 +66,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     middles = times[:-1] + 0.5 * plan.step
     inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in whole.inputs.items()}
     named = {name for text in plan.figures.values() for name in read_expression(text).names} & model.variables.keys()
-    angles = [name for name in ANGLES if name in model.variables and model.variables[name].unit == "rad"]
+    angles = ANGLES if {*ANGLES, "psi"} <= model.variables.keys() else ()
     recorded = [*dict.fromkeys([*plan.kept, *sorted({*named, *angles} - {*design.names})])]
     trials = design.rows(0, min(_TRIALS, design.runs))
     job = Job(f"rov-fmu-{uuid4().hex}", model, plan, design.names, inputs, recorded, trials)
