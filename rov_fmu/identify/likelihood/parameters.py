@@ -184,12 +184,14 @@ class Table:
         reverse = exp(self.get(z, "reverse thrust", curve.name))
         if "k_t" in curve.keys:
             found[curve.coefficient("k_t")] *= scale
-        for end, ratio in (("", 1.0), (REVERSE, reverse)):
+        linear = self.get(z, "linear thrust", curve.name)
+        astern = self.get(z, "linear thrust", curve.name, "astern", default=linear)
+        for end, ratio, moved in (("", 1.0, linear), (REVERSE, reverse, astern)):
             names = [curve.name_of(f"{key}{end}") for key in ("a_t", "b_t")]
             if names[0] in found:
                 a, b = (self.base[name] for name in names)
-                moved = self.get(z, "linear thrust", curve.name) * (a + b)
-                found[names[0]], found[names[1]] = scale * ratio * (a - moved), scale * ratio * (b + moved)
+                found[names[0]] = scale * ratio * (a - moved * (a + b))
+                found[names[1]] = scale * ratio * (b + moved * (a + b))
             if (band := curve.name_of(f"c_0{end}")) in found:
                 found[band] = self.get(z, "dead band", curve.name, default=found[band])
         if "T" in curve.keys:
@@ -326,21 +328,29 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
         yield Parameter("thrust scale", name, deviation=scale, is_log=True)
         if curve.tables:
             continue
+        has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
+        c = known.coefficients
+        # Forces that were measured astern are no effect: their centre is not that without one.
+        is_told = is_measured and has_reverse and c[curve.coefficient("a_t")] != c[curve.coefficient(f"a_t{REVERSE}")]
         if shape:
             shapes = [Parameter("thrust shape", name, str(n + 1)) for n in range(COUNT)]
-            linear = [Parameter("linear thrust", name, deviation=_LINEAR)] * is_measured
+            linear = [_linear(curve, c, end) for end in ("", REVERSE)[: 1 + is_told]] * is_measured
             bends = not is_measured or name in known.bent
             yield from shapes if bends else map(_held, shapes)
             yield from map(_held, linear) if bends else linear
-        if f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact:
-            ratio, c = 0.5 if is_measured else prior("thrust_reverse"), known.coefficients
-            # Forces that were measured astern are no effect: their centre is not that without one.
-            is_told = is_measured and c[curve.coefficient("a_t")] != c[curve.coefficient(f"a_t{REVERSE}")]
+        if has_reverse:
+            ratio = 0.5 if is_measured else prior("thrust_reverse")
             yield Parameter("reverse thrust", name, deviation=ratio, null=None if is_told else 0.0)
         if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
             mean = known.coefficients[curve.coefficient("c_0")]
             width = prior("dead_band")
             yield Parameter("dead band", name, mean=mean, deviation=width, low=0.0, high=0.5, null=0.0)
+
+
+def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:
+    """Return the parameter of the linear share of a measured thrust, which is not negative."""
+    a, b = (c[curve.name_of(f"{key}{end}")] for key in ("a_t", "b_t"))
+    return Parameter("linear thrust", curve.name, "astern" if end else "", deviation=_LINEAR, low=-b / (a + b))
 
 
 def _held(p: Parameter) -> Parameter:
