@@ -61,7 +61,7 @@ _COLOURED = (0.3, 2.0)
 _QUIETER = 2.0
 """The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
 _LINEAR = 0.3
-"""The deviation of the linear share of the thrust of a quadratic curve, whose measured forces determine it."""
+"""The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
 USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
@@ -348,7 +348,10 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
 
 
 def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:
-    """Return the parameter of the linear share of a measured thrust, which is not negative."""
+    """Return the parameter of the linear share of a measured thrust.
+
+    The share is not negative: a (c - d)^2 is almost the same as a c^2 - b c, and a dead band is what thrusters have.
+    """
     a, b = (c[curve.name_of(f"{key}{end}")] for key in ("a_t", "b_t"))
     return Parameter("linear thrust", curve.name, "astern" if end else "", deviation=_LINEAR, low=-b / (a + b))
 
