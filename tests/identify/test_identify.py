@@ -335,6 +335,7 @@ def renamed(vehicle: Vehicle, curves: Mapping[str, str], thrusters: Mapping[str,
     return replace(vehicle, layout=layout, coefficients=values, sources=sources)
 
 
+@pytest.mark.long
 def test_names_of_curves_and_thrusters_are_free(tmp_path: Path) -> None:
     """Where curves are named main and main_reverse, and a thruster 0_w, the names of coefficients collide.
 

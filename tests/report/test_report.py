@@ -103,6 +103,7 @@ def test_long_words_break(page: str, tmp_path: Path, visit: Callable[..., Visit]
     check_breaks_long_words(page, tmp_path / "report.html", visit)
 
 
+@pytest.mark.long
 def test_the_same_twice_with_its_progress(page: str) -> None:
     steps: list[tuple[str, float]] = []
     assert report_page(example(), lambda step, share: steps.append((step, share))) == page

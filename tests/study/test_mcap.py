@@ -29,6 +29,7 @@ end = "z[-1]"
 """
 
 
+@pytest.mark.long
 def test_a_run_is_written_by_its_number(tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]) -> None:
     plan, folder = tmp_path / "plan.toml", tmp_path / "results"
     plan.write_text(PLAN, encoding="utf-8")

@@ -84,6 +84,7 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
         assert [bands[q][t] for q in bands] == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
 
 
+@pytest.mark.long
 def test_runs_in_which_the_vehicle_turns_over_are_counted(
     tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

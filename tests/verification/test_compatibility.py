@@ -20,6 +20,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", ["fmi2", "fmi3"])
 def test_the_rules_are_kept_and_fmpy_agrees(written: Path, version: str) -> None:
     folder = written / version / "videoray"

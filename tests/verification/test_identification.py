@@ -91,6 +91,7 @@ def test_a_summary_is_relative_to_no_change() -> None:
 # ---- Methods ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_method_predicts_the_future_from_the_past_alone(outcome: Outcome) -> None:
     """The samples of the last span are changed: no prediction of an earlier sample or of this span changes."""
     recording, span = outcome.split.test[0], 5.0

@@ -31,6 +31,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_the_inventory_of_an_fmu_names_every_file(fmu: Path) -> None:
     text = release.fmu_inventory(fmu)
     assert valid(text)

@@ -243,6 +243,7 @@ def test_the_errors_on_unseen_data_are_those_of_the_model_card(
 # ---- Any FMU ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_strangers_fmu_gets_the_rows_that_apply(tmp_path: Path, capsys: Capsys) -> None:
     page = tmp_path / "page.html"
     assert main(["prove", str(slave(_EXACT, tmp_path)), "--report", str(page)]) == 0

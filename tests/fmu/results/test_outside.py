@@ -108,6 +108,7 @@ def ranges(built: tuple[Fmu, Vehicle, Ranges]) -> Ranges:
     return built[2]
 
 
+@pytest.mark.long
 def test_a_simulation_has_it_at_every_step(built: tuple[Fmu, Vehicle, Ranges]) -> None:
     """In both interfaces and versions of FMI and in Python, from the other outputs."""
     fmu, vehicle, ranges = built
