@@ -183,6 +183,7 @@ _STRANGE = "It is known only of vehicles of rov-fmu which parameters switch drag
 _ACCEPTED = "Not refused: an input that is not a number, an infinite input, a parameter that is"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("measure", "step", "ours", "result", "words"),
     [
