@@ -5,7 +5,6 @@ from collections.abc import Callable
 from datetime import date, datetime
 from typing import Any
 
-import pytest
 import tomlkit
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -48,12 +47,6 @@ VALUES: st.SearchStrategy[Any] = st.recursive(
 def fuzz(check: Callable[[st.DataObject], None], examples: int) -> None:
     """Run a check with a given number of examples."""
     settings(max_examples=examples, suppress_health_check=list(HealthCheck))(given(data=st.data())(check))()
-
-
-def examples(default: int, long: int, weekly: int) -> pytest.MarkDecorator:
-    """Run a test with `examples`, the number of examples of the default tests, the long ones and the weekly ones."""
-    more = (pytest.param(n, marks=mark) for n, mark in ((long, pytest.mark.long), (weekly, pytest.mark.weekly)))
-    return pytest.mark.parametrize("examples", [default, *more])
 
 
 def changed_bytes(content: bytes, data: st.DataObject) -> bytes:

@@ -1,6 +1,6 @@
 """What is known before the fit: the tests of a folder, the part of the vehicle that they concern, and its prior."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -210,7 +210,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in vehicle.layout.drivers(axis)}
     given_thrust = {name for name, quantity in given.description.known.items() if not quantity.interval}
-    measured = [name for name, _ in tests.rows("thrust")]
+    measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
     driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
     curves = [
         curve
@@ -238,7 +238,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     return known, logs, [*_table_rows(tests, vehicle)]
 
 
-def _exact(given: GivenVehicle, layout: Layout, measured: Sequence[str]) -> frozenset[str]:
+def _exact(given: GivenVehicle, layout: Layout, measured: Collection[str]) -> frozenset[str]:
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
     leave as they are. The curves of a base are uncertain unless their forces were measured, and so is a lag."""
     uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}

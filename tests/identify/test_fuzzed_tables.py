@@ -19,6 +19,7 @@ from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests import damage
 from tests.commands import TESTS, without_progress
 from tests.damage import changed_bytes, changed_cells, changed_course, changed_lines, changed_toml, fuzz
+from tests.often import often
 from tests.recordings import run, write_log
 
 Capsys = pytest.CaptureFixture[str]
@@ -80,7 +81,7 @@ def output_or_one_line(arguments: list[str], out: Path, folder: Path, capsys: Ca
     return ""
 
 
-@damage.examples(10, 100, 2000)
+@often("examples", 10, 100, 2000)
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 
@@ -101,7 +102,7 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@damage.examples(2, 5, 30)
+@often("examples", 2, 5, 30)
 @pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", pytest.param(LOG, marks=pytest.mark.long)])
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
@@ -147,7 +148,7 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
     assert not said or LOG in said
 
 
-@damage.examples(10, 40, 1000)
+@often("examples", 10, 40, 1000)
 def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
     content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
@@ -161,7 +162,7 @@ def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Pa
     fuzz(check, examples)
 
 
-@damage.examples(20, 60, 2000)
+@often("examples", 20, 60, 2000)
 def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     tuned = tmp_path / "tuned.toml"
     words = st.one_of(damage.NUMBERS.filter(lambda x: abs(x) < 10**400), damage.CELLS, st.floats(0.0, 10.0)).map(str)
@@ -176,7 +177,7 @@ def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_
     fuzz(check, examples)
 
 
-@damage.examples(10, 40, 1000)
+@often("examples", 10, 40, 1000)
 def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     original = VIDEORAY.parent / "tables"
     vehicle = tmp_path / "videoray.toml"

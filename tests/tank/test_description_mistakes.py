@@ -11,7 +11,6 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.vehicle.geometry import check_layout
-from tests import damage
 from tests.commands import ROOT
 from tests.damage import changed_toml, fuzz
 from tests.folders import (
@@ -30,6 +29,7 @@ from tests.folders import (
     folder_of,
     pulled,
 )
+from tests.often import often
 
 
 def given(name: str, value: float, unit: str) -> str:
@@ -226,7 +226,7 @@ def check_lines(text: str, folder: Path) -> None:
     assert all(line.startswith(str(folder)) and line.isprintable() for line in text.splitlines())
 
 
-@damage.examples(5, 60, 2000)
+@often("examples", 5, 60, 2000)
 @pytest.mark.parametrize("rov", [f"{BLUEROV2}[known]\n{given('m_a_w', 1.0, 'kg')}", VECTORED])
 def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int, tmp_path: Path) -> None:
     tables = {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n", "steady_surge.csv": f"{SPEED}\n0.3,0.2\n"}

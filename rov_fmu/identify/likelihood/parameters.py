@@ -271,8 +271,8 @@ class Beginning:
     """The axes whose motion is tested."""
     curves: Sequence[Curve]
     """The curves that drive these axes."""
-    measured_curves: Sequence[str]
-    """The curves whose forces were measured: their scale and shape are those of the rows."""
+    measured_curves: Mapping[str, bool]
+    """The curves whose forces were measured, and whether astern, too. Their scale and shape are those of the rows."""
     with_lag: bool
     """True if the base or the file gives a lag."""
     guessed: Sequence[str]
@@ -285,7 +285,7 @@ class Beginning:
     thrust_errors: Mapping[str, float] = field(default_factory=dict)
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
     bent: frozenset[str] = frozenset()
-    """The measured curves whose shape deviates. The others are quadratic, with a free linear share of the thrust."""
+    """The measured curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
 
 
 def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
@@ -329,18 +329,19 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
         if curve.tables:
             continue
         has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
-        c = known.coefficients
-        # Forces that were measured astern are no effect: their centre is not that without one.
-        is_told = is_measured and has_reverse and c[curve.coefficient("a_t")] != c[curve.coefficient(f"a_t{REVERSE}")]
+        is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
             shapes = [Parameter("thrust shape", name, str(n + 1)) for n in range(COUNT)]
-            linear = [_linear(curve, c, end) for end in ("", REVERSE)[: 1 + is_told]] * is_measured
             bends = not is_measured or name in known.bent
             yield from shapes if bends else map(_held, shapes)
-            yield from map(_held, linear) if bends else linear
+            if is_measured:
+                ends = ("", REVERSE) if is_told_astern else ("",)
+                linear = [_linear(curve, known.coefficients, end) for end in ends]
+                yield from map(_held, linear) if bends else linear
         if has_reverse:
             ratio = 0.5 if is_measured else prior("thrust_reverse")
-            yield Parameter("reverse thrust", name, deviation=ratio, null=None if is_told else 0.0)
+            # Forces that were measured astern are data, and not an effect that may be absent.
+            yield Parameter("reverse thrust", name, deviation=ratio, null=None if is_told_astern else 0.0)
         if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
             mean = known.coefficients[curve.coefficient("c_0")]
             width = prior("dead_band")
@@ -350,7 +351,8 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
 def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:
     """Return the parameter of the linear share of a measured thrust.
 
-    The share is not negative: a (c - d)^2 is almost the same as a c^2 - b c, and a dead band is what thrusters have.
+    It is not negative. A negative share would take the place of a dead band d, because a (c - d)^2 is almost
+    a c^2 - 2 a d c.
     """
     a, b = (c[curve.name_of(f"{key}{end}")] for key in ("a_t", "b_t"))
     return Parameter("linear thrust", curve.name, "astern" if end else "", deviation=_LINEAR, low=-b / (a + b))

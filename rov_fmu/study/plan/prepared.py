@@ -19,7 +19,6 @@ from rov_fmu.study.plan.figures import meaning, read_expression, unusable
 from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
 from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, check_plan
 from rov_fmu.study.plan.sampling import Design
-from rov_fmu.study.run.child import ANGLES
 from rov_fmu.study.run.simulator import Job
 from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -66,10 +65,10 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     middles = times[:-1] + 0.5 * plan.step
     inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in whole.inputs.items()}
     named = {name for text in plan.figures.values() for name in read_expression(text).names} & model.variables.keys()
-    angles = ANGLES if {*ANGLES, "psi"} <= model.variables.keys() else ()
+    angles = ("phi", "theta") if {"phi", "theta", "psi"} <= model.variables.keys() - {*design.names} else ()
     recorded = [*dict.fromkeys([*plan.kept, *sorted({*named, *angles} - {*design.names})])]
     trials = design.rows(0, min(_TRIALS, design.runs))
-    job = Job(f"rov-fmu-{uuid4().hex}", model, plan, design.names, inputs, recorded, trials)
+    job = Job(f"rov-fmu-{uuid4().hex}", model, plan, design.names, inputs, recorded, angles, trials)
     warnings = [*_without_inputs(model, {*inputs, *design.names, *plan.set}), *estimates.warnings(), *design.warnings()]
     return Prepared(job, design, whole.mark | estimates.mark, warnings)
 

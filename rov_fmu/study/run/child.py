@@ -17,8 +17,6 @@ from rov_fmu.study.run.simulator import Job, LoadError, RunError, Simulator
 Array = npt.NDArray[np.float64]
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
-ANGLES = ("phi", "theta")
-"""The variables that tell whether a vehicle turns over."""
 _MANY = 10.0
 """The seconds that the runs of a task may take in addition to the limit of one run. A task is made to take 1 s."""
 
@@ -127,7 +125,7 @@ class _Runner:
             return _failed(self._job, str(error))
         figures, reason = self._figures.of({**dict(zip(self._job.varied, values, strict=True)), **run})
         kept = [run[name][points] for name in self._job.plan.kept]
-        turned = any(np.any(np.abs(run[name]) > 0.5 * np.pi) for name in ANGLES if name in run)
+        turned = any(np.any(np.abs(run[name]) > 0.5 * np.pi) for name in self._job.angles)
         if resets:
             self._simulator.reset()
         else:

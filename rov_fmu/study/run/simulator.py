@@ -47,6 +47,8 @@ class Job:
     """The values that are set at the beginning of each step, by variable."""
     recorded: Sequence[str]
     """The variables that are read before the first step and after every step."""
+    angles: Sequence[str]
+    """The recorded angles that tell whether a vehicle turns over; none for an FMU without an attitude."""
     trials: Array
     """The values of the first runs, with which it is found out whether the FMU can be reset."""
 
