@@ -45,7 +45,7 @@ class Steps:
         for table in (self.turning, self.straight, self.one_way):
             yield table.section(self.measured)
         if HEYOKA not in self.one_way.methods:
-            yield [[f"heyoka: {NOT_INSTALLED}"]]
+            yield [NOT_INSTALLED]
         yield self.heavy.section(self.measured_heavy)
         section = [["ours, to rounding", duration(self.measured.cost(self.ours)), "1"]]
         for method, name in SOLVERS.items():

@@ -25,7 +25,8 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 from .page import Section, digits, duration
 
-NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'
+NOT_INSTALLED = ['heyoka (pip install "rov-fmu[benchmarks]")', "not installed"]
+"""The row of the table that takes its place. It fits into a line, because readers look for it."""
 Reals = NDArray[np.float64]
 
 
