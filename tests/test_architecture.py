@@ -2,12 +2,17 @@
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
 import pytest
+import tomlkit
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from tests.commands import ROOT
 
@@ -172,3 +177,27 @@ def test_a_folder_has_at_most_a_dozen_modules() -> None:
             counts[folder] = counts.get(folder, 0) + 1
     counts = {folder: count for folder, count in counts.items() if folder != "verification/interoperability/runners"}
     assert {folder: count for folder, count in counts.items() if count > LARGEST_FOLDER} == LARGER_FOLDERS
+
+
+def _installed_without_extras() -> set[str]:
+    """Return the distributions that `pip install -e .` brings, with what each of them requires."""
+    project = tomlkit.parse((ROOT / "pyproject.toml").read_text(encoding="utf-8")).unwrap()["project"]
+    found, left = {"rov-fmu"}, [*project["dependencies"]]
+    while left:
+        requirement = Requirement(left.pop())
+        name = canonicalize_name(requirement.name)
+        if name not in found and (requirement.marker is None or requirement.marker.evaluate({"extra": ""})):
+            found.add(name)
+            left += requires(name) or []
+    return found
+
+
+@pytest.mark.parametrize("program", ["examples.tank_tests", "rov_fmu"])
+def test_the_commands_of_the_readme_need_no_extra(program: str) -> None:
+    """Their help imports all that they import at the start."""
+    installed = _installed_without_extras()
+    modules = {name: {*map(canonicalize_name, of)} for name, of in packages_distributions().items()}
+    extra = [name for name, of in modules.items() if not of & installed and name not in sys.stdlib_module_names]
+    hidden = f"import runpy, sys; sys.modules.update(dict.fromkeys({extra}))"
+    run = f"sys.argv = ['x', '--help']; runpy.run_module('{program}', run_name='__main__')"
+    subprocess.run([sys.executable, "-c", f"{hidden}; {run}"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
