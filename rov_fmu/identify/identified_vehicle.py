@@ -22,6 +22,8 @@ from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
+_DEAD_BAND = ("c_0", f"c_0{REVERSE}")
+"""The keys of dead bands."""
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 EXACT_BAND = 0.01
@@ -58,8 +60,8 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     if names:
         held = [  # a file without a dead band has an exact one of 0
             name
-            for name in fit.known.layout.coefficients
-            if name not in names and (name in changed or name.startswith("c_0"))
+            for name, (*_, key) in fit.known.layout.keys_in_file.items()
+            if name not in names and (name in changed or key in _DEAD_BAND)
         ]
         _, covariance, _ = _numbers(fit, [*names, *held])
         marginal = np.sqrt(np.diag(covariance))
@@ -192,7 +194,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
             return key in part.keys
         if key in ("V_0", "n_V"):
             return with_voltage
-        if key in ("F_0", "T") or key.startswith("c_0"):
+        if key in ("F_0", "T", *_DEAD_BAND):
             value = coefficients[name]
             return {"F_0": value != 0.0, "T": value > LEAST_LAG * 1.0001}.get(key, value > 0.0)
         if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
@@ -244,8 +246,8 @@ def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterato
 
 def _interval(vehicle: Vehicle, name: str, error: float) -> Interval:
     """Return the 95 % interval of a coefficient within its bounds."""
-    declaration = vehicle.layout.coefficients[name]
-    if name.startswith("c_0"):
+    declaration, key = vehicle.layout.coefficients[name], vehicle.layout.keys_in_file[name][-1]
+    if key in _DEAD_BAND:
         error = max(error, EXACT_BAND / QUANTILE)
-    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
+    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and key not in ("T", *_DEAD_BAND))
     return max(low, declaration.minimum), min(high, declaration.maximum)
