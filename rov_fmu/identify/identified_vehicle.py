@@ -11,7 +11,7 @@ from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.equation.layout import Curve, Layout, Part, VehicleAxis
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.given import GivenVehicle
-from rov_fmu.identify.likelihood.curves import fitted
+from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
@@ -22,6 +22,8 @@ from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
+_DEAD_BAND = ("c_0", f"c_0{REVERSE}")
+"""The keys of dead bands."""
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 EXACT_BAND = 0.01
@@ -58,8 +60,8 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     if names:
         held = [  # a file without a dead band has an exact one of 0
             name
-            for name in fit.known.layout.coefficients
-            if name not in names and (name in changed or name.startswith("c_0"))
+            for name, (*_, key) in fit.known.layout.keys_in_file.items()
+            if name not in names and (name in changed or key in _DEAD_BAND)
         ]
         _, covariance, _ = _numbers(fit, [*names, *held])
         marginal = np.sqrt(np.diag(covariance))
@@ -143,19 +145,23 @@ _SOURCE = "Identified from the tests, as the method says"
 
 
 def _in_file(fit: Fit, z: Array) -> dict[str, float]:
-    """Return the coefficients of the vehicle file for the coordinates of the parameters.
+    """Return the coefficients of the vehicle file for the coordinates of the parameters."""
+    table = fit.kept.table
+    coefficients = table.coefficients(z.tolist())
+    for one in _quadratics(fit, z):
+        coefficients |= one.coefficients
+    return coefficients | {name: table.base[name] for name in table.exact}
 
-    A file has no shapes of curves: a_t and b_t are those of the nearest curve over the tested commands.
-    """
+
+def _quadratics(fit: Fit, z: Array) -> Iterator[Quadratic]:
+    """Yield the curves of the file for those that bend. A file has no shapes of curves: it has the nearest ones."""
     table, (low, high) = fit.kept.table, fit.command_range
     coefficients = table.coefficients(z.tolist())
     shapes, vehicle = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
     for curve in fit.known.curves:
         if curve.name in shapes.of:
             c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
-
-            coefficients |= fitted(curve, partial(shapes.forces, vehicle, curve), c_0, low, high)
-    return coefficients | {name: table.base[name] for name in table.exact}
+            yield from nearest(curve, partial(shapes.forces, vehicle, curve), c_0, low, high)
 
 
 def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
@@ -170,13 +176,30 @@ def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
 
 
 def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
-    """Return some coefficients of the vehicle file, their covariance, and their covariance by the prior."""
+    """Return some coefficients of the vehicle file, their covariance, and their covariance by the prior.
+
+    The forces of a measured curve that bends differ from those of the file by a misfit, which is uncertain, too. The
+    covariance of a_t and b_t contains it: the mean variance of the forces grows by the mean square of the misfit. The
+    scale of the forces of other curves is an assumption, whose error is much larger than their misfit.
+    """
 
     def values(z: Array) -> Array:
         coefficients = _in_file(fit, z)
         return np.array([coefficients[name] for name in names])
 
-    return fit.averaged.numbers(values)
+    def measured(z: Array) -> list[Quadratic]:
+        some = (one for one in _quadratics(fit, z) if one.curve.name in fit.known.measured_curves)
+        return [one for one in some if {*one.coefficients} <= {*names}]
+
+    def misfit(n: int, z: Array) -> Array:
+        return measured(z)[n].misfit
+
+    found, covariance, prior = fit.averaged.numbers(values)
+    for n, one in enumerate(measured(fit.averaged.z)):
+        off, errors, _ = fit.averaged.numbers(partial(misfit, n))
+        places = [names.index(name) for name in one.coefficients]
+        covariance[np.ix_(places, places)] += one.covariance(float(np.mean(off**2 + np.diag(errors))))
+    return found, covariance, prior
 
 
 def _layout(tests: Tests, fit: Fit) -> Layout:
@@ -192,7 +215,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
             return key in part.keys
         if key in ("V_0", "n_V"):
             return with_voltage
-        if key in ("F_0", "T") or key.startswith("c_0"):
+        if key in ("F_0", "T", *_DEAD_BAND):
             value = coefficients[name]
             return {"F_0": value != 0.0, "T": value > LEAST_LAG * 1.0001}.get(key, value > 0.0)
         if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
@@ -244,8 +267,8 @@ def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterato
 
 def _interval(vehicle: Vehicle, name: str, error: float) -> Interval:
     """Return the 95 % interval of a coefficient within its bounds."""
-    declaration = vehicle.layout.coefficients[name]
-    if name.startswith("c_0"):
+    declaration, key = vehicle.layout.coefficients[name], vehicle.layout.keys_in_file[name][-1]
+    if key in _DEAD_BAND:
         error = max(error, EXACT_BAND / QUANTILE)
-    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and not name.startswith(("c_0", "T_")))
+    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and key not in ("T", *_DEAD_BAND))
     return max(low, declaration.minimum), min(high, declaration.maximum)

@@ -216,6 +216,39 @@ def test_intervals_of_a_measured_curve_with_a_dead_band_cover_the_truth(tmp_path
     assert min(map(sum, covered.values())) >= binom.ppf(0.001, 8, 0.95), covered
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("power", "band"), [(1.45, 0.06), (2.2, 0.0), (2.0, 0.1)])
+def test_the_file_of_a_measured_curve_tells_how_far_off_its_forces_are(
+    power: float, band: float, tmp_path: Path
+) -> None:
+    """The force grows with a power of the command beyond a dead band. A file has a quadratic curve, which misses the
+    first two laws; the third is quadratic without a linear share, which may not be negative."""
+    random, covered = np.random.default_rng(5), []
+
+    def force(c: float) -> float:
+        share = max(abs(c) - band, 0.0) / (1.0 - band)
+        return float((22.0 if c > 0.0 else -15.0) * share**power)
+
+    for n in range(3):
+        forces, speeds = f"{FORCE}\n", f"{SPEED}\n"
+        for c in (sign * size for size in (0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0) for sign in (1.0, -1.0)):
+            forces += "".join(f"{c},{force(c) + 0.3 * random.standard_normal():.4f}\n" for _ in range(2))
+            V = np.sign(c) * (np.sqrt(36.0 + 180.0 * abs(force(c))) - 6.0) / 90.0  # 45 V² + 6 V = F
+            speeds += f"{c},{V * (1.0 + 0.02 * random.standard_normal()):.5f}\n"
+        found = identify(read(tmp_path / str(n), DOWN, {"thrust_t200.csv": forces, "steady_heave.csv": speeds})).vehicle
+        write_vehicle(found, tmp_path / f"{n}.toml")
+        vehicle = load_vehicle(tmp_path / f"{n}.toml")
+        known = vehicle.uncertainty
+        rows = known.drawn(random.random((1000, len(known.names)))).tolist()
+        drawn = [vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in rows]
+        for c in (sign * size for size in (0.3, 0.5, 0.7, 1.0) for sign in (1.0, -1.0)):
+            some = [one.curve_force(one.layout.curves[0], c) for one in drawn]
+            low, high = np.quantile(some, [0.025, 0.975])
+            covered.append(low <= force(c) <= high)
+            assert high - low < 0.2 * 22.0, "an interval is not just wide"
+    assert sum(covered) >= binom.ppf(0.001, len(covered), 0.95), covered
+
+
 # ---- Logs of one axis ------------------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ would be off by 1 % of the thrust for published curves.) eta has a Gaussian prio
 deviations ahead and astern are correlated by one half.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -101,12 +101,29 @@ class Shapes:
 NO_SHAPES = Shapes({})
 
 
-def fitted(curve: Curve, forces: Callable[[Array], Array], c_0: float, low: float, high: float) -> dict[str, float]:
-    """Return the coefficients a_t and b_t, ahead and astern, that are nearest to a curve over the tested commands.
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """The a_t and b_t of one direction that are nearest to a thrust curve over n commands."""
+
+    curve: Curve
+    coefficients: Mapping[str, float]
+    """By the names of a_t and b_t."""
+    misfit: Array
+    """Of the forces at the commands, relatively."""
+    terms: Array
+    """n x 2: the forces for a coefficient of 1, relative to the curve."""
+
+    def covariance(self, variance: float) -> Array:
+        """Return the covariance of a_t and b_t with which the relative forces at the commands have a mean variance."""
+        mean_squares = self.terms.T @ self.terms / len(self.terms)
+        return np.asarray(variance / len(self.coefficients) * np.linalg.inv(mean_squares))
+
+
+def nearest(curve: Curve, forces: Callable[[Array], Array], c_0: float, low: float, high: float) -> Iterator[Quadratic]:
+    """Yield the quadratic curves that are nearest to a curve ahead and astern.
 
     `forces` gives the thrust for some commands (N); the relative errors have equal weights over low to high.
     """
-    found: dict[str, float] = {}
     low = max(low, c_0 + 0.05)
     commands = np.linspace(low, max(high, low + 0.1), 40)
     for end, sign in (("", 1.0), (REVERSE, -1.0)):
@@ -114,6 +131,7 @@ def fitted(curve: Curve, forces: Callable[[Array], Array], c_0: float, low: floa
             continue
         F = sign * forces(sign * commands)
         beyond = commands - c_0
-        a, b = np.linalg.lstsq(np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F)), rcond=None)[0]
-        found |= {curve.coefficient(f"a_t{end}"): float(a), curve.coefficient(f"b_t{end}"): float(b)}
-    return found
+        terms, one = np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F))
+        values = np.linalg.lstsq(terms, one, rcond=None)[0]
+        names = [curve.coefficient(f"{key}{end}") for key in ("a_t", "b_t")]
+        yield Quadratic(curve, dict(zip(names, values.tolist(), strict=True)), terms @ values - one, terms)

@@ -45,25 +45,45 @@ class Posterior:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def evidence(self, place: int) -> float:
-        """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): posterior against prior where it is 0."""
-        p, z, error = self.table.parameters[place], self.z[place], self.errors[place]
+        """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): posterior against prior where it is 0.
+
+        The posterior is that of the most probable vehicle without the effect. Where this has parameters at their
+        bounds, it is less probable than a normal distribution without bounds would have it.
+        """
+        p = self.table.parameters[place]
         assert p.null is not None
-        before, after = (p.mean - p.null) / p.deviation, (z - p.null) / error
-        return float(after**2 - before**2 + 2.0 * log(error / p.deviation))
+        _, after = self._nearest([place])
+        before = ((p.mean - p.null) / p.deviation) ** 2
+        return float(after - before + 2.0 * log(self.errors[place] / p.deviation))
 
     def without(self, places: Sequence[int]) -> "Posterior":
         """Return the posterior given that some effects are absent."""
         if not places:
             return self
         gone, C = np.array(places), self.covariance
-        null = np.array([self.table.parameters[n].null or 0.0 for n in places])
         regression = np.linalg.solve(C[np.ix_(gone, gone)], C[gone]).T
-        low, high = (np.array([getattr(p, key) for p in self.table.parameters]) for key in ("low", "high"))
-        z = np.clip(self.z + regression @ (null - self.z[gone]), low, high)
-        z[gone] = null
         covariance = C - regression @ C[gone]
         covariance[gone] = covariance[:, gone] = 0.0
-        return Posterior(self.table, z, 0.5 * (covariance + covariance.T))
+        return Posterior(self.table, self._nearest(places)[0], 0.5 * (covariance + covariance.T))
+
+    def _nearest(self, absent: Sequence[int]) -> tuple[Array, float]:
+        """Return the most probable coordinates without some effects, within their bounds, and how far they are away.
+
+        That is the square of their distance in standard deviations. A coordinate that would leave its bounds stays
+        at them, and the others move on with it.
+        """
+        low, high = (np.array([getattr(p, key) for p in self.table.parameters]) for key in ("low", "high"))
+        ends = {n: self.table.parameters[n].null or 0.0 for n in absent}
+        while True:
+            places, C = [*ends], self.covariance
+            move = np.array([*ends.values()]) - self.z[places]
+            weight = np.linalg.solve(C[np.ix_(places, places)], move)
+            z = self.z + C[:, places] @ weight
+            z[places] = [*ends.values()]
+            beyond = np.flatnonzero((z < low) | (z > high))
+            if not beyond.size:
+                return z, float(move @ weight)
+            ends |= zip(beyond.tolist(), np.clip(z, low, high)[beyond].tolist(), strict=True)
 
     @cached_property
     def absent(self) -> tuple[int, ...]:

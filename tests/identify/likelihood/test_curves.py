@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, fitted
+from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, nearest
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VIDEORAY
@@ -48,7 +48,8 @@ def test_a_shape_is_fitted_where_it_was_tested() -> None:
     """No other quadratic curve has smaller relative errors over the tested commands, (6)."""
     shape = Shapes({"rear": 0.1 * np.random.default_rng(5).standard_normal(COUNT)})
     commands = np.linspace(0.2, 0.7, 40)
-    found = fitted(REAR, lambda c: shape.forces(VIDEORAY, REAR, c), 0.0, 0.2, 0.7)
+    (curve,) = nearest(REAR, lambda c: shape.forces(VIDEORAY, REAR, c), 0.0, 0.2, 0.7)
+    found = dict(curve.coefficients)
 
     def error(coefficients: dict[str, float]) -> float:
         near = VIDEORAY.replaced(coefficients)

@@ -1,9 +1,11 @@
 """The posterior: evidence by marginal likelihoods, and the mixture of models with and without an effect."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal, t
 
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
@@ -53,6 +55,24 @@ def test_an_effect_is_weighed_against_the_model_without_it(true: float, noise: f
         C = share * posterior.covariance + (1.0 - share) * without.covariance
         assert mixed.z == pytest.approx(share * posterior.z + (1.0 - share) * without.z)
         assert mixed.covariance == pytest.approx(C + share * (1.0 - share) * np.outer(shift, shift))
+
+
+def test_without_an_effect_the_others_stay_within_their_bounds() -> None:
+    """The vehicle without a load is the best one within the bounds, and its evidence is that of this vehicle."""
+    random, noise = np.random.default_rng(1), 0.1
+    A = random.standard_normal((15, 3))
+    A[:, 1] += 3.0 * A[:, 0]
+    y = A @ np.array([0.15, 0.3, -0.4]) + noise * random.standard_normal(15)
+    parameters = [LOAD, replace(INERTIA, high=0.335), OFFSET]
+    posterior = conjugate(parameters, A, y, noise)
+    mean, deviation = (np.array([getattr(p, key) for p in parameters]) for key in ("mean", "deviation"))
+    rows, values = np.vstack([A / noise, np.diag(1.0 / deviation)]), np.array([*y / noise, *mean / deviation])
+    best = lsq_linear(rows[:, 1:], values, ([-np.inf, -np.inf], [0.335, np.inf]), tol=1e-14)
+    assert posterior.z[1] < best.x[0] == pytest.approx(0.335), "only without the load, it is at its bound"
+    assert posterior.without([0]).z == pytest.approx([0.0, *best.x])
+    worse = 2.0 * best.cost - np.sum((rows @ posterior.z - values) ** 2)
+    ratio = worse - (mean[0] / deviation[0]) ** 2 + 2.0 * np.log(posterior.errors[0] / deviation[0])
+    assert posterior.evidence(0) == pytest.approx(ratio, rel=1e-6)
 
 
 def test_intervals_are_those_of_student() -> None:
