@@ -161,7 +161,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "log_1.csv: the current to the north is -0.100 m/s (-0.110 to -0.090). It belongs to the water, so the",
         quiet(effects=(replace(OF_FILE, evidence=5.0),)),
     ),
-    ("small disturbance", disturbance(share=0.03), "It is small, and the intervals allow for it", disturbance()),
+    (
+        "small disturbance",
+        disturbance(share=0.03),
+        "It is small, and the intervals allow for it",
+        disturbance(share=0.009),
+    ),
     (
         "logging",
         quiet(logging=(LATE,)),
@@ -265,13 +270,13 @@ ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the othe
             [f"{ODD}Check the surge velocity: is it in cm?"],
         ),
         (
-            three(**slow_forces(0.5, 0.4, 3.3)),
+            three(**slow_forces(0.5, 0.4, 1.6)),
             [
-                f"{ODD}An unknown slow force acts in this log: 3.3 N in surge (at most 0.50 N in the other logs). "
+                f"{ODD}An unknown slow force acts in this log: 1.6 N in surge (at most 0.50 N in the other logs). "
                 "Check the thrusters and the tether of that dive."
             ],
         ),
-        (three(**slow_forces(0.5, 1.4, 3.3)), []),
+        (three(**slow_forces(0.5, 0.6, 1.6)), []),
     ],
 )
 def test_a_log_that_disagrees_with_the_others_is_repaired_before_anything_is_measured(
