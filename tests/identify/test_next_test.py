@@ -8,36 +8,21 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
-from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.likelihood.fit import Fit, fit_all
+from rov_fmu.identify.beginning import begin
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import total
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.result import NextTest
+from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.description import TankLimits
-from tests.folders import ARM, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read
-from tests.recordings import run, write_log
-from tests.vehicles import VIDEORAY
+from tests.folders import FORCE, HEAD, MASS, SPEED, read
+from tests.identify.conftest import SHORT, TRUTH, written
+from tests.recordings import run
 
-TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
-FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("top", "rear")}
-SHORT = ((0.0, 2.0), (0.3, 8.0), (0.0, 4.0), (-0.2, 6.0))
 REST = 4.0
 """The rest between both commands of a proposed test, s."""
-
-
-def fitted(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Fit:
-    """Fit logs at 10 Hz by their axes, names and plans."""
-    path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
-    for axis, name, plan in logs:
-        write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
-    tests = load_tests(path)
-    known, recorded, rows = begin(tests)
-    return fit_all(tests.folder.path, known, recorded, rows)
-
-
-@pytest.fixture(scope="module")
-def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
-    """Fit a short log of heave and one of yaw."""
-    return fitted(tmp_path_factory.mktemp("tests"), (HEAVE, "a", SHORT), (YAW, "a", SHORT))
 
 
 def proposed(fit: Fit, axis: Axis = HEAVE, **limits: float) -> NextTest | None:
@@ -79,18 +64,33 @@ def test_no_command_is_above_the_strongest(fit: Fit) -> None:
     assert proposed(fit, command_max=0.1) is None
 
 
-@pytest.mark.long
-def test_the_interval_after_the_test_is_that_of_a_fit_with_it(fit: Fit, tmp_path: Path) -> None:
+def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path: Path) -> None:
     """A log of the proposed test joins the others, and the interval becomes as narrow as was said."""
     test = proposed(fit)
     assert test
     assert test.is_useful
     more = ((0.0, 2.0), *plan(test), (0.0, 2.0))
-    again = fitted(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more))
-    after = proposed(again)
+    known, logs, rows = begin(written(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more)))
+    objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+    places = [fit.posterior.table.place(p.kind, p.of, p.part) for p in objective.table.parameters]
+    z = np.array([usual if n is None else fit.kept.z[n] for n, usual in zip(places, objective.mean, strict=True)])
+    _, information = total(objective, z, objective.data(z, objective.runs(z)))
+    after = next_test(objective, Posterior.of(objective.table, z, information), HEAVE, TankLimits(), ())
     assert after
-    assert after.now == pytest.approx(test.then, rel=0.4)
+    assert after.now == pytest.approx(test.then, rel=0.2)
     assert after.now < 0.8 * test.now
+
+
+def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
+    """An interval of 30 %, of which the posterior explains less, has a part that no test narrows."""
+    test, (low, high) = proposed(fit), (-0.26, -0.14)
+    answer = Answer(HEAVE, -0.5, (-0.2, (low, high)), (1.0, (1.0, 1.0)), (1.0, (1.0, 1.0)))
+    posterior = replace(fit.posterior, z=fit.kept.z)
+    wider = next_test(fit.objective, posterior, HEAVE, TankLimits(), [answer])
+    assert test
+    assert wider
+    assert (test.target, wider.target, wider.now) == ("the speed at -50%", test.target, pytest.approx(0.3))
+    assert wider.then == pytest.approx(np.sqrt(test.then**2 + 0.3**2 - test.now**2))
 
 
 # ---- The limits in rov.toml ------------------------------------------------------------------------------------------
