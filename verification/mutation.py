@@ -69,7 +69,7 @@ TESTS = {
     "rov_fmu/identify/likelihood/*": "identify/likelihood docs/test_identify_pages.py identify",
     "rov_fmu/identify/given.py": "tank/test_description_mistakes.py tank/test_description.py identify",
     "rov_fmu/identify/beginning.py": "tank/test_description_mistakes.py tank/test_tank_tests.py tank identify",
-    "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify/test_identify.py identify",
+    "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify",
     "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/claims/*": "fmu/claims",

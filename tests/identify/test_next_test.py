@@ -17,7 +17,7 @@ from rov_fmu.identify.likelihood.solve import total
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.description import TankLimits
-from tests.folders import FORCE, HEAD, MASS, SPEED, read
+from tests.folders import HEAD, SPEED, read
 from tests.identify.conftest import SHORT, TRUTH, written
 from tests.recordings import run
 
@@ -93,31 +93,7 @@ def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
     assert wider.then == pytest.approx(np.sqrt(test.then**2 + 0.3**2 - test.now**2))
 
 
-# ---- The limits in rov.toml ------------------------------------------------------------------------------------------
-
-TABLES = {
-    "thrust_top.csv": f"{FORCE}\n0.1,0.07\n0.3,0.6\n0.5,1.65\n0.7,3.2\n",
-    "steady_heave.csv": f"{SPEED}\n0.3,0.163\n0.4,0.22\n0.5,0.28\n0.6,0.34\n0.7,0.4\n",
-}
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("tank_length = 0", "limits.tank_length = 0: must be the length of the tank in m, above 0"),
-        ("command_max = 50", "limits.command_max = 50: must be above 0 and at most 1, a fraction of the full command"),
-        ('command_max = "120 %"', "limits.command_max = '120 %': must be above 0 and at most 1"),
-        ("duration = -1.0", "limits.duration = -1.0: must be the duration of a test in s, above 0"),
-    ],
-)
-def test_a_wrong_limit_is_one_line(line: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(Exception, match="limits") as error:
-        read(tmp_path, f"{HEAD}[known]\n{MASS}[limits]\n{line}\n", TABLES)
-    text = str(error.value)
-    assert text.count("\n") == 0
-    assert message in text
-
-
 def test_percent_are_a_fraction(tmp_path: Path) -> None:
-    tests = read(tmp_path, f'{HEAD}[known]\n{MASS}[limits]\ncommand_max = "60 %"\n', TABLES)
+    rov = f'base = "videoray"\n{HEAD}[limits]\ncommand_max = "60 %"\n'
+    tests = read(tmp_path, rov, {"steady_heave.csv": f"{SPEED}\n0.3,0.163\n"})
     assert tests.given.description.tables.limits == TankLimits(command_max=0.6)

@@ -1,16 +1,12 @@
-"""The independent integrators of the pool, compared with the exact step and with what follows without integration."""
+"""The independent integrator of the pool, compared with the exact step."""
 
 import random
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
-from verification.references import pool, rigid_pool
-from verification.references.pool import Array, Commands, Conditions, swim
+from tests.vehicles import VEHICLES, at_rest, still
+from verification.references.pool import Array, swim
 
 STEP = 0.25
 
@@ -31,29 +27,3 @@ def test_a_swim_is_that_of_the_exact_step(name: str) -> None:
         state = k.step(inputs, state, STEP)
         for symbol in {*k.layout.velocities, *k.layout.pose}:
             assert motion[symbol][n + 1] == pytest.approx(state[symbol], rel=1e-7, abs=1e-8), (symbol, n)
-
-
-# ---- Commands that switch at any time, and conditions ----------------------------------------------------------------
-
-HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
-SWITCHES = np.array([0.0, 0.613, 0.977, 1.0142, 1.3])
-TIME: Array = np.array([0.0, 0.3, 0.7, 0.9, 1.0, 1.35, 1.4])
-Simulate = Callable[..., dict[str, Array]]
-
-
-@pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
-def test_conditions_of_thrust(simulate: Simulate, k: Vehicle) -> None:
-    """Thrust at 70 % is that of a weaker curve; saturated commands are smaller ones; a delay moves the switches."""
-    rng = np.random.default_rng(0)
-    levels = {t.name: rng.uniform(-0.5, 0.5, len(SWITCHES)) for t in k.layout.thrusters}
-    weaker = k.replaced({name: 0.7 * value for name, value in k.coefficients.items() if name[:4] in ("a_t_", "b_t_")})
-    clipped = {name: np.clip(values, -0.3, 0.3) for name, values in levels.items()}
-    for conditions, other, commands in (
-        (Conditions(thrust=lambda _: 0.7), weaker, Commands(SWITCHES, levels)),
-        (Conditions(saturation=0.3), k, Commands(SWITCHES, clipped)),
-        (Conditions(delay=0.25), k, Commands(SWITCHES + 0.25, levels)),
-    ):
-        motion = simulate(k, Commands(SWITCHES, levels), TIME, conditions)
-        expected = simulate(other, commands, TIME)
-        for name in (*k.layout.velocities, "x", "y", "z", "psi"):
-            assert motion[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-8), (conditions, name)
