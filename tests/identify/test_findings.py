@@ -208,6 +208,16 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
     )
 
 
+def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
+    """They are those of commands, of the measured V_ss and of the depths, of which 0.5 % at each end do not count."""
+    values = np.where(TIME > 59.8, 99.0, np.where(TIME < 0.1, 0.0, 1.0 + TIME / 6.0))
+    depth, heading = (Channel(QUANTITIES[name], Source(name), TIME, values) for name in ("depth", "heading"))
+    one = replace(log("dive.csv"), channels=(depth, heading))
+    vehicle = replace(quiet().vehicle, command_range=(0.2, 0.6))
+    found = told(quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)).vehicle.layout.identified
+    assert found == (("command", 0.0, 0.6), ("u", 0.29, 0.51), ("z", 1.05, 10.9))
+
+
 def test_the_next_tests_begin_with_the_widest_interval() -> None:
     tests = [
         NextTest(axis, f"do {n}", "V_ss at 50%", now, 0.1)
