@@ -35,8 +35,8 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
     ("changes", "word", "reason"),
     [
         ({}, "good", ""),
-        ({"found": [WORSE]}, "do not use", NO_CHANGE),
-        ({"found": [WORSE, DEPTH]}, "usable", NO_CHANGE),
+        ({"found": [WORSE, replace(WORSE, file="log_3.csv"), DEPTH]}, "do not use", NO_CHANGE),
+        ({"found": [WORSE, replace(WORSE, file="log_3.csv"), DEPTH, DEPTH]}, "usable", NO_CHANGE),
         ({"found": [replace(WORSE, noise=0.23)]}, "do not use", NO_CHANGE),
         ({"found": [replace(WORSE, noise=0.24)]}, "good", ""),
         ({"slow": [FORCE]}, "do not use", "An unknown slow force is as large as 6% of the thrusters' in log.csv."),
@@ -77,7 +77,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
     ],
 )
 def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:
-    usual = {"found": [DEPTH], "given": results.answers(1.0, 0.02), "slow": [], "difference": 0.0}
+    usual: dict[str, Any] = {"found": [DEPTH], "given": results.answers(1.0, 0.02), "slow": [], "difference": 0.0}
     judged = verdict(**(usual | changes))
     assert (judged.word, judged.reasons) == (word, tuple(filter(None, [COVERED, reason])))
 

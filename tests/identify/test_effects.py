@@ -50,8 +50,8 @@ def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(
 ) -> None:
     numbers = {"logging offset": -0.05, "logging width": 0.6, "dead time": dead_time}
     one, other = loggers_of(found(fit, **numbers))
-    assert (one.file, other.file, one.interval) == ("log_heave_a.csv", "log_yaw_a.csv", pytest.approx(0.1))
-    assert (one.offset, one.width) == pytest.approx((offset, 0.06))
+    assert (one.file, other.file) == ("log_heave_a.csv", "log_yaw_a.csv")
+    assert (one.interval, one.offset, one.width) == pytest.approx((0.1, offset, 0.06))
     assert one.offset_interval == pytest.approx((offset - half, offset + half))
 
 
