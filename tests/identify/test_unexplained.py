@@ -91,13 +91,14 @@ def test_a_change_of_all_thrust_follows_the_largest_command_and_the_voltage_itse
 
 def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> None:
     """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more."""
-    z, filter_of, since = objective.mean, objective.filters[0], 1.0 * (TIME >= 30.0)
-    slow: dict[int, Array] = {
+    z, filter_of = objective.mean, objective.filters[0]
+    since: Array = np.where(TIME >= 30.0, 1.0, 0.0)
+    slow = {
         filter_of.force: 2.0 * since,
         filter_of.gain: 1.1 * since,
         filter_of.drift: 0.3 + 0.0 * TIME,
     }
-    moving: dict[int, Array] = {filter_of.drift + 1: 1.2 * since, 0: 0.8 + 0.0 * TIME}
+    moving = {filter_of.drift + 1: 1.2 * since, 0: 0.8 + 0.0 * TIME}
     run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
     posterior = Posterior(objective.table, z, np.diag(0.3 * objective.deviation) ** 2)
     best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)), has_converged=True, steps=0)
