@@ -101,7 +101,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> No
     moving = {filter_of.drift + 1: 1.2 * since, 0: 0.8 + 0.0 * TIME}
     run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
     posterior = Posterior(objective.table, z, np.diag(0.3 * objective.deviation) ** 2)
-    best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)), has_converged=True, steps=0)
+    best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)))
     found = {(str(one.kind), one.axis): one for one in disturbances(objective, best, posterior, [run])}
     thrust = np.array([VIDEORAY.force(SURGE, c) for c in COMMAND])
     share = np.mean(since)
