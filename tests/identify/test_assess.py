@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.identify.assess import answers, answers_of_file, unseen_current, verdict
+from rov_fmu.identify.assess import answers, answers_of_file, verdict
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.result import Disturbance, Point, Slip
@@ -140,13 +140,3 @@ def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
             assert value == pytest.approx(own)
             assert interval == pytest.approx(np.quantile(some, (0.025, 0.975)), abs=0.3 * np.std(some))
         assert exact.steady == (exact.steady[0], (exact.steady[0], exact.steady[0]))
-
-
-def test_the_current_of_an_unseen_log_is_about_as_large_as_in_the_others() -> None:
-    files = "a.csv", "b.csv"
-    currents = [Parameter("current", file, part, deviation=0.1) for file in files for part in ("north", "east")]
-    table = Table(VIDEORAY.layout, VIDEORAY.coefficients, {}, tuple(currents))
-    z, covariance = np.array([9.0, 9.0, 0.03, -0.05]), np.diag([9.0, 9.0, 0.01, 0.02]) ** 2
-    expected = 0.02**2 + (0.03**2 + 0.05**2 + 0.01**2 + 0.02**2) / 2.0
-    assert unseen_current(table, z, covariance, "a.csv") == pytest.approx(expected)
-    assert unseen_current(table, z, covariance, "b.csv") == pytest.approx(0.1**2), "never more than before any log"
