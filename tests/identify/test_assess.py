@@ -73,7 +73,8 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "do not use",
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
         ),
-        ({"difference": 41.0}, "do not use", "Two starts of the fit led to different vehicles."),
+        ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
+        ({"difference": 40.0}, "good", ""),
     ],
 )
 def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:
