@@ -238,7 +238,7 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
     """Return the RMS change of a quantity since the start of its prediction."""
     if span == inf:
         return float(np.sqrt(np.mean((values - values[0]) ** 2)))
-    first = np.maximum(np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span)), 0)
+    first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
     return float(np.sqrt(np.mean((values - values[first]) ** 2)))
 
 

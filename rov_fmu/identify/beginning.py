@@ -322,7 +322,7 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
     c_0 = vehicle.coefficients.get(curve.coefficient("c_0"), 0.0)
     command, F = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
     c, F, is_back = np.maximum(np.abs(command) - c_0, 0.0), np.abs(F), astern & (command < 0.0)
-    largest = max(float(F.max()), 1e-9)
+    largest = float(F.max())
 
     def force(x: Array) -> Array:
         whole, share, ratio = np.exp(x[0]), x[1], np.exp(x[2])

@@ -5,13 +5,19 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from rov_fmu.identify.beginning import Tests
+from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
+from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.result import Identification
 from rov_fmu.tank.description import NO_ROV_FILE
 from tests.conftest import Made
+from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled
+from tests.recordings import run, write_log
+from tests.vehicles import VIDEORAY
 
 Identified = Callable[[str, Callable[[Path], Tests]], Identification]
 """A function that returns the result with a name. Another function writes its tests to a folder, if it is new."""
@@ -33,3 +39,23 @@ def identified(made_once: Made) -> Identified:
         return result
 
     return found
+
+
+TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
+FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("top", "rear")}
+SHORT = ((0.0, 2.0), (0.3, 8.0), (0.0, 4.0), (-0.2, 6.0))
+
+
+def written(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Tests:
+    """Write logs at 10 Hz by their axes, names and plans."""
+    path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
+    for axis, name, plan in logs:
+        write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
+    return load_tests(path)
+
+
+@pytest.fixture(scope="session")
+def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
+    """Fit a short log of heave and one of yaw."""
+    folder = tmp_path_factory.mktemp("tests")
+    return fit_all(folder, *begin(written(folder, (HEAVE, "a", SHORT), (YAW, "a", SHORT))))

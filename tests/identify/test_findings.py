@@ -161,7 +161,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "log_1.csv: the current to the north is -0.100 m/s (-0.110 to -0.090). It belongs to the water, so the",
         quiet(effects=(replace(OF_FILE, evidence=5.0),)),
     ),
-    ("small disturbance", disturbance(share=0.03), "It is small, and the intervals allow for it", disturbance()),
+    (
+        "small disturbance",
+        disturbance(share=0.03),
+        "It is small, and the intervals allow for it",
+        disturbance(share=0.009),
+    ),
     (
         "logging",
         quiet(logging=(LATE,)),
@@ -201,6 +206,16 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
         "surge distance, 10 s ahead: off by 0.050 m (RMS) in log_2.csv, and a prediction of no change by 0.70 m; 95% "
         "of the samples are inside the 95% band"
     )
+
+
+def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
+    """They are those of commands, of the measured V_ss and of the depths, of which 0.5 % at each end do not count."""
+    values = np.where(TIME > 59.8, 99.0, np.where(TIME < 0.1, 0.0, 1.0 + TIME / 6.0))
+    depth, heading = (Channel(QUANTITIES[name], Source(name), TIME, values) for name in ("depth", "heading"))
+    one = replace(log("dive.csv"), channels=(depth, heading))
+    vehicle = replace(quiet().vehicle, command_range=(0.2, 0.6))
+    found = told(quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)).vehicle.layout.identified
+    assert found == (("command", 0.0, 0.6), ("u", 0.29, 0.51), ("z", 1.05, 10.9))
 
 
 def test_the_next_tests_begin_with_the_widest_interval() -> None:
@@ -265,13 +280,13 @@ ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the othe
             [f"{ODD}Check the surge velocity: is it in cm?"],
         ),
         (
-            three(**slow_forces(0.5, 0.4, 3.3)),
+            three(**slow_forces(0.5, 0.4, 1.6)),
             [
-                f"{ODD}An unknown slow force acts in this log: 3.3 N in surge (at most 0.50 N in the other logs). "
+                f"{ODD}An unknown slow force acts in this log: 1.6 N in surge (at most 0.50 N in the other logs). "
                 "Check the thrusters and the tether of that dive."
             ],
         ),
-        (three(**slow_forces(0.5, 1.4, 3.3)), []),
+        (three(**slow_forces(0.5, 0.6, 1.6)), []),
     ],
 )
 def test_a_log_that_disagrees_with_the_others_is_repaired_before_anything_is_measured(

@@ -12,12 +12,11 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify import beginning
-from rov_fmu.identify.assess import verdict
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
-from rov_fmu.identify.result import Answer, AxisResult, Identification, Point
+from rov_fmu.identify.result import AxisResult, Identification
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
@@ -102,16 +101,6 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
         assert p.held_out == pytest.approx(p.measured, rel=0.01)
     (outside,) = (p for p in heave.points if not p.counts)
     assert (outside.command, outside.measured, np.isnan(outside.held_out)) == (0.9, 2.5, True)
-
-
-@pytest.mark.parametrize(("off", "word"), [(0.1, "good"), (0.25, "usable"), (0.5, "do not use")])
-def test_a_verdict_counts_how_well_other_commands_predict_a_velocity(off: float, word: str) -> None:
-    answer = Answer(HEAVE, 0.3, (0.2, (0.19, 0.21)), (1.0, (0.9, 1.1)), (1.0, (0.9, 1.1)))
-    numbers = 0.3, 0.2, 0.2, 0.2 * (1.0 + off)
-    points = [Point("heave", "V_ss", "m/s", "steady_heave.csv", *numbers, counts=True)]
-    judged = verdict([], [answer], [], 0.0, (), points)
-    assert judged.word == word
-    assert (f"with an error of {off:.0%} (RMS)" in " ".join(judged.reasons)) == (word != "good")
 
 
 # ---- The vehicle file ------------------------------------------------------------------------------------------------
@@ -289,6 +278,10 @@ def test_unseen_logs_are_predicted_and_the_noise_of_the_sensor_is_found(of_logs:
     for p in predictions:
         assert (p.quantity, p.unit, p.by) == ("depth", "m", "the other log")
         assert p.error < 0.1 * p.unchanged
+        begins = p.span * np.floor((p.time - p.time[0]) / p.span) if np.isfinite(p.span) else 0.0 * p.time
+        changed = p.measured - p.measured[np.searchsorted(p.time - p.time[0], begins)]
+        assert p.unchanged == pytest.approx(np.sqrt(np.mean(changed**2)))
+        assert (p.time[0], p.time[-1]) == pytest.approx((5.0, 59.8)), "after the time in which the filter settles"
         assert p.noise == pytest.approx(0.005, rel=0.2)
         off = p.measured - p.predicted
         assert p.error == pytest.approx(np.sqrt(np.mean(off**2)))
@@ -320,6 +313,10 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_pa
     write_log(path, "0", change(run(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
     (heave,) = identify(load_tests(path)).axes
     check_answers(heave, near)
+    by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
+    assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"
+    assert all(p.error < 0.45 * p.unchanged for p in heave.predictions)
+    assert heave.coverage > 0.8
 
 
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------
@@ -334,7 +331,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_pa
     ],
 )
 def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> None:
-    rov = f'base = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'
+    rov = f'base = "videoray"\nagainst = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'
     folder = with_logs(tmp_path, HEAVE, 1, rov, {})
     (path,) = folder.glob("log_*.csv")
     header, *rows = path.read_text(encoding="utf-8").splitlines()
@@ -345,6 +342,10 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
     assert all(np.isfinite(effect.evidence) for effect in found.effects)
     absent = {"lag": "lag", "dead_time": "dead time", "load": "load", "dead_band": "dead band", "voltage": "voltage"}
     assert absent.get(key) not in {effect.kind for effect in found.effects}
+    (heave,) = found.axes
+    assert all(p.compared_error and p.compared_error < 0.7 for p in heave.predictions)
+    for answer in heave.compared:
+        assert (answer.steady[0], answer.rise[0]) == pytest.approx(VIDEORAY.response(HEAVE, answer.command))
     if key == "voltage":
         assert found.vehicle["n_V_top"] == USUAL_EXPONENT
         assert found.vehicle.layout.voltage_source == "Mean voltage of the logs"
@@ -431,6 +432,11 @@ TABLES = {**FORCES, **responses(TRUTH, HEAVE)}
         (KNOWN, {**FORCES, "steady_heave.csv": UP}, "steady_heave"),
         (f"{KNOWN}[priors]\nthrst = 0.0\n", TABLES, "priors.thrst"),
         (f"{KNOWN}[priors]\nthrust = -1.0\n", TABLES, "priors.thrust"),
+        (f"{KNOWN}[priors]\nwhite_noise = 0\n", TABLES, "priors.white_noise = 0: must be above 0"),
+        (f"{KNOWN}[limits]\ntank_length = 0\n", TABLES, "limits.tank_length = 0: must be the length of the tank"),
+        (f"{KNOWN}[limits]\ncommand_max = 50\n", TABLES, "limits.command_max = 50: must be above 0 and at most 1"),
+        (f'{KNOWN}[limits]\ncommand_max = "120 %"\n', TABLES, "limits.command_max = '120 %': must be above 0 and at"),
+        (f"{KNOWN}[limits]\nduration = -1.0\n", TABLES, "limits.duration = -1.0: must be the duration of a test"),
     ],
 )
 def test_a_folder_that_cannot_be_used_is_one_line(

@@ -8,36 +8,21 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
-from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.likelihood.fit import Fit, fit_all
+from rov_fmu.identify.beginning import begin
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import total
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.result import NextTest
+from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.description import TankLimits
-from tests.folders import ARM, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read
-from tests.recordings import run, write_log
-from tests.vehicles import VIDEORAY
+from tests.folders import HEAD, SPEED, read
+from tests.identify.conftest import SHORT, TRUTH, written
+from tests.recordings import run
 
-TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
-FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("top", "rear")}
-SHORT = ((0.0, 2.0), (0.3, 8.0), (0.0, 4.0), (-0.2, 6.0))
 REST = 4.0
 """The rest between both commands of a proposed test, s."""
-
-
-def fitted(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Fit:
-    """Fit logs at 10 Hz by their axes, names and plans."""
-    path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
-    for axis, name, plan in logs:
-        write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
-    tests = load_tests(path)
-    known, recorded, rows = begin(tests)
-    return fit_all(tests.folder.path, known, recorded, rows)
-
-
-@pytest.fixture(scope="module")
-def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
-    """Fit a short log of heave and one of yaw."""
-    return fitted(tmp_path_factory.mktemp("tests"), (HEAVE, "a", SHORT), (YAW, "a", SHORT))
 
 
 def proposed(fit: Fit, axis: Axis = HEAVE, **limits: float) -> NextTest | None:
@@ -53,16 +38,6 @@ def plan(test: NextTest) -> tuple[tuple[float, float], ...]:
     return ((0.01 * ahead, first), (0.0, REST), (-0.01 * astern, second))
 
 
-def test_a_test_narrows_the_least_certain_velocity(fit: Fit) -> None:
-    for axis in (HEAVE, YAW):
-        test = proposed(fit, axis)
-        assert test
-        assert test.axis is axis
-        assert re.fullmatch(r"the speed at -?[35]0%", test.target)
-        assert 0.0 < test.then < test.now
-        assert test.is_useful == (test.then < 0.9 * test.now)
-
-
 def test_the_vehicle_stays_in_the_tank(fit: Fit) -> None:
     """The integrator of the tests flies the proposed test, and a minute of coasting after it."""
     free, within = proposed(fit), proposed(fit, tank_length=1.0)
@@ -70,6 +45,9 @@ def test_the_vehicle_stays_in_the_tank(fit: Fit) -> None:
     assert within
     covered = [float(np.ptp(run(TRUTH, HEAVE, [*plan(t), (0.0, 60.0)], 10.0).position)) for t in (free, within)]
     assert covered[1] <= 1.0 < covered[0]
+    turn = proposed(fit, YAW, tank_length=0.1)
+    assert turn
+    assert (turn.axis, turn.then < turn.now) == (YAW, True), "a turn needs no length"
 
 
 def test_no_command_is_above_the_strongest(fit: Fit) -> None:
@@ -79,45 +57,37 @@ def test_no_command_is_above_the_strongest(fit: Fit) -> None:
     assert proposed(fit, command_max=0.1) is None
 
 
-@pytest.mark.long
-def test_the_interval_after_the_test_is_that_of_a_fit_with_it(fit: Fit, tmp_path: Path) -> None:
+def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path: Path) -> None:
     """A log of the proposed test joins the others, and the interval becomes as narrow as was said."""
     test = proposed(fit)
     assert test
     assert test.is_useful
     more = ((0.0, 2.0), *plan(test), (0.0, 2.0))
-    again = fitted(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more))
-    after = proposed(again)
+    known, logs, rows = begin(written(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more)))
+    objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+    places = [fit.posterior.table.place(p.kind, p.of, p.part) for p in objective.table.parameters]
+    z = np.array([usual if n is None else fit.kept.z[n] for n, usual in zip(places, objective.mean, strict=True)])
+    _, information = total(objective, z, objective.data(z, objective.runs(z)))
+    after = next_test(objective, Posterior.of(objective.table, z, information), HEAVE, TankLimits(), ())
     assert after
-    assert after.now == pytest.approx(test.then, rel=0.4)
+    assert after.now == pytest.approx(test.then, rel=0.2)
     assert after.now < 0.8 * test.now
 
 
-# ---- The limits in rov.toml ------------------------------------------------------------------------------------------
-
-TABLES = {
-    "thrust_top.csv": f"{FORCE}\n0.1,0.07\n0.3,0.6\n0.5,1.65\n0.7,3.2\n",
-    "steady_heave.csv": f"{SPEED}\n0.3,0.163\n0.4,0.22\n0.5,0.28\n0.6,0.34\n0.7,0.4\n",
-}
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("tank_length = 0", "limits.tank_length = 0: must be the length of the tank in m, above 0"),
-        ("command_max = 50", "limits.command_max = 50: must be above 0 and at most 1, a fraction of the full command"),
-        ('command_max = "120 %"', "limits.command_max = '120 %': must be above 0 and at most 1"),
-        ("duration = -1.0", "limits.duration = -1.0: must be the duration of a test in s, above 0"),
-    ],
-)
-def test_a_wrong_limit_is_one_line(line: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(Exception, match="limits") as error:
-        read(tmp_path, f"{HEAD}[known]\n{MASS}[limits]\n{line}\n", TABLES)
-    text = str(error.value)
-    assert text.count("\n") == 0
-    assert message in text
+def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
+    """An interval of 30 %, of which the posterior explains less, has a part that no test narrows."""
+    test, (low, high) = proposed(fit), (-0.26, -0.14)
+    answer = Answer(HEAVE, -0.5, (-0.2, (low, high)), (1.0, (1.0, 1.0)), (1.0, (1.0, 1.0)))
+    posterior = replace(fit.posterior, z=fit.kept.z)
+    wider = next_test(fit.objective, posterior, HEAVE, TankLimits(), [answer])
+    assert test
+    assert wider
+    assert test.target == wider.target == "the speed at -50%"
+    assert wider.now == pytest.approx(0.3)
+    assert wider.then == pytest.approx(np.sqrt(test.then**2 + 0.3**2 - test.now**2))
 
 
 def test_percent_are_a_fraction(tmp_path: Path) -> None:
-    tests = read(tmp_path, f'{HEAD}[known]\n{MASS}[limits]\ncommand_max = "60 %"\n', TABLES)
+    rov = f'base = "videoray"\n{HEAD}[limits]\ncommand_max = "60 %"\n'
+    tests = read(tmp_path, rov, {"steady_heave.csv": f"{SPEED}\n0.3,0.163\n"})
     assert tests.given.description.tables.limits == TankLimits(command_max=0.6)

@@ -78,7 +78,7 @@ def test_what_is_left_out_is_predicted_and_the_refit_is_better_than_the_scaled_m
     """V_ss of surge and heave and Tau of yaw improve clearly; no other column becomes worse by more than 2 %."""
     for (axis, quantity), most in HELD_OUT.items():
         some = points(refit, axis, quantity)
-        assert relative_error(some, "held_out") <= most, (axis, quantity)
+        assert 0.94 * most < relative_error(some, "held_out") <= most, (axis, quantity)
         ours, paper = relative_error(some, "model"), by_paper(vehicle, some)
         asked = (axis, quantity) in (("surge", "V_ss"), ("heave", "V_ss"), ("yaw", "Tau"))
         assert ours < (0.9 if asked else 1.02) * paper, (axis, quantity)

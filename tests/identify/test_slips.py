@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
@@ -103,6 +106,23 @@ def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) ->
     lines = told(write_folder(tmp_path, [slipped(r, slip) if r in wrong else r for r in logs]))
     assert any(names(lines, r.file, slip.words) for r in wrong), lines
     assert not any(r.file in line for line in lines for r in logs if r not in wrong), lines
+
+
+def test_each_of_several_slips_is_told_in_its_words(tmp_path: Path) -> None:
+    """The first 30 s of three logs, each of which has another mistake."""
+    words = {
+        "depths a hundredfold": "is it in cm",
+        "distances a tenth": "are its numbers 10 times too small for its unit",
+        "radians under degrees": "is it in radians instead of degrees",
+    }
+    logs = [slipped(recordings(SLIPS[kind].axis)[0], SLIPS[kind]) for kind in words]
+    some = [replace(r, **{key: getattr(r, key)[:150] for key in ("time", "command", "values")}) for r in logs]
+    tests = load_tests(write_folder(tmp_path, some))
+    known, recorded, rows = begin(tests)
+    objective = Objective(table_of(known, recorded, []), recorded, rows)
+    found = slips(tests, known, objective, objective.mean)
+    assert {(one.file, one.words) for one in found} == {*zip((r.file for r in logs), words.values(), strict=True)}
+    assert all(one.evidence > 100.0 for one in found)
 
 
 @pytest.mark.parametrize("axis", [HEAVE, *(pytest.param(axis, marks=pytest.mark.long) for axis in (SURGE, YAW))])

@@ -102,6 +102,7 @@ def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
     found = identify(load_tests(tmp_path))
     vehicle = found.vehicle
     assert not vehicle.layout.thrusters
+    assert vehicle.measured_from == "2 dive logs"
     assert [*vehicle.layout.inputs] == ["X_ext", "Z_ext", "V_N", "V_E"]
     truths = {f"a_d_{v}": QUADRATIC[v] for v in "uw"} | {f"b_d_{v}": LINEAR[v] for v in "uw"}
     truths |= {f"beta_{v}": MASS / INERTIA[v] for v in "uw"} | {"F_0_w": BALLAST}

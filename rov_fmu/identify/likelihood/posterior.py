@@ -119,16 +119,15 @@ class Posterior:
             found = Posterior(self.table, without.z + share * shift, covariance)
         return found
 
-    def slopes(self, function: Callable[[Array], Array], places: Sequence[int] | None = None) -> Array:
-        """Return the derivatives of m numbers with respect to the coordinates, m x p."""
-        base = np.atleast_1d(function(self.z))
-        found = np.zeros((len(base), len(self.z)))
-        for n in places if places is not None else range(len(self.z)):
+    def slopes(self, function: Callable[[Array], Array], places: Sequence[int]) -> Array:
+        """Return the derivatives of m numbers with respect to the coordinates at some places, m x p."""
+        found = np.zeros((len(function(self.z)), len(self.z)))
+        for n in places:
             step = 0.05 * self.errors[n] + 1e-9
             up, down = self.z.copy(), self.z.copy()
             up[n] += step
             down[n] -= step
-            found[:, n] = (np.atleast_1d(function(up)) - np.atleast_1d(function(down))) / (2.0 * step)
+            found[:, n] = (function(up) - function(down)) / (2.0 * step)
         return found
 
     @cached_property

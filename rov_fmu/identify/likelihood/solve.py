@@ -38,8 +38,6 @@ class Minimum:
     """The innovations of each log, and then of the rows of tables, with their derivatives."""
     information: Array
     """p x p: the second derivatives of J, with those of the prior."""
-    has_converged: bool
-    steps: int
 
 
 def minimise(
@@ -63,7 +61,7 @@ def minimise(
     runs = objective.runs(z)
     place = _Place(z, objective.value(z, runs), runs)
     data = objective.data(z, runs, with_noise=with_noise, exact=False)
-    damping, has_converged, count = _FIRST_DAMPING, False, 0
+    damping = _FIRST_DAMPING
     for count in range(1, most + 1):
         on_step(count)
         moves_noise = with_noise and count % 2 == 1
@@ -79,7 +77,7 @@ def minimise(
     if last:
         data = objective.data(place.z, place.runs, data, with_noise=with_noise)
     _, information = total(objective, place.z, data)
-    return Minimum(place.z, place.value, place.runs, data, information, has_converged, count)
+    return Minimum(place.z, place.value, place.runs, data, information)
 
 
 @dataclass(frozen=True, eq=False)

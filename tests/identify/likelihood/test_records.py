@@ -1,14 +1,20 @@
-"""What a log tests, and what it tells nothing about."""
+"""What a log tests, what it tells nothing about, and what the filter reads of it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from rov_fmu.identify.likelihood.records import driven_axes, recorded
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.identify.likelihood.records import driven_axes, recorded, typical
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.log import Channel, Log
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.tank.logs import channel, commands, log
 from tests.vehicles import VIDEORAY
 
@@ -87,3 +93,60 @@ def test_the_channels_of_an_axis_that_is_not_pushed_still_tell_how_the_vehicle_m
     one = recorded(dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)), VIDEORAY.layout)
     assert one
     assert [sensor.axis.name for sensor in one.record.sensors] == ["surge", "heave", "yaw"]
+
+
+FAST: Array = 0.02 * np.arange(1000.0)
+DEPTH = 2.0 + 0.3 * FAST + 0.01 * np.random.default_rng(0).standard_normal(1000)
+
+
+def test_the_filter_reads_averages_of_fast_samples_and_all_slow_ones() -> None:
+    """Of 50 samples per second and 10, 20 are kept and 10; a first fit has 5 single ones of both."""
+    channels = channel("depth", FAST, DEPTH), *moving("surge velocity")
+    one = recorded(dive(STEP, 0.0 * STEP, STEP, *channels), VIDEORAY.layout)
+    assert one
+    full, thin, depth = one.record, one.thinned, one.measured[0]
+    groups = np.floor(20.0 * FAST + 1e-6)
+    for told, of in ((full.time, FAST), (full.value, DEPTH)):
+        assert told[full.sensor == 0] == pytest.approx([of[groups == n].mean() for n in range(400)])
+    assert full.value[full.sensor == 1] == pytest.approx(MOTION["surge velocity"])
+    assert thin.time == pytest.approx(np.repeat(0.2 * np.arange(100.0), 2))
+    assert thin.value[thin.sensor == 0] == pytest.approx(DEPTH[::10])
+    assert np.all(np.diff(full.time) >= 0.0)
+    assert (one.has_velocities, one.has_positions) == (True, False)
+    assert depth.noise == pytest.approx(0.01, rel=0.1)
+    assert full.start == VIDEORAY.layout.at_rest | {"z": DEPTH[0]}
+    usual = {"w": 0.3, "r": 0.3, "psi": 0.1, "z": 3.0 * depth.noise, "u": 0.03 + 3.0 * one.measured[1].noise}
+    assert {name: full.errors[name] for name in usual} == usual
+    assert [*full.since] == [0.0, TIME[50]]
+    assert full.inputs[:, [*VIDEORAY.layout.inputs].index("u_l")].tolist() == [0.0, 0.4]
+    assert [typical([one], axis) for axis in (HEAVE, SURGE, YAW)] == pytest.approx([0.3, 0.04, 0.0], rel=0.1)
+
+
+def test_a_voltage_has_a_row_for_each_thousandth_and_tilt_is_an_input() -> None:
+    layout = replace(VIDEORAY.layout, voltage=16.0)
+    volts, pitch = 16.0 - 0.006 * np.arange(200.0), 0.1 * np.sin(TIME)
+    more = (
+        channel("voltage", TIME, volts),
+        channel("pitch angle", TIME, pitch),
+        channel("roll angle", TIME[::2], TIME[::2]),
+    )
+    one = recorded(dive(STEP, STEP, STEP, *more, *moving("depth")), layout)
+    assert one
+    changed = one.record.inputs[:, [*layout.inputs].index("voltage")]
+    steps = -np.diff(changed) / changed[:-1]
+    assert 0.001 < min(steps) < max(steps) < 0.0015
+    assert changed == pytest.approx(np.interp(one.record.told, TIME, volts))
+    assert one.record.tilt == pytest.approx(np.array([TIME, np.minimum(TIME, TIME[198]), pitch]))
+
+
+def test_the_attitude_at_the_start_is_that_of_the_first_angles() -> None:
+    layout, angles = (
+        load_vehicle(SHIPPED["bluerov2_heavy"]).layout,
+        {"heading": 1.1, "pitch angle": -0.2, "roll angle": 0.3},
+    )
+    channels = [channel(name, TIME, value + 0.01 * np.sin(TIME)) for name, value in angles.items()]
+    one = recorded(log(commands(TIME, {t.name: STEP for t in layout.thrusters}), *channels, *moving("depth")), layout)
+    assert one
+    x, y, z, w = Rotation.from_euler("ZYX", [*angles.values()]).as_quat()
+    assert [one.record.start[name] for name in QUATERNION] == pytest.approx([w, x, y, z])
+    assert {one.record.errors[name] for name in QUATERNION} == {0.1}

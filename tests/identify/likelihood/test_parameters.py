@@ -1,0 +1,133 @@
+"""The parameters: their priors, and how they enter the model."""
+
+from functools import partial
+from math import exp
+
+import numpy as np
+import pytest
+
+from rov_fmu.equation.catalogue import HEAVE, SURGE
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.parameters import Parameter, Table, table_of
+from rov_fmu.identify.likelihood.records import SampledLog
+from tests.folders import HEAD, folder_of, pulled
+from tests.recordings import run, write_log
+from tests.vehicles import VIDEORAY
+
+Known = tuple[Table, list[SampledLog]]
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
+    """Return the parameters of logs of heave (10 Hz) and surge (5 Hz) with a voltage, and of the forces of `top`."""
+    rov = f'base = "videoray"\n{HEAD}[fit]\nvoltage = true\n'
+    path = folder_of(tmp_path_factory.mktemp("tests"), rov, {"thrust_top.csv": pulled(6.0, 2.0)})
+    for axis, rate, quantity in ((HEAVE, 10.0, "depth"), (SURGE, 5.0, "distance")):
+        recording = run(VIDEORAY, axis, ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0)), rate)
+        file = write_log(path, "0", recording.noisy(np.random.default_rng(0), quantity))
+        header, *rows = file.read_text(encoding="utf-8").splitlines()
+        volts = [f"{row},{16.0 - 0.03 * n:.2f}" for n, row in enumerate(rows)]
+        file.write_text("\n".join([f"{header},voltage [V]", *volts, ""]), encoding="utf-8")
+    beginning, logs, rows_of_tables = begin(load_tests(path))
+    return table_of(beginning, logs, sorted({row.noise for row in rows_of_tables})), logs
+
+
+PRIORS = """
+lag: 0.05 ± 0.15, 0.02 to inf, absent at 0.02
+dead time: 0 ± 0.05, 0 to inf, absent at 0
+voltage: 1.5 ± 0.5, 0 to 4, absent at 0
+thrust scale rear: ln 1 ± 0.1, 0 to inf
+thrust shape rear: 0 ± 1, -inf to inf
+reverse thrust rear: 0 ± 0.1, -inf to inf, absent at 0
+dead band rear: 0 ± 0.05, 0 to 0.5, absent at 0
+thrust scale top: ln 1 ± 1, 0 to inf
+thrust shape top: 0 ± 0.001, 0 to 0
+linear thrust top: 0 ± 0.3, -0.25 to inf
+linear thrust top astern: 0 ± 0.3, -0.25 to inf
+reverse thrust top: 0 ± 0.5, -inf to inf
+dead band top: 0 ± 0.05, 0 to 0.5, absent at 0
+inertia surge: ln 1 ± 0.5, 0 to inf
+quadratic drag surge: ln 3.16 ± 1, 0 to inf
+linear drag surge: ln 9.38 ± 1.5, 0 to inf
+drag astern surge: 0 ± 0.2, -inf to inf, absent at 0
+load surge: 0 ± 0.05, -inf to inf, absent at 0
+inertia heave: ln 1 ± 0.5, 0 to inf
+quadratic drag heave: ln 18.7 ± 1, 0 to inf
+linear drag heave: ln 0.632 ± 1.5, 0 to inf
+drag astern heave: 0 ± 0.2, -inf to inf, absent at 0
+load heave: 0 ± 0.05, -inf to inf, absent at 0
+logging offset log_heave_0.csv: -0.05 ± 0.05, -inf to inf
+logging width log_heave_0.csv: 0.5 ± 0.5, 0 to 1
+logging offset log_surge_0.csv: -0.1 ± 0.1, -inf to inf
+logging width log_surge_0.csv: 0.5 ± 0.5, 0 to 1
+current log_surge_0.csv north: 0 ± 0.1, -inf to inf, absent at 0
+slow force surge: ln 0.001 ± 2.5, 1e-07 to 0.1
+slow force heave: ln 0.001 ± 2.5, 1e-07 to 0.1
+slow gain: ln 0.01 ± 2, 1e-06 to 0.2
+slow velocity heave: ln 0.001 ± 2.5, 1e-07 to 0.3
+slow velocity horizontal: ln 0.001 ± 2.5, 1e-07 to 0.3
+white noise depth: ln 0.00396 ± 0.7, 0.000535 to inf
+coloured noise depth: ln 0.3 ± 1, 0 to inf
+correlation time depth: ln 2 ± 1, 0 to inf
+white noise surge distance: ln 0.011 ± 0.7, 0.00149 to inf
+coloured noise surge distance: ln 0.3 ± 1, 0 to inf
+correlation time surge distance: ln 2 ± 1, 0 to inf
+row noise forces of top: ln 0.03 ± 1, 0.001 to inf
+"""
+"""The usual number and the deviation of each parameter, or those of its logarithm, its bounds, and where an effect is
+absent. docs/identify-method.md has the deviations, and what an h/2 of a logger is. Drag is that of the base."""
+
+
+def told(p: Parameter) -> str:
+    number = exp if p.is_log else float
+    mean, low, high = map(number, (p.mean, p.low, p.high))
+    part = "" if p.kind == "thrust shape" else p.part
+    name = " ".join(filter(None, (p.kind, p.of, part)))
+    absent = "" if p.null is None else f", absent at {p.null + 0.0:.3g}"
+    return f"{name}: {'ln ' * p.is_log}{mean:.3g} ± {p.deviation:.3g}, {low:.3g} to {high:.3g}{absent}"
+
+
+def test_priors_are_those_that_are_stated(known: Known) -> None:
+    lines = [told(p) for p in known[0].parameters]
+    assert {*lines} == {*PRIORS.strip().splitlines()}
+    assert sum(line.startswith("thrust shape rear") for line in lines) == 8, "four ahead and four astern"
+
+
+def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
+    table, (heave, surge) = known
+    z = np.random.default_rng(0).uniform(0.05, 0.3, len(table.parameters)).tolist()
+    of, c, base = partial(table.get, z), table.coefficients(z), table.base
+    assert table.layout.voltage == pytest.approx(np.mean([15.19, 14.36]), abs=0.1)
+    for curve in ("rear", "top"):
+        scale, astern = of("thrust scale", curve), exp(of("reverse thrust", curve))
+        for end, ratio, part in (("", scale, ""), ("_reverse", scale * astern, "astern")):
+            names = [f"{key}_{curve}{end}" for key in ("a_t", "b_t")]
+            full, more = sum(base[name] for name in names), of("linear thrust", curve, part)
+            linear = base[names[1]] + more * full
+            assert [c[name] for name in names] == pytest.approx([ratio * (full - linear), ratio * linear])
+        assert [c[f"{key}_{curve}"] for key in ("c_0", "T", "n_V")] == [
+            of("dead band", curve),
+            of("lag"),
+            of("voltage"),
+        ]
+    for axis, v in ((SURGE.name, "u"), (HEAVE.name, "w")):
+        for kind, name in (("quadratic drag", f"a_d_{v}"), ("linear drag", f"b_d_{v}")):
+            ratio = exp(of("drag astern", axis))
+            assert [c[name], c[f"{name}_reverse"]] == pytest.approx([of(kind, axis), ratio * of(kind, axis)])
+        assert c[f"beta_{v}"] == pytest.approx(base[f"beta_{v}"] / of("inertia", axis))
+        assert c[f"F_0_{v}"] == pytest.approx(of("load", axis) * table.full[axis])
+    one, other = (table.of_log(z, log) for log in (heave, surge))
+    assert one.offset == of("logging offset", "log_heave_0.csv") + of("dead time")
+    assert one.width == of("logging width", "log_heave_0.csv")
+    slow = {
+        8.0: [table.full["heave"] * of("inertia", "heave") * of("slow force", "heave"), of("slow velocity", "heave")],
+        60.0: [of("slow gain")],
+        of("correlation time", "depth"): [of("white noise", "depth") * of("coloured noise", "depth")],
+    }
+    for process in (*one.forces, one.gain, one.drifts[2], *one.noise):
+        assert process.size == pytest.approx(slow[process.time_constant].pop(0))
+    assert one.white == (of("white noise", "depth"),)
+    sideways = of("slow velocity", "horizontal")
+    drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
+    assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
+    assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "north")]

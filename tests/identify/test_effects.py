@@ -1,0 +1,89 @@
+"""What is told of a fit: its effects, loggers and sensors in their units, and how far its predictions may be off."""
+
+from dataclasses import replace
+from math import log
+
+import numpy as np
+import pytest
+from scipy.stats import t
+
+from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.identify.assess import ahead, cautious
+from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.posterior import Posterior
+
+ERROR = 0.004
+HALF = t.ppf(0.975, 10) * ERROR
+FOUND = {"lag": 0.2, "dead time": 0.1, "dead band": 0.05, "drag astern": log(1.3), "load": 0.03}
+"""The coordinates of effects that are clear with this standard error."""
+
+
+def found(fit: Fit, **others: float) -> Fit:
+    """Return the fit with these effects and independent parameters."""
+    parameters, z = fit.posterior.table.parameters, {**FOUND, **others}
+    at = np.array([z.get(p.kind, old) for p, old in zip(parameters, fit.posterior.z, strict=True)])
+    return replace(fit, posterior=Posterior(fit.posterior.table, at, ERROR**2 * np.eye(len(at))))
+
+
+def test_effects_are_told_in_their_units(fit: Fit) -> None:
+    """A dead band is not known to better than 1 % of a command, and a ratio has the interval of its logarithm."""
+    full = fit.known.full["heave"]
+    expected = {
+        ("time constant of the thrusters", ""): (0.2, 0.2 - HALF, 0.2 + HALF, "s"),
+        ("dead time of the commands", ""): (0.1, 0.1 - HALF, 0.1 + HALF, "s"),
+        ("dead band", "top"): (0.05, 0.04, 0.06, "1"),
+        ("drag astern relative to drag ahead", "heave"): (1.3, 1.3 * np.exp(-HALF), 1.3 * np.exp(HALF), "1"),
+        ("constant load", "heave"): (0.03 * full, (0.03 - HALF) * full, (0.03 + HALF) * full, "N"),
+    }
+    told = {(one.name, one.of): one for one in effects_of(found(fit))}
+    for key, (value, low, high, unit) in expected.items():
+        one = told[key]
+        assert (one.value, *one.interval) == pytest.approx((value, low, high)), key
+        assert (one.unit, one.kept) == (unit, True)
+    assert told["constant load", "yaw"].unit == "N.m"
+
+
+@pytest.mark.parametrize(("dead_time", "offset", "half"), [(0.1, -0.05, HALF), (ERROR, -0.046, np.sqrt(2.0) * HALF)])
+def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(
+    dead_time: float, offset: float, half: float, fit: Fit
+) -> None:
+    numbers = {"logging offset": -0.05, "logging width": 0.6, "dead time": dead_time}
+    one, other = loggers_of(found(fit, **numbers))
+    assert (one.file, other.file) == ("log_heave_a.csv", "log_yaw_a.csv")
+    assert (one.interval, one.offset, one.width) == pytest.approx((0.1, offset, 0.06))
+    assert one.offset_interval == pytest.approx((offset - half, offset + half))
+
+
+def test_sensors_have_their_noise_and_their_outliers(fit: Fit) -> None:
+    """Of 200 depths, 3 are 6.5 standard deviations beside their predictions, and all others 5.5."""
+    data, table = fit.best.data[0], fit.posterior.table
+    off = np.where(np.arange(200) < 3, -6.5, 5.5) * np.sqrt(data.variances)
+    numbers = {"white noise": log(0.01), "coloured noise": log(0.4), "correlation time": log(3.0)}
+    z = np.array([numbers.get(p.kind, 0.0) for p in table.parameters])
+    best = replace(fit.best, z=z, data=[replace(data, innovations=off), *fit.best.data[1:]])
+    depth, heading = sensors_of(replace(fit, best=best))
+    assert (depth.axis, depth.quantity, depth.unit, depth.samples, depth.outliers) == (HEAVE, "depth", "m", 200, 0.015)
+    assert (depth.white, depth.coloured, depth.correlation) == pytest.approx((0.01, 0.004, 3.0))
+    assert (heading.quantity, heading.outliers) == ("heading", 0.0)
+
+
+def test_a_prediction_is_as_uncertain_as_its_parameters(fit: Fit) -> None:
+    """Nothing is known of a heading at 1.8 rad, and thrust is never known to better than 3 %."""
+    objective, z, table = fit.objective, fit.kept.z, fit.posterior.table
+    place, gain = table.place("quadratic drag", "yaw"), table.place("slow gain")
+    assert place is not None
+    assert gain is not None
+
+    def deviations(error: float) -> np.ndarray:
+        covariance = np.diag(np.where(np.arange(len(z)) == place, error**2, 0.0))
+        return ahead(objective, 1, z, covariance, 5.0, 10.0)[1]
+
+    ends = [z + step * np.eye(len(z))[place] for step in (0.01, -0.01)]
+    above, below = (objective.run(end, 1, begin=5.0, span=10.0).innovations for end in ends)
+    slope = (above - below) / 0.02
+    assert deviations(0.2) == pytest.approx(np.hypot(deviations(0.0), 0.2 * slope), rel=0.02)
+    assert deviations(10.0).max() == 1.8
+    quiet, loud = (np.where(np.arange(len(z)) == gain, log(size), z) for size in (0.01, 0.05))
+    assert np.exp(cautious(objective, quiet)[gain]) == pytest.approx(0.03)
+    assert cautious(objective, loud).tolist() == loud.tolist()

@@ -1,0 +1,127 @@
+"""Slow forces, changes of thrust and velocities over ground: their size, their evidence, and what they follow."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rov_fmu.c.filter import Run
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import Minimum
+from rov_fmu.identify.unexplained.causes import cause_of
+from rov_fmu.identify.unexplained.disturbances import disturbances
+from rov_fmu.tank.arrays import Array
+from tests.folders import HEAD, folder_of
+from tests.vehicles import VIDEORAY
+
+TIME: Array = np.arange(0.0, 100.0, 0.25)
+COMMAND = np.where(TIME % 10.0 < 5.0, 0.5, -0.3)
+VOLTAGE, DEPTH, ROLL = 16.0 - 0.003 * TIME - 0.1 * (TIME > 40.0), 3.0 + np.sin(0.2 * TIME), 0.2 * np.sin(0.33 * TIME)
+NORTH, EAST, HEADING = 5.0 * np.sin(0.05 * TIME), 4.0 * np.cos(0.09 * TIME), 0.4 * np.sin(0.13 * TIME)
+
+
+@pytest.fixture(scope="module")
+def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
+    """Return J for a dive in which nothing but the channels matters."""
+    columns = {
+        **dict.fromkeys(("u_l [1]", "u_r [1]"), COMMAND),
+        **{"u_t [1]": 0.3 * COMMAND, "voltage [V]": VOLTAGE, "depth [m]": DEPTH, "roll [rad]": ROLL},
+        **{"surge velocity [m/s]": 0.5 * np.gradient(NORTH), "heading [rad]": HEADING},
+    }
+    path = folder_of(tmp_path_factory.mktemp("tests"), f'base = "videoray"\n{HEAD}', {})
+    table, header = np.column_stack([TIME, *columns.values()]), ",".join(["time [s]", *columns])
+    np.savetxt(path / "dive.csv", table, "%.9g", ",", header=header, comments="")
+    known, logs, rows = begin(load_tests(path))
+    return Objective(table_of(known, logs, []), logs, rows)
+
+
+def run_with(objective: Objective, values: Mapping[int, Array], deviation: float = 0.5) -> Run:
+    """Return a run through the dive whose states are next to nothing, but for some."""
+    time = objective.records[0].time
+    states = np.full((len(time), objective.filters[0].states), 1e-9)
+    for place, some in values.items():
+        states[:, place] = np.interp(time, TIME, some)
+    return replace(objective.runs(objective.mean)[0], states=states, deviations=np.full_like(states, deviation))
+
+
+def centred(values: Array) -> Array:
+    return np.asarray((values - values.mean()) / values.std())
+
+
+CAUSES = {
+    "the voltage": COMMAND * (VOLTAGE - VOLTAGE.mean()),
+    "the depth": DEPTH,
+    "the distance": NORTH * np.cos(HEADING) + (EAST - EAST[0]) * np.sin(HEADING),
+    "the command": COMMAND,
+    "the time": TIME,
+    "the roll": ROLL,
+}
+OTHER = 0.03 * np.random.default_rng(0).standard_normal(len(TIME))
+"""What nothing explains."""
+
+
+def cause(objective: Objective, values: Array, axis: Axis | None = SURGE, time_constant: float = 8.0) -> str:
+    """Return what a slow process with these values follows."""
+    states, place = objective.filters[0].vehicle_states, objective.filters[0].force
+    course = {states.index(name): some for name, some in (("x", NORTH), ("y", EAST), ("psi", HEADING))}
+    run = run_with(objective, {**course, place: centred(values) + OTHER})
+    return cause_of(objective, objective.mean, [run], [place], time_constant, axis)
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_a_cause_is_named_where_a_slow_force_follows_it(name: str, objective: Objective) -> None:
+    assert cause(objective, CAUSES[name]) == name
+    assert not cause(objective, CAUSES[name], time_constant=34.0), "the dive has less than three of them"
+
+
+def test_no_cause_is_named_where_none_is_clear(objective: Objective) -> None:
+    assert not cause(objective, np.cumsum(OTHER))
+    assert not cause(objective, centred(DEPTH) + 0.75 * centred(ROLL))
+
+
+def test_a_change_of_all_thrust_follows_the_largest_command_and_the_voltage_itself(objective: Objective) -> None:
+    assert cause(objective, np.abs(COMMAND), None) == "the command"
+    assert cause(objective, VOLTAGE, None) == "the voltage"
+
+
+def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> None:
+    """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more."""
+    z, filter_of = objective.mean, objective.filters[0]
+    since: Array = np.where(TIME >= 30.0, 1.0, 0.0)
+    slow = {
+        filter_of.force: 2.0 * since,
+        filter_of.gain: 1.1 * since,
+        filter_of.drift: 0.3 + 0.0 * TIME,
+    }
+    moving = {filter_of.drift + 1: 1.2 * since, 0: 0.8 + 0.0 * TIME}
+    run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
+    posterior = Posterior(objective.table, z, np.diag(0.3 * objective.deviation) ** 2)
+    best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)))
+    found = {(str(one.kind), one.axis): one for one in disturbances(objective, best, posterior, [run])}
+    thrust = np.array([VIDEORAY.force(SURGE, c) for c in COMMAND])
+    share = np.mean(since)
+    sizes = {
+        ("force", SURGE): (2.0 * share**0.5, np.sqrt(np.mean(thrust**2)), "N"),
+        ("gain", None): (np.expm1(1.1) * share**0.5, 1.0, "1"),
+        ("velocity", None): ((0.09 + 1.44 * share) ** 0.5, 0.8, "m/s"),
+        ("velocity", HEAVE): (0.0, 0.05, "m/s"),
+        ("force", YAW): (0.0, 0.05 * VIDEORAY.force(YAW, 1.0), "N.m"),
+    }
+    for key, (size, usual, unit) in sizes.items():
+        one = found[key]
+        assert (one.size, one.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
+        assert (one.unit, one.since) == (unit, pytest.approx(30.0, abs=0.3) if size else None)
+        kind = {"force": "slow force", "gain": "slow gain", "velocity": "slow velocity"}[one.kind]
+        of = one.axis.name if one.axis else "horizontal" if one.kind == "velocity" else ""
+        place = objective.table.place(kind, of)
+        assert place is not None
+        gone = np.where(np.arange(len(z)) == place, objective.low, z)
+        explained = [
+            objective.value(other, objective.runs(other, runs)) - objective.prior(other) for other in (gone, z)
+        ]
+        assert one.evidence == pytest.approx(explained[0] - explained[1] - 2.0 * np.log(1.0 / 0.3)), key
