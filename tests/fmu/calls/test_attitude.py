@@ -149,6 +149,3 @@ def test_a_quaternion_of_zero_is_refused(fmu: Fmu) -> None:
         put(rov, before)
         assert rov.get(["psi"]) == [0.0]
         complete(rov)
-
-
-# ---- Derivatives ----
