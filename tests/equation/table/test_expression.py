@@ -8,7 +8,10 @@ import math
 import pytest
 
 from rov_fmu.equation.expression import (
+    MATHML,
+    TEXT,
     Expression,
+    Language,
     Name,
     Names,
     beyond_dead_band,
@@ -24,6 +27,7 @@ from rov_fmu.equation.expression import (
     to_c,
     total,
     where,
+    written,
 )
 
 a, b, c, d = map(Name, "abcd")
@@ -54,6 +58,12 @@ a, b, c, d = map(Name, "abcd")
 )
 def test_c_has_the_brackets_that_it_needs(expression: Expression, in_c: str) -> None:
     assert to_c(expression) == in_c
+
+
+@pytest.mark.parametrize("language", [TEXT, MATHML], ids=["text", "MathML"])
+def test_what_readers_cannot_be_shown_is_told(language: Language) -> None:
+    with pytest.raises(ValueError, match=r"^hypot\(a, b \+ c\): there is no way to show this$"):
+        written(2.0 * call("hypot", a, b + c), language)
 
 
 def test_two_quantities_never_have_the_same_identifier() -> None:
