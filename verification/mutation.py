@@ -55,11 +55,17 @@ verdict (killed, survived, or empty), the seconds until then, and the test that 
 _LIMIT = 150
 """The longest time (s) for the tests of a mutant. One that no test has noticed by then has survived."""
 TESTS = {
-    "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/calls",
-    "fmu_src/c/s*.c": "equation/test_c_step.py fmu/calls/test_values.py fmu/calls equation/test_exactness.py c",
-    "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls",
+    "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/results/test_ballast.py fmu/calls",
+    "fmu_src/c/[dt]*.c": "equation/test_thrust_effects.py fmu/calls/test_dead_time.py fmu/calls",
+    "fmu_src/c/[ch]*.c": "equation/test_step.py equation/test_six_axes.py c equation fmu/calls",
+    "fmu_src/c/[ls]*.c": "equation/test_step.py equation/test_alone.py equation c fmu/calls",
+    "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls "
+    "fmu/results/test_ballast.py",
     "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py vehicle/test_published.py",
-    "rov_fmu/equation/layout.py": "equation/table docs/test_docs.py equation/test_rov.py vehicle equation",
+    "rov_fmu/equation/[cl]a*.py": "equation/table docs/test_docs.py equation/test_rov.py vehicle equation",
+    "rov_fmu/equation/dependencies.py": "equation/table/test_dependencies.py fmu/test_dependencies.py",
+    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation",
+    "rov_fmu/equation/[pt]*.py": "equation/test_rov.py equation fmu/results/test_outside.py fmu/test_python_flavour.py",
     "rov_fmu/equation/*": "equation/test_rov.py equation/test_step.py equation/test_symmetries.py equation",
     "rov_fmu/c/source.py": "equation/test_c_step.py fmu/test_sources.py c equation",
     "rov_fmu/c/*": "fmu/test_build_failures.py c",

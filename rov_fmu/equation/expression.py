@@ -493,11 +493,10 @@ def tangent(x: Expression, changes: Callable[[str], Change]) -> Change:
         return None
     args = x.args[1:] if x.op == "if" else x.args
     d = [tangent(arg, changes) for arg in args]
-    if all(change is None for change in d):
+    changing = [change for change in d if change]
+    if not changing:
         return None
-    if len(args) == 1:
-        return _of_function(x, args[0], of(d[0] or 0.0))
-    return _of_two(x, args, d)
+    return _of_function(x, args[0], changing[0]) if len(args) == 1 else _of_two(x, args, d)
 
 
 def _of_two(x: Operation, args: Sequence[Expression], changes: Sequence[Change]) -> Change:
@@ -511,10 +510,9 @@ def _of_two(x: Operation, args: Sequence[Expression], changes: Sequence[Change])
         case "*":
             return _added(_times(a, right), "+", b and left * b)
         case "/":
-            return of(_added(a, "-", b and x * b) or 0.0) / right
+            return _over(_added(a, "-", b and x * b), right)
         case "atan2":
-            rate = _added(_times(a, right), "-", _times(b, left))
-            return of(rate or 0.0) / (left * left + right * right)
+            return _over(_added(_times(a, right), "-", _times(b, left)), left * left + right * right)
     assert x.op == "pow"  # the base is not negative
     logarithm = where(left > 0.0, call("log", left), 0.0)
     return _added(a and right * call("pow", left, right - 1.0) * a, "+", b and x * logarithm * b)
@@ -552,6 +550,10 @@ def _of_function(x: Operation, argument: Expression, change: Expression) -> Expr
 
 def _times(change: Change, factor: Expression) -> Change:
     return change and change * factor
+
+
+def _over(change: Change, divisor: Expression) -> Change:
+    return change and change / divisor
 
 
 def _added(a: Change, op: str, b: Change) -> Change:

@@ -36,6 +36,15 @@ def test_the_platform_of_a_machine_is_the_one_that_importers_look_for(
     else:
         assert flags[:2] == ["-target", PLATFORMS[in_fmi_3].targets(3)[0]]
         assert ("-lm" in flags) == (system == "Linux")
+    special = [(flags, "engine.c"), *((engine_flags(file), file) for file in ("lanes.c", "filter_lanes.c"))]
+    found = [("-mcpu=native" in of, "-ffp-contract=on" in of, "engine.c" in of, file in of) for of, file in special]
+    assert found == [(False, False, True, True), (True, True, True, True), (True, False, False, True)]
+
+
+def test_only_in_fmi_2_the_library_for_the_mac_is_for_both_of_its_processors() -> None:
+    macs = ["x86_64-macos.11.0", "aarch64-macos.11.0"]
+    assert [PLATFORMS["darwin64"].targets(fmi) for fmi in (2, 3)] == [macs, macs[:1]]
+    assert {len(one.targets(2)) for name, one in PLATFORMS.items() if name != "darwin64"} == {1}
 
 
 @pytest.fixture

@@ -12,7 +12,8 @@ from rov_fmu.bridges import arrays
 from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.vehicles import SIX, VEHICLES, random_inputs, random_state
+from tests.equation.test_thrust_effects import NOW, ROV
+from tests.vehicles import SIX, VEHICLES, VIDEORAY, at_rest, random_inputs, random_state, still
 
 SWIFT = VEHICLES["lag without coupling"].with_(T_t200=0.001)
 ALL = {**VEHICLES, "six_coupled": SIX, "a very short lag": SWIFT}
@@ -66,3 +67,29 @@ def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
         assert np.allclose(
             np.hstack((found.states, found.inputs, found.coefficients)), derivatives, rtol=1e-6, atol=1e-6
         )
+
+
+def test_the_thrust_of_tables_is_differentiated_and_commands_act_at_once() -> None:
+    """Also those of a vehicle with a dead time: its slopes are those of exact steps without one."""
+    inputs = ROV.layout.usual_inputs | {"u_l": 0.47, "u_r": -0.43, "u_bow": 0.33, "u_top": 0.6, "u_rudder": 0.2}
+    state = at_rest(ROV) | {"u": 0.5, "r": 0.2, "F_l": 3.0}
+    found = step_jacobian(ROV, inputs, state, 0.2)
+    for n, (name, x) in enumerate(inputs.items()):
+        low, high = (NOW.step({**inputs, name: x + change}, state, 0.2) for change in (-1e-4, 1e-4))
+        slopes = [(high[one] - low[one]) / 2e-4 for one in state]
+        assert found.inputs[:, n] == pytest.approx(slopes, rel=1e-6, abs=1e-7), name
+
+
+@pytest.mark.parametrize(
+    ("h", "changes", "names", "said"),
+    [
+        *((h, {}, (), f"^h = {h}: must be a time above 0, s$") for h in (0.0, float("inf"), float("nan"))),
+        (1.0, {"u": None, "w": None}, (), "^state: u and w must be given, too$"),
+        (1.0, {}, ("a_d_u", "a_d_x"), "^coefficients: the vehicle has no 'a_d_x'"),
+        (1.0, {"u": 1e200}, (), "^the derivatives of the step cannot be computed: it overflows, or never settles"),
+    ],
+)
+def test_what_cannot_be_differentiated_is_told(h: float, changes: dict[str, Any], names: Any, said: str) -> None:
+    state = {name: x for name, x in (at_rest(VIDEORAY) | changes).items() if x is not None}
+    with pytest.raises(ValueError, match=said):
+        step_jacobian(VIDEORAY, still(VIDEORAY), state, h, names)

@@ -7,6 +7,7 @@ from math import e, inf, nextafter
 
 import pytest
 from mpmath import mp
+from scipy.integrate import quad
 
 from rov_fmu.equation.alone import RISE, AxisAlone, steady_velocity, time_constant
 from tests.motions import DISTANCE, SMALLEST, VELOCITY, Case, step_alone
@@ -102,6 +103,15 @@ def test_after_the_time_constant_the_velocity_is_that_of_17() -> None:
         assert abs(fraction - (1.0 - 1.0 / e)) <= 1e-15, (A, B, C)
 
 
+@pytest.mark.parametrize("drag", [(2.0, 3.0), (2.0, 0.0), (0.0, 3.0)])
+def test_the_way_to_a_stop_is_the_integral_over_the_velocities(drag: tuple[float, float]) -> None:
+    A, B = drag
+    way = quad(lambda v: 1.0 / (A * v + B), 0.05 * 1.5, 1.5)[0]
+    assert AxisAlone(A, B, 1.0).stopping_way(1.5, 0.05) == pytest.approx(way, rel=1e-9)
+    assert AxisAlone(A, B, 1.0).stopping_way(inf, 0.05) == inf
+    assert AxisAlone(0.0, 0.0, 1.0).stopping_way(1.5, 0.05) == inf
+
+
 def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -> None:
     ahead, astern = AxisAlone(2.0, 3.0, 5.0, (0.5, 1.0)), AxisAlone(2.0, 3.0, -1.5, (0.5, 1.0))
     assert [ahead.acceleration(v) for v in (-2.0, 0.0, 0.5)] == [5.0 + (1.0 + 0.5 * 2.0) * 2.0, 5.0, 5.0 - 2.0]
@@ -110,4 +120,5 @@ def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -
     assert ahead.time_constant() == time_constant(2.0, 3.0, 5.0)
     assert astern.time_constant() == time_constant(0.5, 1.0, -1.5)
     assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
+    assert astern.stopping_way(-1.5, 0.1) == pytest.approx(quad(lambda v: 1.0 / (0.5 * v + 1.0), 0.15, 1.5)[0])
     assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE

@@ -143,6 +143,3 @@ def test_a_step_solves_the_equations_of_the_paper(steps: list[Step], h: float) -
         expected = integrated(VIDEORAY.coefficients, inputs, before, h)
         for step in steps:
             assert step(VIDEORAY, inputs, before, h) == pytest.approx(expected, rel=1e-10, abs=1e-10)
-
-
-# ---- Many steps, long steps and far headings ----

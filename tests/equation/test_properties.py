@@ -36,9 +36,6 @@ def for_every(
     return decorate
 
 
-# ---- Semigroup ----
-
-
 # ---- Approach to equilibrium ----
 
 

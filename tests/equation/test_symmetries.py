@@ -91,6 +91,3 @@ def test_coupling_does_no_work() -> None:
         assert energy(rov, after) == pytest.approx(energy(rov, state), rel=1e-14)
         momenta = [hypot(M_u * s["u"], M_v * s["v"]) for s in (state, after)]
         assert momenta[1] == pytest.approx(momenta[0], rel=1e-14)
-
-
-# ---- The same anywhere, in any direction ----

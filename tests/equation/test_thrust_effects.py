@@ -14,6 +14,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.equation.step import Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.equation.steps import in_engine
 from tests.vehicles import SIX, THRUST_EFFECTS, at_rest, fin, numbered, random_inputs, random_state
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces
@@ -70,6 +71,8 @@ def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
     forces = [table.force(c) for c in commands]
     assert forces == pytest.approx(PchipInterpolator(*zip(*points, strict=True))(commands), rel=1e-13, abs=1e-13)
     assert (np.diff(forces) >= 0.0).all()
+    slopes = PchipInterpolator(*zip(*points, strict=True)).derivative()(commands)
+    assert [table.slope(c) for c in commands] == pytest.approx(slopes, rel=1e-12, abs=1e-12)
     assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
 
 
@@ -117,10 +120,9 @@ def test_a_step_is_exact(rov: Vehicle) -> None:
 def test_c_agrees_with_python(rov: Vehicle) -> None:
     rng = random.Random(4)
     for _ in range(30):
-        inputs, state, h = inputs_of(rng, rov), random_state(rng, rov), 10.0 ** rng.uniform(-3.0, 0.0)
-        expected = rov.step(inputs, state, h)
-        found = simulate(rov, np.array([0.0, h]), {**inputs, **state}, workers=1).values[:, 0, 1]
-        assert found.tolist() == pytest.approx([expected[name] for name in rov.layout.state], rel=1e-13, abs=1e-14)
+        case = inputs_of(rng, rov), random_state(rng, rov), 10.0 ** rng.uniform(-3.0, 0.0)
+        expected = {name: x for name, x in rov.step(*case).items() if name in rov.layout.state}
+        assert in_engine(rov, *case) == pytest.approx(expected, rel=1e-13, abs=1e-14)
 
 
 # ---- Dead time ----
@@ -178,6 +180,15 @@ def test_a_change_acts_at_its_time_to_within_the_rounding_of_the_times(units: in
     assert (bool(line.waiting), line.acting["u_l"]) == (waits, 0.0 if waits else 0.5)
 
 
+def test_no_more_changes_wait_than_the_fmu_has_room_for() -> None:
+    inputs, line = ROV.layout.usual_inputs, ROV.delay_line()
+    line.waiting = [Change(0.09, dict.fromkeys(ROV.layout.commands, 1.0))] * 1023
+    line.step(ROV, inputs, at_rest(ROV), 0.0, 1e-3)
+    assert len(line.waiting) == 1024
+    with pytest.raises(ValueError, match=r"^more than 1024 changes of commands wait for the dead time; "):
+        line.step(ROV, inputs | {"u_l": 0.5}, at_rest(ROV), 1e-3, 1e-3)
+
+
 def test_a_dead_time_that_ends_inside_a_step_is_as_exact_late_in_a_run() -> None:
     """Times near a million seconds have ten digits after the point, which the motion must not feel."""
     inputs = ROV.layout.usual_inputs | {"u_l": 0.5, "u_r": 0.5}
@@ -191,7 +202,11 @@ def test_a_dead_time_that_ends_inside_a_step_is_as_exact_late_in_a_run() -> None
         ends.append([*state.values(), *in_c])
     assert ends[1] == ends[0]
     line, h = ROV.delay_line(), ROV["T_d"] / 300
-    for n in range(300):  # rounding does not add up: the change acts at the end of the last step
+    acting = simulate(ROV, h * np.arange(301), inputs, ["delayed_u_l"]).values[0, 0]
+    assert acting.tolist() == [0.0] * 300 + [
+        0.5
+    ]  # rounding does not add up: the change acts at the end of the last step
+    for n in range(300):
         assert line.acting["u_l"] == 0.0
         state = line.step(ROV, inputs, state, n * h, h)
     assert (line.waiting, line.acting["u_l"]) == ([], 0.5)

@@ -9,7 +9,7 @@ from rov_fmu.equation.dependencies import dependencies_of, parameters_of
 from rov_fmu.equation.expression import Name, directed, of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import ONE, Equation, Term, equation_of
-from tests.vehicles import HEAVY, VIDEORAY
+from tests.vehicles import HEAVY, SIX, VIDEORAY
 
 ADDED = {
     "a number": (Term(of(-2.5), ("z",)), "constant", ()),
@@ -53,3 +53,15 @@ def test_every_kind_of_dependency_of_a_vehicle_with_lag() -> None:
     assert found["der(F_1)"]["F_1"] == "fixed"
     assert found["der(w)"] == {"Z_ext": "tunable", "w": "dependent"} | {f"F_{n}": "tunable" for n in "5678"}
     assert found["der(x)"] == {"V_N": "constant", "u": "dependent", "v": "dependent", "psi": "dependent"}
+
+
+def test_an_attitude_at_the_start_depends_on_the_angles_that_give_it() -> None:
+    """An angle beyond its range turns the other two, so roll and heading depend on the pitch."""
+    found = parameters_of(SIX.layout)
+    assert {name: found[name] for name in ("eta", "phi", "theta", "psi")} == {
+        "eta": ("phi_0", "theta_0", "psi_0"),
+        "phi": ("phi_0", "theta_0"),
+        "theta": ("theta_0",),
+        "psi": ("theta_0", "psi_0"),
+    }
+    assert {"W", "z_B", "theta_0"} <= {*found["der(q)"]}

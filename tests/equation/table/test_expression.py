@@ -3,20 +3,31 @@
 Their values are those of the vehicles, which other tests compare with 50 digits.
 """
 
+import math
+
 import pytest
 
 from rov_fmu.equation.expression import (
+    MATHML,
+    TEXT,
     Expression,
+    Language,
     Name,
     Names,
     beyond_dead_band,
     call,
     compiled,
     directed,
+    equal,
+    minus,
+    product,
     saturated,
+    scaled,
     tangent,
     to_c,
+    total,
     where,
+    written,
 )
 
 a, b, c, d = map(Name, "abcd")
@@ -32,12 +43,27 @@ a, b, c, d = map(Name, "abcd")
         (saturated(a), "a > 1.0 ? 1.0 : a < -1.0 ? -1.0 : a"),
         (directed(b, a, -a) * c, "(b < 0.0 ? -a : a) * c"),
         (beyond_dead_band(a, b, c), "a < 0.0 || (a == 0.0 && b > 0.0) ? 0.0 : c"),
+        (a - b - (c - d) + (a + b), "a - b - (c - d) + (a + b)"),
+        (a / b / (c / d) * (a * b), "a / b / (c / d) * (a * b)"),
+        (-(a + b) - -c * -(a * b), "-(a + b) - -c * -(a * b)"),
+        (where(a + b > c * d, a, b) + c, "(a + b > c * d ? a : b) + c"),
+        (where(equal(a, -1.5), math.inf, 2.0) * where(a >= b, a, c), "(a == -1.5 ? INFINITY : 2.0) * (a >= b ? a : c)"),
+        (total([a, -b * c, -(b * c), -(a / b) / c, d]), "a - b * c - b * c - a / b / c + d"),
+        (total([]) + product() + product(a, 2.0, b), "0.0 + 1.0 + a * 2.0 * b"),
+        (scaled(-2.0, a * b) + scaled(1.0, a / b) + scaled(0.5, a + b), "-2.0 * a * b + a / b + 0.5 * (a + b)"),
+        (scaled(-1.0, a * b) + minus(-a), "-a * b + a"),
         (where(where(b < c, a, b) < 1.0, 1.0, 2.0), "(b < c ? a : b) < 1.0 ? 1.0 : 2.0"),
         (where(b >= c, where(a < b, 1.0, 2.0), 3.0), "b >= c ? (a < b ? 1.0 : 2.0) : 3.0"),
     ],
 )
 def test_c_has_the_brackets_that_it_needs(expression: Expression, in_c: str) -> None:
     assert to_c(expression) == in_c
+
+
+@pytest.mark.parametrize("language", [TEXT, MATHML], ids=["text", "MathML"])
+def test_what_readers_cannot_be_shown_is_told(language: Language) -> None:
+    with pytest.raises(ValueError, match=r"^hypot\(a, b \+ c\): there is no way to show this$"):
+        written(2.0 * call("hypot", a, b + c), language)
 
 
 def test_two_quantities_never_have_the_same_identifier() -> None:
@@ -55,7 +81,9 @@ def test_two_quantities_never_have_the_same_identifier() -> None:
     [
         *(a * b - c / d, -a + a * a, call("sqrt", a) * call("log", b), call("sin", a) + call("cos", a * b)),
         *(call("pow", a / b, c), call("atan2", a, b), call("abs", a - b), saturated(a - b), directed(a - b, a, c)),
-        beyond_dead_band(a - c, b, a * b),
+        *(beyond_dead_band(a - c, b, a * b), 2.0 - a, a - 2.0, 1.0 / a, a / 2.0, 3.0 * a, a * 3.0, -call("log", a)),
+        *(call("pow", a, 3.0), call("pow", 2.0, a), call("atan2", 2.0, a), call("atan2", a, 2.0), call("abs", -a)),
+        *(where(a < b, 3.0, b * c), where(a < b, b * c, 3.0), where(a > b, a, c), directed(a, 2.0, b)),
     ],
     ids=to_c,
 )

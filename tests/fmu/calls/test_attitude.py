@@ -9,6 +9,9 @@ import pytest
 from tests.fmi import (
     CONTINUOUS,
     DISCARD,
+    ERROR,
+    EVENT,
+    INSTANTIATED,
     MODEL_EXCHANGE,
     OK,
     STEP,
@@ -18,7 +21,7 @@ from tests.fmi import (
     reals,
     room,
 )
-from tests.fmu.calls.conftest import of_both_versions
+from tests.fmu.calls.conftest import modes_of, of_both_versions
 from tests.vehicles import SIX, random_inputs, random_state
 from verification.references.rigid_vehicle import QUATERNION
 
@@ -87,6 +90,15 @@ def test_a_quaternion_before_the_start_is_a_guess_that_the_angles_replace(fmu: F
                 instance.log.clear()
 
 
+def test_a_quaternion_is_set_by_solvers_and_in_events_only(fmu: Fmu) -> None:
+    for kind, mode in modes_of(fmu.VERSION):
+        with fmu.instance(kind) as rov:
+            rov.reach(mode)
+            is_taken = mode == CONTINUOUS or (mode == EVENT and fmu.VERSION == 3)
+            rov.set({"eta": 0.5}, OK if is_taken or mode == INSTANTIATED else ERROR)
+            assert rov.get(["eta"]) == [0.5 if is_taken else 1.0], mode
+
+
 # ---- Model Exchange ----
 
 
@@ -137,6 +149,3 @@ def test_a_quaternion_of_zero_is_refused(fmu: Fmu) -> None:
         put(rov, before)
         assert rov.get(["psi"]) == [0.0]
         complete(rov)
-
-
-# ---- Derivatives ----

@@ -2,9 +2,11 @@
 
 import ctypes
 import random
+import struct
 from ctypes import c_bool, c_double, c_int, pointer
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import inf, nan
 
 import numpy as np
 import pytest
@@ -14,9 +16,11 @@ from lxml import etree
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.model_description import DEAD_TIME_NOTE
+from tests import fmi3
 from tests.equation.test_thrust_effects import ROV
-from tests.fmi import CONTINUOUS, ERROR, MODEL_EXCHANGE, WARNING, AnyInstance, Fmu, reals
-from tests.fmu.calls.conftest import of_both_versions
+from tests.fmi import CONTINUOUS, ERROR, EVENT, MODEL_EXCHANGE, WARNING, WITH_EVENTS, AnyInstance, Fmu, reals
+from tests.fmu.calls.conftest import modes_of, of_both_versions
+from tests.fmu.calls.test_state_bytes import checksum
 
 T_d = ROV["T_d"]
 ALL_ON = dict.fromkeys(ROV.layout.commands, 0.5)
@@ -87,6 +91,52 @@ def test_too_many_changes_are_refused_and_change_nothing(fmu: Fmu) -> None:
         assert rov.save() == before
         rov.set({"u_l": 0.0})  # the last command that was sent
         rov.step(MOST_WAITING * h, T_d)
+
+
+def test_a_state_with_waiting_commands_that_no_run_can_have_is_refused(fmu: Fmu) -> None:
+    width = 2 + len(ROV.layout.commands)  # the remaining time of a change, its rounding error, and the commands
+    with fmu.instance() as rov:
+        rov.start()
+        for n in range(2):
+            rov.set({"u_l": 0.5 + 0.25 * n})
+            rov.step(0.01 * n, 0.01)
+        good = rov.save()
+        line = len(good) - 8 * (2 + MOST_WAITING * width)
+
+        def with_word(place: int, value: float | int) -> bytes:
+            content = bytearray(good[:-8])
+            struct.pack_into("<Q" if isinstance(value, int) else "<d", content, line + 8 * place, value)
+            return bytes(content) + checksum(bytes(content))
+
+        assert with_word(0, 2) == good
+        for place in (1, 2, 3, width, 1 + width, 2 * width):
+            for value in (nan, inf):
+                rov.load(with_word(place, value), ERROR)
+        rov.load(with_word(0, MOST_WAITING + 1), ERROR)
+        rov.load(with_word(1, T_d), ERROR)  # the second change cannot arrive before the first
+        for place, value in ((0, 1), (1, 0.0), (1 + width, T_d)):
+            rov.load(with_word(place, value))
+        assert rov.save() == with_word(1 + width, T_d)
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        rov.reach(CONTINUOUS)
+        rov.set(ALL_ON)
+        assert completed(rov)
+        for time in (1.7e308, -1.7e308):  # their difference overflows
+            rov.expect("SetTime", time)
+            rov.load(rov.save())
+
+
+def test_a_voltage_beyond_the_tables_is_told_once_for_their_curve(fmu: Fmu) -> None:
+    for voltage, end in ((11.9, 12), (16.5, 16)):
+        with fmu.instance() as rov:
+            rov.set({"voltage": 12.0})
+            rov.set({"voltage": 16.0})
+            assert rov.log == []
+            rov.set({"voltage": voltage})
+            rov.set({"voltage": voltage})
+            (message,) = rov.log
+            told = f"voltage = {voltage:g} saturates at {end} for the thrust curve main; logged once."
+            assert message.text.endswith(told)
 
 
 def completed(rov: AnyInstance) -> bool:
@@ -198,3 +248,27 @@ def test_no_derivative_by_a_command_or_of_a_command_that_acts(fmu: Fmu) -> None:
         arguments = (fmu.references(["der(u)"]), 1, fmu.references(["delayed_u_l"]), 1)
         sizes = () if fmu.VERSION == 2 else (1,)
         rov.refuse("GetDirectionalDerivative", *arguments, reals(1.0), *sizes, reals(0.0), *sizes)
+    for kind, mode in modes_of(fmu.VERSION):
+        with fmu.instance(kind) as rov:
+            rov.reach(mode)
+            for value in (0.0, 0.3):  # it has the first one already
+                rov.set({"delayed_u_l": value}, ERROR)
+            rov.refuse("GetDirectionalDerivative", *arguments, reals(1.0), *sizes, reals(0.0), *sizes)
+
+
+def test_in_co_simulation_commands_are_sent_by_steps_and_set_between_them(fmu: Fmu) -> None:
+    if not isinstance(fmu, fmi3.Fmu):
+        return  # FMI 2.0 has neither events nor updates there
+
+    def act(rov: fmi3.Instance, _: fmi3.Update) -> None:
+        rov.set({"u_l": 0.7}, ERROR)
+        rov.set({"X_ext": 1.0})
+
+    with fmu.instance(WITH_EVENTS, intermediate=["X_ext"], on_update=act) as rov:
+        rov.reach(EVENT)
+        rov.set(ALL_ON)
+        assert updated(rov) is None
+        rov.expect("EnterStepMode")
+        rov.step(0.0, 1.5 * T_d)
+        assert delayed(rov) == DELAYED
+        assert rov.get(["X_ext", "u_l"]) == [1.0, 0.5]

@@ -189,14 +189,16 @@ def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Vehicle, n
             assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
 
 
-def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu) -> None:
+def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu, rov: Vehicle) -> None:
     n = len(fmu.states)
     for point, mode in product(points(fmu, 3, seed=8), MODES[MODEL_EXCHANGE][1:]):
-        with at_point(fmu, MODEL_EXCHANGE, mode, point) as rov:
-            derivatives, states = room(n), room(n)
-            rov.expect("GetContinuousStateDerivatives", derivatives, n)
-            rov.expect("GetContinuousStates", states, n)
-            assert bytes(derivatives) == bytes(reals(*rov.get(fmu.derivatives)))
-            assert bytes(states) == bytes(reals(*rov.get(fmu.states)))
+        with at_point(fmu, MODEL_EXCHANGE, mode, point) as instance:
+            derivatives, states, nominals = room(n), room(n), room(n)
+            instance.expect("GetContinuousStateDerivatives", derivatives, n)
+            instance.expect("GetContinuousStates", states, n)
+            instance.expect("GetNominalsOfContinuousStates", nominals, n)
+            assert list(nominals) == [rov.layout.state[name].nominal for name in fmu.states]
+            assert bytes(derivatives) == bytes(reals(*instance.get(fmu.derivatives)))
+            assert bytes(states) == bytes(reals(*instance.get(fmu.states)))
             assert all(point[name] == state for name, state in zip(fmu.states, states, strict=True) if name in point)
             assert len({*derivatives}) > 3

@@ -75,10 +75,10 @@ def test_values_that_overflow_are_logged_and_not_returned(fmu: Fmu) -> None:
     n = len(fmu.states)
     for kind, status in [(CO_SIMULATION, ERROR), (MODEL_EXCHANGE, DISCARD)]:
         with fmu.instance(kind) as rov:
-            rov.start({"w": 1e200})
-            value = room()
-            assert rov.get_by(references(fmu.vr["der(w)"]), value) == status
-            assert list(value) == [-7.0]
+            rov.start({"w": 1e308})
+            value = room(2)
+            assert rov.get_by(fmu.references(["z", "der(w)"]), value) == status
+            assert list(value) == [-7.0] * 2
             values = room(n if kind == MODEL_EXCHANGE else 1)
             if kind == MODEL_EXCHANGE:
                 assert rov.call("GetContinuousStateDerivatives", values, n) == status
@@ -87,6 +87,11 @@ def test_values_that_overflow_are_logged_and_not_returned(fmu: Fmu) -> None:
             assert set(values) == {-7.0}
             assert len(rov.log) == 2
             assert all("der(w) overflows" in m.text or "derivative of w overflows" in m.text for m in rov.log)
+            pairs = [(fmu.references(names), 2) for names in (("der(u)", "der(w)"), ("u", "w"))]
+            for derivative in ("Directional", "Adjoint")[: fmu.VERSION - 1]:
+                rov.refuse(f"Get{derivative}Derivative", *pairs[0], *pairs[1], *fmu.sized(value), *fmu.sized(value))
+                assert list(value) == [-7.0] * 2
+                assert "the derivative of" in rov.log[-1].text
 
 
 @pytest.mark.parametrize("value", [nextafter(1.0, 2.0), 1.5, -1.5, 1e308, -1e308])
@@ -144,6 +149,8 @@ SWITCHES: list[tuple[int, str, str]] = [
     (0, "logEvents", "logStatusError logStatusDiscard"),
     (1, "", "logEvents logStatusError logStatusDiscard"),
     (0, "logStatusError", "logEvents logStatusDiscard"),
+    (0, "logAll", ""),
+    (1, "logAll", "logEvents logStatusError logStatusDiscard"),
 ]
 """Whether categories are switched on or off, which ones, and those that are logged afterwards."""
 
