@@ -13,6 +13,7 @@ from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.solve import Minimum, minimise
+from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.tank.arrays import Array
@@ -95,11 +96,13 @@ def fit_all(
         on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
 
     near = minimise(full, _scaled(full, ends[0].z), on_step=show_full, last=False)
+    if known.measured_curves:
+        near = min(near, minimise(full, _with_dead_bands(full, near.z), last=False), key=lambda end: end.value)
     for curve in known.measured_curves:
         other = replace(known, bent=known.bent | {curve})
         objective = Objective(table_of(other, logs, noises), logs, rows)
         found = minimise(objective, near.z, enough=_QUICK, last=False)
-        if _evidence(objective, found) > _evidence(full, near):
+        if _evidence(objective, found) > _evidence(full, near) + KEPT:
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     best = minimise(full, _scaled(full, near.z), most=2)
@@ -111,6 +114,21 @@ def fit_all(
     kept = posterior.without(posterior.absent)
     averaged = replace(posterior.averaged, z=kept.z)
     return Fit(known, full, best, posterior, averaged, kept, float(difference))
+
+
+def _with_dead_bands(objective: Objective, z: Array) -> Array:
+    """Return another start for the measured curves, with a dead band that is larger by the deviation of its prior.
+
+    The forces of full commands hardly change, because a linear share of 2 d makes up for a dead band d: a (c - d)^2 is
+    almost a c^2 - 2 a d c. Between both, J has a kink wherever the dead band passes a command of the tests.
+    """
+    found = z.copy()
+    for n, p in enumerate(objective.table.parameters):
+        band = objective.table.place("dead band", p.of)
+        if p.kind == "linear thrust" and band is not None:
+            found[n] += 2.0 * objective.deviation[band]
+            found[band] = z[band] + objective.deviation[band]
+    return found
 
 
 def _evidence(objective: Objective, best: Minimum) -> float:
