@@ -97,9 +97,16 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
         ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
         ("b_d_u of this vehicle does not fit the FMU: it must be within 6 ... 7 N.s/m", _estimates(made, narrow)),
         ("nothing varies, because [set] gives every coefficient that has an interval", _estimates(made, set=all_set)),
+        ("a grid needs values or a range, but estimated", _estimates(made, sampler="grid")),
     ):
         (line,) = estimates.check()
         assert line.startswith(f"vary_from = 'its.toml': {words}")
+    (line,) = _estimates(made, sampler="saltelli")[1].check()
+    assert (
+        line
+        == "sampler = 'saltelli': Sobol indices need independent variables, but all varied variables are correlated"
+    )
+    assert not [*_estimates(MADE, sampler="saltelli")[1].check()]
 
 
 # ---- Done ------------------------------------------------------------------------------------------------------------
