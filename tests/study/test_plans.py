@@ -79,7 +79,7 @@ TABLES = {
         "inputs.u_l = [0.55, 0.0]: a jump, as from 0.5 here, must be at a communication point, a multiple of step"
     ),
     "[inputs]\nu_l = {}": "inputs.u_l: must have either steps or ramps",
-    "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.2, 0.5], [0.55, 0.5], [0.55, 0]]": "inputs.u_l = [0.55, 0.0]: a jump, as from",
+    "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.55, 0.5], [0.55, 0.0]]": "inputs.u_l = [0.55, 0.0]: a jump, as from",
     '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each variable once",
     '[keep]\noutputs = ["q"]': "keep.outputs: the FMU has no variable 'q' that is a number",
     '[keep]\noutputs = ["u"]\nevery = 0.1\nat = [0.5]': "keep: must have either every or at",

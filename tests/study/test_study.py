@@ -69,7 +69,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results
     return study(_plan(folder, foreign()), folder / "results", workers=1)
 
 
-def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
+def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     runs = whole.runs
     assert runs.index.tolist() == [*range(40)]
     assert {*runs.status} == {"done"}
@@ -82,6 +82,9 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
         y: Any = _expected(runs, t)
         assert part.y.to_numpy() == pytest.approx(y.to_numpy(), rel=1e-12)
         assert [bands[q][t] for q in bands] == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
+    monkeypatch.setattr("rov_fmu.study.results.results._AT_ONCE", 100)
+    pd.testing.assert_frame_equal(whole.bands("y", (0.0, 0.5, 1.0)), bands)
+    assert whole.trajectories([3, 5]).run.tolist() == [3] * 5 + [5] * 5
 
 
 @pytest.mark.long
@@ -155,7 +158,10 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     results = tmp_path / "results"
     study(_plan(tmp_path, foreign(), runs=16), results, scheduler=scheduler)
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
+    for draft in ("trajectories/part-000000090-000000099.parquet", "runs/.part-000000090-000000099.parquet.abc.part"):
+        (results / draft).write_bytes(b"of a process that was killed")
     _same(study(_plan(tmp_path, foreign(), runs=40, limit=99.0), results, scheduler=scheduler), whole)
+    assert not [*results.glob("*/*part-000000090*")]
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
     others = {
