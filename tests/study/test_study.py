@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,10 @@ from distributed import LocalCluster
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.study import Progress, Results, study
+from rov_fmu.study.plan.model import read_model
+from rov_fmu.study.plan.plan import load_plan
+from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.run.child import Child
 from tests.commands import start, without_progress
 from tests.folders import beside
 
@@ -114,7 +119,8 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
     plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1]", more='bad = "1/(mode - mode)"')
-    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    progress: list[Progress] = []
+    results = study(plan, tmp_path / "results", scheduler=scheduler, on_progress=progress.append)
     failed, others = results.runs[results.runs["mode"] == 1], results.runs[results.runs["mode"] == 0]
     assert 0 < len(failed) < 30
     assert {*failed.status} == {"failed"}
@@ -126,6 +132,24 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     assert {*others.reason} == {"bad: ZeroDivisionError: division by zero"}
     assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
     assert {*results.trajectories().run} == {*others.index}
+    assert [progress[0].failed, progress[-1].failed] == [0, len(failed)]
+    assert [*results.failed.index, *results.incomplete.index] == [*failed.index, *others.index]
+
+
+def test_a_run_that_ends_its_process_fails_and_the_next_runs_tell_whether_the_vehicle_turned_over(
+    foreign: Foreign, tmp_path: Path
+) -> None:
+    """The output stands for an angle: with a = 2, it passes 90 degrees."""
+    plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]"), tmp_path / "unpacked"
+    job = prepare(load_plan(plan), plan, read_model(foreign())).job
+    job.model.unpack(folder)
+    child = Child(str(folder), replace(job, angles=["y"], trials=np.zeros((1, 4))))
+    (failed,) = child.runs(np.array([[0.0, 0.0, 0.0, 2.0]]))
+    assert (failed.status, failed.reason, failed.turned) == ("failed", "the FMU ended its process: SIGABRT", False)
+    assert np.isnan(failed.figures).tolist() == [True, True]
+    runs = child.runs(np.array([[2.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]))
+    child.close()
+    assert [(run.status, run.reason, run.turned) for run in runs] == [("done", "", True), ("done", "", False)]
 
 
 LIMIT = 2.0
