@@ -111,6 +111,23 @@ def test_the_tables_of_the_paper_stand_beside_what_is_computed(capsys: pytest.Ca
     assert [out.count(part) for part in ("V_ss", "Tau")] == [3, 3]
 
 
+def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_column() -> None:
+    out = console()
+    out.file, out._force_terminal, out._color_system, out.width = io.StringIO(), True, None, 30
+    numbers = [f"number {n}" for n in range(5)]
+    found = table("A title", "row", numbers, ["words"])
+    found.add_row("its name", *map(str, range(90, 95)), "a text that is wrapped")
+    found.caption = "A caption"
+    print_table(found, out)
+    lines = [line.rstrip() for line in out.file.getvalue().splitlines()]
+    assert max(map(len, lines)) <= 30
+    assert re.findall(r"row|number \d|words|its name|9\d|A \w+", "\n".join(lines)) == [
+        *("A title", "row", "number 0", "number 1", "its name", "90", "91"),
+        *("row", "number 2", "number 3", "its name", "92", "93"),
+        *("row", "number 4", "words", "its name", "94", "A caption"),
+    ]
+
+
 # ---- The progress of long work ---------------------------------------------------------------------------------------
 
 

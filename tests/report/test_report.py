@@ -201,7 +201,7 @@ def test_everything_that_was_found_has_its_row(page: str) -> None:
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_a_report_of_almost_nothing_says_so() -> None:
+def test_a_report_of_almost_nothing_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     page = report_page(bare())
     check_is_whole(page)
     words = text_of(page)
@@ -215,6 +215,11 @@ def test_a_report_of_almost_nothing_says_so() -> None:
     ):
         assert part in words
     assert "nan" not in re.findall(r"[a-z]+", words)
+    assert printed(bare(), monkeypatch)[-2:] == ["No warnings.", "--report shows 2 more doubts and facts."]
+    seen = replace(example(), axes=(replace(example().axes[0], predictions=()),), findings=())
+    lines = [" ".join(line.split()) for line in printed(seen, monkeypatch, 120)]
+    assert "surge V_ss, 2 points 5.1% - -" in lines
+    assert "What else acts: lag of the thrusters (top 0.12 s), current to the north (log_1.csv 0.10 m/s)." in lines
 
 
 @pytest.mark.usefixtures("without_plots")

@@ -102,6 +102,12 @@ FIGURES = {
     'end = "out[0]"': "figures.end = 'out[0]': out gives a variable by its name: write out[\"der(u)\"]",
     'end = "u[-12]"': "figures.end = 'u[-12]': IndexError: index -12 is out of bounds for axis 0 with size 11",
     f'end = "1{" " * 2000}"': "figures.end = ",
+    'end = "at(u)"': "figures.end = 'at(u)': at takes 2 values (y, time), each once, and not 1",
+    'end = "round(1, 2, 3)"': "figures.end = 'round(1, 2, 3)': round takes 1 to 2 values, each once, and not 3",
+    'end = "round(1, 400)"': "figures.end = 'round(1, 400)': ValueError: decimals must be within -300 ... 300",
+    'end = "at(u, when=1)"': "figures.end = 'at(u, when=1)': at has no parameter named when",
+    'end = "meen(u)"': "figures.end = 'meen(u)': 'meen' is neither a function nor a variable of the FMU; did you",
+    'end = "where(u)"': "figures.end = 'where(u)': where with one value gives a tuple of one array: write",
     'status = "u[-1]"': "figures.status: the results have another column of this name",
     'alpha_u = "u[-1]"': "figures.alpha_u: the results have another column of this name",
 }
