@@ -141,7 +141,7 @@ class Runs:
     dashboard: str = "http://localhost"
 
 
-def test_a_terminal_shows_the_share_or_the_count_of_each_part() -> None:
+def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.CaptureFixture[str]) -> None:
     display = Progress()
     shown = Parts(display)
     assert shown.is_shown
@@ -156,6 +156,7 @@ def test_a_terminal_shows_the_share_or_the_count_of_each_part() -> None:
     assert (display.tasks[2].completed, display.tasks[2].fields["count"]) == (0.5, "7,000/12,000 runs")
     study.update(Runs(12_000))
     assert display.tasks[2].completed == 0.999, "it is not done before it ends"
+    assert capsys.readouterr().out == "rov-fmu: what the workers do: http://localhost\n"
 
 
 def test_a_pipe_gets_a_line_again_and_again(
@@ -178,6 +179,7 @@ def test_a_pipe_gets_a_line_again_and_again(
     assert "rov-fmu: starting the workers (0 s so far)" in text
     assert "rov-fmu: starting the workers: done in 2.0 s" in text
     assert 1 <= text.count("rov-fmu: 600 runs/s, 2 failed, 7,200/12,000 runs (2 s so far)\n") <= 3, "none after the end"
+    assert "what the workers do" not in text
     sleep(0.1)
     assert not capsys.readouterr().err
 

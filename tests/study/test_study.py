@@ -22,6 +22,7 @@ from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.child import Child
 from tests.commands import start, without_progress
 from tests.folders import beside
@@ -118,13 +119,17 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
-    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1]", more='bad = "1/(mode - mode)"')
+    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1, 6, 7]", more='bad = "1/(mode - mode)"')
     progress: list[Progress] = []
     results = study(plan, tmp_path / "results", scheduler=scheduler, on_progress=progress.append)
-    failed, others = results.runs[results.runs["mode"] == 1], results.runs[results.runs["mode"] == 0]
+    failed, others = results.runs[results.runs["mode"] > 0], results.runs[results.runs["mode"] == 0]
     assert 0 < len(failed) < 30
     assert {*failed.status} == {"failed"}
-    assert {*failed.reason} == {"the step at 1 s: error; the FMU: the pump is blocked"}
+    assert {*zip(failed["mode"], failed.reason, strict=True)} == {
+        (1, "the step at 1 s: error; the FMU: the pump is blocked"),
+        (6, "setting the inputs at 1 s: discard"),
+        (7, "reading at 0.1 s: discard"),
+    }
     assert failed[["end", "sooner"]].isna().all(axis=None)
     table = pq.read_table(tmp_path / "results" / "runs")
     assert [table[name].null_count for name in ("end", "bad")] == [len(failed), 30]
@@ -199,6 +204,21 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
         assert line.startswith(f"rov-fmu: {results}: {reason}")
         assert line.count("\n") == 1
     _same(Results(results), whole)
+
+
+def test_a_folder_of_another_vehicle_or_without_its_description_is_refused(tmp_path: Path) -> None:
+    store = Store(tmp_path / "results")
+    with store.held():
+        store.belongs_to({}, "1", "rov", 9)
+        store.write(2, 4, b"", None)
+        assert store.missing(9) == [(0, 2), (4, 9)]
+        with pytest.raises(
+            FileError, match="another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"
+        ):
+            store.belongs_to({}, "2", "rov", 9)
+        (store.folder / "study.json").unlink()
+        with pytest.raises(FileError, match=r"has runs, but study\.json, which describes them, is missing"):
+            store.belongs_to({}, "1", "rov", 9)
 
 
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
