@@ -77,9 +77,7 @@ def live_section(page: str) -> str:
     return str(section)
 
 
-def test_what_flies_is_small_its_script_alone_is_allowed_and_it_offers_the_published_tests(
-    page: str, vehicle: Vehicle
-) -> None:
+def test_what_flies_is_small_and_its_script_alone_is_allowed(page: str, vehicle: Vehicle) -> None:
     section = live_section(page).encode()
     assert len(section) < 120_000
     assert len(zlib.compress(section, 9)) < 45_000

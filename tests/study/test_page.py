@@ -21,7 +21,7 @@ from rov_fmu.study.results.page import study_page
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height
 from tests.folders import beside
 from tests.report.pages import check_is_whole
-from tests.report.plots.test_identification import bands, lines
+from tests.report.plots.test_identification import bands, bars, lines
 
 
 @pytest.fixture(scope="module")
@@ -176,8 +176,9 @@ def test_plots_have_all_runs_their_quantiles_and_the_intervals_of_indices() -> N
     spread, over_time, indices, over_grid = (Figure() for _ in range(4))
     draw_distribution(spread, np.arange(1.0, 101.0), [5.0, 30.0, 50.0, 70.0, 95.0])
     (ax,) = spread.axes
-    assert [bar.get_height() for bar in ax.containers[0]] == pytest.approx([10.0] * 10), "ten bars of 10 % of the runs"
-    assert (ax.patches[0].get_x(), ax.patches[0].get_width(), ax.lines[0].get_xdata()[0]) == (5.0, 90.0, 50.0)
+    assert [height for _, _, height in bars(ax)[1:]] == pytest.approx([10.0] * 10), "ten bars of 10 % of the runs"
+    assert bars(ax)[0][:2] == (5.0, 90.0)
+    assert np.asarray(ax.lines[0].get_xdata()).tolist() == [50.0, 50.0]
     values = np.outer([0.0, 1.0, 2.0], [1.0, 2.0, 3.0, 4.0, 5.0])
     draw_band(over_time, pd.DataFrame(values, [0.0, 0.5, 1.0]), "m/s")
     (ax,) = over_time.axes
@@ -187,11 +188,11 @@ def test_plots_have_all_runs_their_quantiles_and_the_intervals_of_indices() -> N
     tells = {"S1_tells": True, "ST_tells": False, "S1_95": 0.1, "ST_95": 0.2}
     draw_indices(indices, [{"name": f"x{n}", "S1": 0.5, "ST": 0.6 + n, **tells} for n in range(15)])
     (ax,) = indices.axes
-    alone, with_others = (list(bars) for bars in ax.containers[::2])
+    alone, with_others = (list(shown) for shown in ax.containers[::2])
     assert [len(alone), len(with_others), len(ax.get_yticks())] == [12] * 3, "the largest twelve"
     assert (alone[0].get_width(), with_others[1].get_width()) == (0.5, 1.6)
     assert alone[0].get_y() < 0.0 == pytest.approx(alone[0].get_y() + alone[0].get_height()), "one above the other"
-    assert [to_hex(bars[0].get_facecolor()) for bars in (alone, with_others)] == [LIGHT["blue"], LIGHT["grey"]]
+    assert [to_hex(shown[0].get_facecolor()) for shown in (alone, with_others)] == [LIGHT["blue"], LIGHT["grey"]]
     assert ax.get_xlim() == pytest.approx((-0.02, 1.32))
     assert indices_height(2) < indices_height(12) == indices_height(13)
     runs = pd.DataFrame([(a, b, a * b) for b in range(7) for a in (2.0, 1.0)], columns=["a", "b", "y"])

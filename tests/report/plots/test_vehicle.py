@@ -15,11 +15,11 @@ from matplotlib.text import Annotation
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.report.page.fmu_page import plot_steady, plot_steps
-from rov_fmu.report.plots.drawing import draw_icon, draw_thrusters
+from rov_fmu.report.plots.drawing import draw_thrusters
 from rov_fmu.report.plots.geometry import place, scenes
 from rov_fmu.report.plots.steps import draw_curve, held_commands, tables_by_axis
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.report.plots.test_identification import lines
+from tests.report.plots.test_identification import bars, lines
 from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY
 
 ONE = VEHICLES["yaw only"]
@@ -78,18 +78,6 @@ def test_the_arm_of_the_paper_stands_where_its_torque_says() -> None:
     assert texts == {"", "$R$", r"$\gamma$", "$x, u$", "$y$", r"$\psi, r$", *forces, "0.1 m"}
 
 
-@pytest.mark.parametrize("vehicle", [VIDEORAY, HEAVY], ids=["VideoRay", "Heavy"])
-def test_every_thruster_is_within_the_icon(vehicle: Vehicle) -> None:
-    ax = panel(draw_icon, vehicle)
-    arrows = [text for text in ax.texts if isinstance(text, Annotation)]
-    assert len(arrows) == sum(t.direction.value[2] == 0.0 for t in vehicle.layout.thrusters)
-    points = [patch.get_center() for patch in ax.patches if hasattr(patch, "get_center")]
-    points += [end for arrow in arrows for end in (arrow.xy, arrow.xyann)]
-    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-    assert (left, high) == (-right, -low) == (high, left)
-    assert all(left < x < right and high < y < low for x, y in points)
-
-
 # ---- Over the command and over time ----------------------------------------------------------------------------------
 
 
@@ -103,8 +91,7 @@ def test_the_plot_of_thrust_has_its_dead_band() -> None:
         assert force[commands == command] == pytest.approx([expected])
     assert (commands.min(), commands.max()) == ax.get_xlim() == (-100.0, 100.0)
     assert not force[abs(commands) <= 8.72].any()
-    (band,) = ax.patches
-    assert (band.get_x(), band.get_width()) == pytest.approx((-8.72, 17.44))
+    assert bars(ax)[0][:2] == pytest.approx((-8.72, 17.44))
 
 
 def test_the_plots_of_velocities_have_the_model_what_was_measured_degrees_and_knots() -> None:
@@ -118,9 +105,9 @@ def test_the_plots_of_velocities_have_the_model_what_was_measured_degrees_and_kn
         assert dict(zip(*lines(turning)[label], strict=True))[50.0] == pytest.approx(V * degrees, rel=1e-4)
     assert turning.get_title(loc="left") == "Steady yaw velocity (°/s)"
     assert (turning.get_xlim(), turning.get_ylim()[0], turning.child_axes) == ((0.0, 100.0), 0.0, [])
-    (knots,), (valid,) = ahead.child_axes, turning.patches
+    (knots,) = ahead.child_axes
     assert knots.get_ylim()[1] == pytest.approx(ahead.get_ylim()[1] * 3600.0 / 1852.0)
-    assert (valid.get_x(), valid.get_width()) == pytest.approx((20.0, 50.0))
+    assert bars(turning)[0][:2] == pytest.approx((20.0, 50.0))
     steps = panel(plot_steps, VIDEORAY, YAW, held_commands(VIDEORAY, tables.values()), tables["yaw"])
     assert steps.get_title(loc="left") == "Yaw velocity after a step (°/s)"
     assert [text.get_text() for text in steps.texts] == ["20 %", "30 %", "50 %", "70 %"]
@@ -137,7 +124,7 @@ def test_the_plots_of_velocities_have_the_model_what_was_measured_degrees_and_kn
 def test_directions_that_differ_and_lines_near_each_other_are_told_apart() -> None:
     assert not panel(plot_steady, ONE, YAW, None).patches, "it holds for every command"
     narrow = panel(plot_steady, replace(HEAVY, command_range=(0.2, 0.7)), HEAVE, None)
-    assert [(band.get_x(), band.get_width()) for band in narrow.patches] == [(20.0, 50.0), (-70.0, 50.0)]
+    assert [bar[:2] for bar in bars(narrow)] == [(20.0, 50.0), (-70.0, 50.0)]
     assert narrow.get_xlim() == (-100.0, 100.0)
     assert narrow.get_ylim()[0] < 0.0
     steps = panel(plot_steps, HEAVY, HEAVE, [*map(Decimal, (10, 12, 100))], None)
