@@ -75,7 +75,7 @@ TESTS = {
     "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_identify.py",
     "rov_fmu/report/plots/proof.py": "fmu/claims",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
-    "rov_fmu/report/page/live.py": "report/test_flown.py report/test_fmu_page.py report",
+    "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
     "rov_fmu/report/page/recording.py": "tank/test_several_files.py report/fly",
     "rov_fmu/report/page/*": "report/test_equations.py report/test_fmu_page.py report",
     "rov_fmu/report/proof_page.py": "fmu/claims",
