@@ -94,6 +94,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     labels = re.findall(r'aria-label="([^"]*)"', text)
     shown = [f"{what} {of}" for what in ("Distribution of", "Sobol indices of") for of in ("end", "twice")]
     assert labels == [*shown, "Trajectories of y"]
+    assert text.count('data-plot="{&quot;box') == len(labels), "the script of the page knows each panel"
     check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert study_page(results) == text, "the page is the same for the same results"

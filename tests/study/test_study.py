@@ -119,7 +119,7 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
-    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1, 6, 7]", more='bad = "1/(mode - mode)"')
+    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1, 6, 7, 8]", more='bad = "1/(mode - mode)"')
     progress: list[Progress] = []
     results = study(plan, tmp_path / "results", scheduler=scheduler, on_progress=progress.append)
     failed, others = results.runs[results.runs["mode"] > 0], results.runs[results.runs["mode"] == 0]
@@ -129,6 +129,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
         (1, "the step at 1 s: error; the FMU: the pump is blocked"),
         (6, "setting the inputs at 1 s: discard"),
         (7, "reading at 0.1 s: discard"),
+        (8, "initialization: error"),
     }
     assert failed[["end", "sooner"]].isna().all(axis=None)
     table = pq.read_table(tmp_path / "results" / "runs")

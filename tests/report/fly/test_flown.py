@@ -38,6 +38,7 @@ def test_keys_loads_and_places_of_the_heavy() -> None:
     places = [*around, *(f"{place} vertical" for place in around)]
     assert found.places == {f"u_{n}": place for n, place in enumerate(places, 1)}
     assert found.can_level
+    assert not live([Flown(flown_vehicle("videoray"), b""), Flown(heavy, b"")]).can_level, "the ghost does not matter"
     assert (found.title, found.other) == ("BlueROV2 Heavy", None)
     assert found.tests[:5] == [*(f"surge {command} %" for command in (10, 40, 70, 100)), "sway 10 %"]
 
