@@ -1,6 +1,7 @@
 """What the page that flies gets of a vehicle: keys, sliders, labels, step tests, and columns of commands."""
 
 import json
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import sqrt
 from typing import Any
@@ -19,56 +20,49 @@ def data_of(vehicle: Vehicle) -> Any:
     return json.loads(live([Flown(vehicle, b"")]).data)[0]
 
 
+def shown(rows: Iterable[Sequence[Any]]) -> str:
+    """Return rows of texts and numbers as one text."""
+    return ", ".join(" ".join(part if isinstance(part, str) else f"{part:.4g}" for part in row) for row in rows)
+
+
 def test_keys_loads_and_places_of_the_heavy() -> None:
     """A T200 of the Heavy gives 53.2 N ahead and 41.4 N in reverse, so that four aslant push with 134 N."""
     heavy = flown_vehicle("bluerov2_heavy")
     found, axes = live([Flown(heavy, b"")]), data_of(heavy)["axes"]
-    assert [(axis.name, keys) for axis, keys in found.keys] == [
-        *(("surge", "WS"), ("sway", "EQ"), ("heave", "FR")),
-        *(("roll", "LJ"), ("pitch", "IK"), ("yaw", "DA")),
-    ]
-    units = [(axis["position"], axis["positionUnit"]) for axis in axes]
-    angles = [(name, "rad") for name in ("phi", "theta", "psi")]
-    assert units == [(None, "m"), (None, "m"), ("z", "m"), *angles]
-    loads = {"X_ext": 100.0, "Y_ext": 100.0, "Z_ext": 200.0, "K_ext": 50.0, "M_ext": 30.0, "N_ext": 40.0}
-    ends = {name: end for name, end, _ in found.loads}
-    assert ends == {**loads, **dict.fromkeys(("V_N", "V_E", "V_D"), 1.0)}
-    assert [unit for _, _, unit in found.loads] == [*["N"] * 3, *["N·m"] * 3, *["m/s"] * 3]
-    around = ("right front", "left front", "right rear", "left rear")
-    places = [*around, *(f"{place} vertical" for place in around)]
-    assert found.places == {f"u_{n}": place for n, place in enumerate(places, 1)}
+    keys = ", ".join(f"{axis.name} {keys}" for axis, keys in found.keys)
+    assert keys == "surge WS, sway EQ, heave FR, roll LJ, pitch IK, yaw DA"
+    positions = ", ".join(f"{axis['position']} {axis['positionUnit']}" for axis in axes)
+    assert positions == "None m, None m, z m, phi rad, theta rad, psi rad"
+    loads = "X_ext 100 N, Y_ext 100 N, Z_ext 200 N, K_ext 50 N·m, M_ext 30 N·m, N_ext 40 N·m"
+    assert shown(found.loads) == f"{loads}, V_N 1 m/s, V_E 1 m/s, V_D 1 m/s"
+    around = "right front, left front, right rear, left rear"
+    assert ", ".join(found.places.values()) == f"{around}, {around.replace(',', ' vertical,')} vertical"
+    assert [*found.places] == [*heavy.layout.commands]
     assert found.can_level
     assert not live([Flown(flown_vehicle("videoray"), b""), Flown(heavy, b"")]).can_level, "the ghost does not matter"
     assert (found.title, found.other) == ("BlueROV2 Heavy", None)
-    assert found.tests[:5] == [*(f"surge {command} %" for command in (10, 40, 70, 100)), "sway 10 %"]
+    assert ", ".join(found.tests[:5]) == "surge 10 %, surge 40 %, surge 70 %, surge 100 %, sway 10 %"
 
 
 def test_sliders_reach_from_half_to_twice_a_mass_and_20_cm_beside_a_centre() -> None:
     found = live([Flown(flown_vehicle("bluerov2_heavy").replaced({"alpha_u": 0.05, "beta_w": 2.0}), b"")])
     ballast, tuning = found.tunable.values()
-    ends = {name: (low, high, value, unit) for name, _, low, high, value, unit, _ in [*ballast, *tuning]}
-    assert ends["m_rov"] == (6.75, 27.0, 13.5, "kg")
-    assert ends["W"] == pytest.approx((0.8 * 132.57, 1.25 * 132.57, 132.57, "N"))
-    assert ends["z_B"] == pytest.approx((-0.21, 0.19, -0.01, "m"))
-    assert (ends["alpha_u"], ends["beta_w"]) == ((0.05, 3.0, 0.05, ""), (0.1, 4.0, 2.0, ""))
-    assert [label for _, label, *_ in tuning][:2] == ["α of surge", "α of sway"]
+    mass = "m_rov m_rov 6.75 27 13.5 kg, W W 106.1 165.7 132.6 N, B B 105.3 164.5 131.6 N"
+    assert shown(row[:-1] for row in ballast) == f"{mass}, z_B z_B -0.21 0.19 -0.01 m"
+    assert shown(row[:-1] for row in (tuning[0], tuning[1], tuning[8])) == (
+        "alpha_u α of surge 0.05 3 0.05 , alpha_v α of sway 0.1 3 1 , beta_w β of heave 0.1 4 2 "
+    )
     effects = live([Flown(flown_vehicle("thrust effects"), b"")])
-    assert ("voltage", 29.6, "V") in effects.loads, "twice its start value"
-    assert [slider[4:6] for slider in effects.tunable["Ballast and payload"]] == [(20.0, "kg"), (0.9, ""), (1.0, "")]
-    assert effects.places == {"u_l": "left rear", "u_r": "right rear", "u_bow": "front", "u_top": "vertical"}
+    assert shown(effects.loads).endswith(", voltage 29.6 V"), "twice its start value"
+    sliders = shown(row[1:-1] for row in effects.tunable["Ballast and payload"])
+    assert sliders == "m_rov 10 40 20 kg, k_t_main 0.45 1.8 0.9 , k_t_bow 0.5 2 1 "
+    assert shown(effects.places.items()) == "u_l left rear, u_r right rear, u_bow front, u_top vertical"
     assert not effects.can_level
     with_mix = flown_vehicle("everything")
     assert live([Flown(with_mix, b"")]).places == {}
-    labels = [thruster["label"] for thruster in data_of(with_mix)["thrusters"]]
-    assert labels == [
-        "right front",
-        "left front",
-        "3 right rear",
-        "4 left rear",
-        "vertical",
-        "l left rear",
-        "r right rear",
-    ]
+    assert ", ".join(thruster["label"] for thruster in data_of(with_mix)["thrusters"]) == (
+        "right front, left front, 3 right rear, 4 left rear, vertical, l left rear, r right rear"
+    )
 
 
 def test_a_key_pushes_along_its_axis_alone_and_the_hold_leaves_balancing_thrusters_alone() -> None:
