@@ -114,15 +114,6 @@ def test_a_manoeuvre_is_that_of_the_native_fmu_in_firefox(
 # ---- What a person does with it --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("key", "velocity"), [("KeyL", "p"), ("KeyI", "q"), ("KeyD", "r")])
-def test_each_rotation_has_its_key(fly: Fly, key: str, velocity: str) -> None:
-    page = fly("six")
-    page.locator("#live-hold").uncheck()
-    page.focus("#live-stage")
-    page.keyboard.down(key)
-    until(page, f"live.flight.pilot.model.get('{velocity}') > 0.05")
-
-
 STILL = "live.vehicle.commands.every(name => live.flight.pilot.model.get(name) === 0)"
 
 

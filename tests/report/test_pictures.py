@@ -1,5 +1,6 @@
 """The pictures in the FMU: small, whole, of the vehicle's own thrusters, the same bytes every time."""
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -78,6 +79,34 @@ def test_foreign_text_in_a_plot_is_no_markup(foreign: str) -> None:
     assert "$V_{ss}$" not in texts, "our own formula is one"
 
 
+def test_a_plot_tells_its_script_where_its_panel_is_in_the_coordinates_of_its_lines() -> None:
+    def draw(figure: Figure) -> None:
+        upper, lower = figure.subplots(2, 1)
+        upper.plot([0.0, 2.0], [1.0, 5.0], label="a line")
+        upper.set_title("Speed (m/s)", loc="left")
+        lower.bar([1.0], [2.0], label="_no name")
+        lower.set(xlabel="time (s)", ylabel="force")
+
+    found = etree.fromstring(inline_svg("A plot", draw, (4.0, 3.0), marked=True))
+    marks = [(json.loads(group.get("data-plot")), group) for group in found.xpath("//*[@data-plot]")]
+    upper, lower = (mark for mark, _ in marks if "box" in mark)
+    assert [(mark["title"], mark["along"]) for mark in (upper, lower)] == [
+        ("Speed (m/s)", "time (s)"),
+        ("force", "time (s)"),
+    ]
+    (line,) = (group for mark, group in marks if mark.get("line") == "a line")
+    assert len([mark for mark, _ in marks if "line" in mark]) == 1
+    left, top, right, bottom = upper["box"]
+    (x0, x1), (y0, y1) = upper["x"], upper["y"]
+    places = [
+        (left + (x - x0) / (x1 - x0) * (right - left), bottom + (y - y0) / (y1 - y0) * (top - bottom))
+        for x, y in ((0.0, 1.0), (2.0, 5.0))
+    ]
+    assert [float(part) for part in re.findall(r"[\d.]+", line[0].get("d"))] == pytest.approx(
+        [*places[0], *places[1]], abs=0.05
+    )
+
+
 def test_a_plot_that_cannot_be_drawn_costs_only_itself() -> None:
     def fail(_: Figure) -> None:
         raise OverflowError("too large <b>")
@@ -96,6 +125,3 @@ def test_model_png_is_the_own_picture_or_else_the_icon(vehicle: Vehicle, content
     assert content_of(vehicle, shipped("videoray")).files["model.png"] == own
     bare = replace(vehicle, pictures=None)
     assert content_of(bare, shipped("videoray")).files["model.png"] == shipped("videoray")[ICON]
-
-
-# ---- The thrusters in a drawing --------------------------------------------------------------------------------------

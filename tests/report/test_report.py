@@ -15,7 +15,7 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import SURGE
+from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, next_tests, told
@@ -39,7 +39,7 @@ from tests.report.pages import (
     text_of,
     unfolded,
 )
-from tests.report.results import FILES, GOOD, example, without_findings
+from tests.report.results import FILES, GOOD, example, prediction, without_findings
 
 report_page = partial(report.report_page, made=date(2026, 11, 23))
 SECTIONS = [
@@ -104,11 +104,27 @@ def test_long_words_break(page: str, tmp_path: Path, visit: Callable[..., Visit]
 
 
 @pytest.mark.long
-def test_the_same_twice_with_its_progress(page: str) -> None:
+def test_the_same_twice(page: str) -> None:
+    assert report_page(example()) == page
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_progress_tells_each_plot_and_the_picture_shows_the_log_that_is_predicted_worst(
+    page: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     steps: list[tuple[str, float]] = []
-    assert report_page(example(), lambda step, share: steps.append((step, share))) == page
+    report_page(example(), lambda step, share: steps.append((step, share)))
     assert [step for step, _ in steps] == [f"drawing: {label}" for label in labels(page)]
     assert [share for _, share in steps] == pytest.approx([n / len(steps) for n in range(len(steps))])
+    surge, heave, yaw = example().axes
+    other = prediction(HEAVE, "depth", FILES[0], span=10.0, error=0.05)
+    velocity = prediction(SURGE, "surge velocity", FILES[0], error=0.2)
+    axes = (replace(surge, predictions=(velocity, *surge.predictions)), replace(heave, predictions=(other,)), yaw)
+    words = unfolded(report_page(replace(example(), axes=axes)))
+    every = "(started again every 10 s)"
+    assert f"the distance {every} and the heading {every} of log_2.csv, predicted" in words
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    assert report.today() == date(1970, 1, 2)
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -185,7 +201,7 @@ def test_everything_that_was_found_has_its_row(page: str) -> None:
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_a_report_of_almost_nothing_says_so() -> None:
+def test_a_report_of_almost_nothing_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     page = report_page(bare())
     check_is_whole(page)
     words = text_of(page)
@@ -199,6 +215,11 @@ def test_a_report_of_almost_nothing_says_so() -> None:
     ):
         assert part in words
     assert "nan" not in re.findall(r"[a-z]+", words)
+    assert printed(bare(), monkeypatch)[-2:] == ["No warnings.", "--report shows 2 more doubts and facts."]
+    seen = replace(example(), axes=(replace(example().axes[0], predictions=()),), findings=())
+    lines = [" ".join(line.split()) for line in printed(seen, monkeypatch, 120)]
+    assert "surge V_ss, 2 points 5.1% - -" in lines
+    assert "What else acts: lag of the thrusters (top 0.12 s), current to the north (log_1.csv 0.10 m/s)." in lines
 
 
 @pytest.mark.usefixtures("without_plots")

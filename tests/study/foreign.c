@@ -1,8 +1,9 @@
 /* An FMU of FMI 2.0 that this project did not generate. Studies must cope with its faults.
 
    y' = (a + 2 b + 3 c + gain u - y)/0.5; if fast is true, y is at once what it would become. mode: 1 fails at 1 s, 2 ends
-   the process, 3 reads a null pointer, 4 does not return, 5 waits for a millisecond in each step. The digit in the GUID
-   selects what fmi2Reset does: 0 resets, 1 does nothing and returns OK, 2 returns an error. */
+   the process, 3 reads a null pointer, 4 does not return, 5 waits for a millisecond in each step, 6 refuses inputs and
+   7 tells nothing once y is positive, 8 cannot be initialized. The digit in the GUID selects what fmi2Reset
+   does: 0 resets, 1 does nothing and returns OK, 2 returns an error. */
 #ifdef _WIN32
 #include <windows.h>
 #define WAIT() Sleep(1)
@@ -43,7 +44,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean d, fmi2Real t, fmi2R
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return ((Instance *)c)->mode == 8 ? fmi2Error : fmi2OK; }
 fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
 fmi2Status fmi2Reset(fmi2Component c) {
     const int reset = ((const Instance *)c)->reset;
@@ -55,13 +56,13 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     const Instance *i = c;
     const double all[] = {i->a, i->b, i->c, i->u, i->y};
     for (size_t k = 0; k < n; k++) value[k] = all[vr[k]];
-    return fmi2OK;
+    return i->mode == 7 && i->y > 0.0 ? fmi2Discard : fmi2OK;
 }
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     Instance *i = c;
     double *all[] = {&i->a, &i->b, &i->c, &i->u, &i->y};
     for (size_t k = 0; k < n; k++) *all[vr[k]] = value[k];
-    return fmi2OK;
+    return i->mode == 6 && i->y > 0.0 ? fmi2Discard : fmi2OK;
 }
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
     const Instance *i = c;

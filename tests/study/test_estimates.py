@@ -97,9 +97,16 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
         ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
         ("b_d_u of this vehicle does not fit the FMU: it must be within 6 ... 7 N.s/m", _estimates(made, narrow)),
         ("nothing varies, because [set] gives every coefficient that has an interval", _estimates(made, set=all_set)),
+        ("a grid needs values or a range, but estimated", _estimates(made, sampler="grid")),
     ):
         (line,) = estimates.check()
         assert line.startswith(f"vary_from = 'its.toml': {words}")
+    (line,) = _estimates(made, sampler="saltelli")[1].check()
+    assert (
+        line
+        == "sampler = 'saltelli': Sobol indices need independent variables, but all varied variables are correlated"
+    )
+    assert not [*_estimates(MADE, sampler="saltelli")[1].check()]
 
 
 # ---- Done ------------------------------------------------------------------------------------------------------------
@@ -127,7 +134,7 @@ step = 0.1
 runs = 2560
 sampler = "saltelli"
 [vary]
-m_rov.normal = {{ mean = 6.57, sd = 0.05 }}
+m_rov.normal = {{ mean = 6.572, sd = 0.05 }}
 [figures]
 mixed = "a_d_u + 2*b_d_u + a_d_w + 4*m_rov"
 same = "0*a_d_u"
@@ -171,7 +178,7 @@ def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
     assert done.lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
     varied = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
     assert varied["b_d_u"] == "estimate: value 5, error 0.3; correlated with a_d_u"
-    assert varied["m_rov"] == "normal: mean 6.57, sd 0.05"
+    assert varied["m_rov"] == "normal: mean 6.572, sd 0.05"
     index = done.results.sensitivity("mixed").loc["a_d_u, b_d_u"]
     cells = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='a_d_u, b_d_u']/td")
     assert float(cells[1].text_content()) == pytest.approx(index.S1, abs=1e-3)

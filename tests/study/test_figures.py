@@ -39,6 +39,18 @@ KNOWN = {
     "gradient(t**2, t)[1000]": 20.0,
     "interp(3.5, t, y)": 3.0 * (1.0 - exp(-1.0)),
     "settling_time(y, start=2, band=0.02)": 1.5 * log(50.0),
+    "settling_time(t, band=0.06)": 0.94 * 38.0,
+    "V_ss(t)": 38.0,
+    "V_ss(t, 10, 20)": 19.5,
+    "Tau(t, 10, 20)": 9.5 * (1.0 - exp(-1.0)),
+    "overshoot(y)": 0.0,
+    "final(y) + len(y)": 4004.0,
+    "max(1, 3, 2) + min(5, 4) + max(t)": 47.0,
+    "round(149.9, -2) + clip(m, 0, 5)": 105.0,
+    "sorted(-t)[0] + t[::2][5] + t[-2:][0]": 0.09,
+    "(1 if m > 6 else 2) + (0 < m < 6) + (m > 6 or m / 0) + (not m)": 2.0,
+    "((m > 6) ^ (m > 7)) * 1 + (m != 6.5) * 2 + any(t > 3) * 4 + all(t > 0) * 8": 5.0,
+    "median(t) + percentile(t, 25) + searchsorted(t, 0.995) + hypot(3, 4)": 135.0,
 }
 
 
@@ -51,10 +63,14 @@ def test_a_figure_is_what_the_response_has_in_closed_form(expression: str) -> No
 
 
 def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there() -> None:
-    figures = Figures({"far": "y[9999]", "all": "2*y", "zero": "1/0", "late": "V_ss(y, 50, 60)", "m": "m"}, T)
+    odd = {"half": "y[0.5]", "choice": "1 if y else 2", "none": "Tau(0*y)", "never": "Tau(-t, 0, 0)", "end": "log(0)"}
+    figures = Figures({"far": "y[9999]", "all": "2*y", "zero": "1/0", "late": "V_ss(y, 50, 60)", **odd, "m": "m"}, T)
     found, reason = figures.of({"y": FIRST, "m": 6.5})
-    assert found == pytest.approx([nan, nan, nan, nan, 6.5], nan_ok=True)
-    far, others, zero, late = reason.split("; ")
+    assert found == pytest.approx([*[nan] * 9, 6.5], nan_ok=True)
+    far, others, zero, late, half, choice, *infinite = reason.split("; ")
+    assert half == "half: IndexError: an index must be a whole number"
+    assert choice.startswith("choice: ValueError: an array is neither true nor false: write any(...) or all(...)")
+    assert infinite == ["none: is NaN", "never: is NaN", "end: is infinite"]
     assert far == "far: IndexError: index 9999 is out of bounds for axis 0 with size 4001"
     assert others == "all: must be one number, and not an array"
     assert zero == "zero: ZeroDivisionError: division by zero"

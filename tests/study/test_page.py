@@ -2,16 +2,26 @@
 
 import re
 from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
+import pandas as pd
 import pytest
 from lxml import html
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
+from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
+from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height
 from tests.folders import beside
 from tests.report.pages import check_is_whole
+from tests.report.plots.test_identification import bands, bars, lines
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +46,9 @@ twice = "2 * y[-1]"
 odd = "y[y > 1e9][0]"
 offset = "2.0 + 0*b"
 """)
-    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
+    with redirect_stdout(StringIO()) as printed:
+        assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
+    (folder / "printed.txt").write_text(printed.getvalue(), encoding="utf-8")
     return folder / "results"
 
 
@@ -50,18 +62,39 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert (
         f"Model foreign: 600 of 600 runs, {len(results.failed)} failed, {len(ended)} incomplete." in page.text_content()
     )
-    assert float(rows["end"][3].replace("−", "-")) == pytest.approx(ended.end.median(), rel=1e-3)
-    assert rows["end"][-1] == str(len(ended))
-    assert rows["odd"][-1] == "0"
+    quantiles, drawn = ended.end.quantile([0.05, 0.25, 0.5, 0.75, 0.95]), results.runs.b
+    numbers = [*quantiles, ended.end.mean(), ended.end.std(), len(ended)]
+    assert [float(cell.replace("−", "-")) for cell in rows["end"][1:]] == pytest.approx(numbers, rel=3e-3)
+    assert rows["odd"] == ["odd", *"–––––––", "0"]
+    assert rows["mode"][1] == "values: 0, 0, 0, 0, 0, 0, …"
+    assert rows["b"][1] == "normal: mean 0, sd 1"
+    extremes = [drawn.min(), drawn.median(), drawn.max()]
+    assert [float(cell.replace("−", "-")) for cell in rows["b"][2:5]] == pytest.approx(extremes, rel=1e-3, abs=1e-3)
     index = results.sensitivity("end").loc["b"]
     indices = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='b']/td")
     assert float(indices[1].text_content().replace("−", "-")) == pytest.approx(index.S1, abs=1e-3)
     assert "odd has no indices: too few runs have odd." in page.text_content()
-    failed = next(row for row in page.iter("tr") if "the pump is blocked" in row.text_content())
-    assert failed[0].text_content() == str(len(results.failed))
+    reasons = {
+        "incomplete": (ended, "odd: IndexError: index 0 is out of bounds for axis 0 with size 0"),
+        "failed": (results.failed, "the step at 1 s: error; the FMU: the pump is blocked"),
+    }
+    assert [[cell.text_content() for cell in row] for row in page.xpath("//table[last()]//tr")][-2:] == [
+        [str(len(some)), status, reason, ", ".join(map(str, some.index[:5]))]
+        for status, (some, reason) in reasons.items()
+    ]
+    printed = [" ".join(line.split()) for line in (done.parent / "printed.txt").read_text("utf-8").splitlines()]
+    counts = f"600 runs, {len(results.failed)} failed, {len(ended)} incomplete"
+    assert printed[0] == f"{done}: {counts}"
+    assert re.fullmatch(r"600 of them now, in \d+\.\d s; [\d,.]+ runs/s", printed[1])
+    three = [f"{number:.5g}" for number in (*quantiles[[0.05, 0.5, 0.95]], ended.end.mean())]
+    assert " ".join(["end", *three, str(len(ended))]) in printed
+    assert [line for line in printed if " runs: " in line] == [
+        f"{len(some)} runs: {reason}" for some, reason in reasons.values()
+    ]
     labels = re.findall(r'aria-label="([^"]*)"', text)
     shown = [f"{what} {of}" for what in ("Distribution of", "Sobol indices of") for of in ("end", "twice")]
     assert labels == [*shown, "Trajectories of y"]
+    assert text.count('data-plot="{&quot;box') == len(labels), "the script of the page knows each panel"
     check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert study_page(results) == text, "the page is the same for the same results"
@@ -138,6 +171,38 @@ down = "a - u / 1000"
     assert -0.0005 < min(small) < -1e-5
     rows = pages[800].xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
     assert [row.text_content() for row in rows[1:3]] == ["0.000", "0.000"]
+
+
+def test_plots_have_all_runs_their_quantiles_and_the_intervals_of_indices() -> None:
+    spread, over_time, indices, over_grid = (Figure() for _ in range(4))
+    draw_distribution(spread, np.arange(1.0, 101.0), [5.0, 30.0, 50.0, 70.0, 95.0])
+    (ax,) = spread.axes
+    assert [height for _, _, height in bars(ax)[1:]] == pytest.approx([10.0] * 10), "ten bars of 10 % of the runs"
+    assert bars(ax)[0][:2] == (5.0, 90.0)
+    assert np.asarray(ax.lines[0].get_xdata()).tolist() == [50.0, 50.0]
+    values = np.outer([0.0, 1.0, 2.0], [1.0, 2.0, 3.0, 4.0, 5.0])
+    draw_band(over_time, pd.DataFrame(values, [0.0, 0.5, 1.0]), "m/s")
+    (ax,) = over_time.axes
+    assert {label: y[-1] for label, (_, y) in lines(ax).items()} == {"5 %": 2.0, "median": 6.0, "95 %": 10.0}
+    assert [(band[:, 1].max(), band[band[:, 0] == 1.0, 1].min()) for band in bands(ax)] == [(10.0, 2.0), (8.0, 4.0)]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("time (s)", "m/s")
+    tells = {"S1_tells": True, "ST_tells": False, "S1_95": 0.1, "ST_95": 0.2}
+    draw_indices(indices, [{"name": f"x{n}", "S1": 0.5, "ST": 0.6 + n, **tells} for n in range(15)])
+    (ax,) = indices.axes
+    alone, with_others = (list(shown) for shown in ax.containers[::2])
+    assert [len(alone), len(with_others), len(ax.get_yticks())] == [12] * 3, "the largest twelve"
+    assert (alone[0].get_width(), with_others[1].get_width()) == (0.5, 1.6)
+    assert alone[0].get_y() < 0.0 == pytest.approx(alone[0].get_y() + alone[0].get_height()), "one above the other"
+    assert [to_hex(shown[0].get_facecolor()) for shown in (alone, with_others)] == [LIGHT["blue"], LIGHT["grey"]]
+    assert ax.get_xlim() == pytest.approx((-0.02, 1.32))
+    assert indices_height(2) < indices_height(12) == indices_height(13)
+    runs = pd.DataFrame([(a, b, a * b) for b in range(7) for a in (2.0, 1.0)], columns=["a", "b", "y"])
+    draw_lines(over_grid, "y", SimpleNamespace(runs=runs, units={"a": "N.m", "b": "1"}), ["a", "b"])  # type: ignore[arg-type]
+    (ax,) = over_grid.axes
+    assert lines(ax) == {f"{b}": ([1.0, 2.0], [1.0 * b, 2.0 * b]) for b in (0, 2, 4, 6)}, (
+        "four even values of the other"
+    )
+    assert ax.get_xlabel() == "a (N·m)"
 
 
 def test_another_page_of_this_name_is_not_overwritten(

@@ -1,16 +1,18 @@
 """Every mistake in a plan is reported in one line before anything is run."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
-from rov_fmu.study.plan.model import Model, read_model
+from rov_fmu.study.plan.model import Model, Variable, read_model
 from rov_fmu.study.plan.plan import load_plan
-from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.plan.prepared import Prepared, prepare
 from tests.folders import beside
 from tests.io.test_paths import WRONG as WRONG_PATHS
 
@@ -32,7 +34,12 @@ WHOLE = {
     HEAD.replace("1.0", "0.95")
     + VARY
     + TAIL: "stop_time = 0.95: must be a whole number of steps of 0.1 s after the st",
-    HEAD.replace("1.0", "-1.0") + VARY + TAIL: "stop_time = -1.0: must be after start_time = 0",
+    HEAD.replace("1.0", "0.0") + VARY + TAIL: "stop_time = 0.0: must be after start_time = 0",
+    HEAD.replace("0.1", "5e-8") + VARY + TAIL: "step = 5e-08: must divide a run into at most 10000000 steps",
+    HEAD.replace("0.1", "0.0") + VARY + TAIL: "step = 0.0: must be greater than 0",
+    HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be greater than or equal to 1",
+    HEAD.replace("runs = 4", "") + VARY + TAIL: "runs: this key is missing",
+    HEAD + "[vary]\nu_l.values = [0.0]\n[inputs]\nu_l = 0.5\n" + TAIL: "vary.u_l: is given in [set] or [inputs] too",
 }
 """Plans and the beginnings of the messages about them."""
 HEADS = {
@@ -40,6 +47,9 @@ HEADS = {
     'vehicle = "videoray"': "must have either fmu or vehicle",
     'vary_from = "mine.toml"': "vary_from = 'mine.toml': there is no such file beside the plan",
     'vary_from = "videoray"': "vary_from = 'videoray': no coefficient of this vehicle has an interval",
+    "time_limit = 0": "time_limit = 0: must be greater than 0",
+    "time_limit = 2e6": "time_limit = 2000000.0: must be less than or equal to 1000000",
+    "seed = -1": "seed = -1: must be greater than or equal to 0",
 }
 """Keys before the tables."""
 VARIED = {
@@ -47,6 +57,12 @@ VARIED = {
     "alpha_u.uniform = [-1.0, 1.2]": "vary.alpha_u = -1.0: must be within 0 ... 1000",
     "alpha_u = { uniform = [1.0, 2.0], values = [1.0] }": "vary.alpha_u: must have one of normal, lognormal, uniform,",
     "F_l.uniform = [1.0, 2.0]": "vary.F_l: it cannot be set, because the FMU computes it",
+    "alpha_u = {}": "vary.alpha_u: must have one of normal, lognormal, uniform, values, range",
+    "alpha_u.uniform = [1.0, 1.0]": "vary.alpha_u.uniform = [1.0, 1.0]: must be [low, high]",
+    "alpha_u.normal = { mean = -1.0, sd = 1.0 }": "vary.alpha_u = -1.0: must be within 0 ... 1000",
+    "m_rov.lognormal = { median = 1e7, sd = 1.0 }": "vary.m_rov = 10000000.0: must be within 0.001 ... 1000000 kg",
+    "u_l.values = [1.0, -2.0]": "vary.u_l = -2.0: must be within -1 ... 1",
+    "u_l.range = { from = 0.0, to = 1.0, count = 1 }": "vary.u_l.range.count = 1: must be greater than or equal to 2",
 }
 """Entries of [vary]."""
 TABLES = {
@@ -62,7 +78,13 @@ TABLES = {
     "[inputs]\nu_l.steps = [[0.2, 0.5], [0.55, 0.0]]": (
         "inputs.u_l = [0.55, 0.0]: a jump, as from 0.5 here, must be at a communication point, a multiple of step"
     ),
+    "[inputs]\nu_l = {}": "inputs.u_l: must have either steps or ramps",
+    "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.55, 0.5], [0.55, 0.0]]": "inputs.u_l = [0.55, 0.0]: a jump, as from",
     '[keep]\noutputs = ["u", "u"]': "keep.outputs = ['u', 'u']: must name each variable once",
+    '[keep]\noutputs = ["q"]': "keep.outputs: the FMU has no variable 'q' that is a number",
+    '[keep]\noutputs = ["u"]\nevery = 0.1\nat = [0.5]': "keep: must have either every or at",
+    '[keep]\noutputs = ["u"]\nat = [0.5, 0.5]': "keep.at = [0.5, 0.5]: must be times in ascending order",
+    '[keep]\noutputs = ["u"]\nat = [-0.1]': "keep.at = [-0.1]: must be times from the start to the end",
     '[keep]\noutputs = ["u"]\nevery = 2.0': "keep.every = 2.0: must not be longer than a run",
     '[keep]\noutputs = ["u"]\nevery = 0.25': "keep.every = 0.25: must be a multiple of step = 0.1",
     '[keep]\noutputs = ["u"]\nat = [0.5, 1.1]': "keep.at = [0.5, 1.1]: must be times from the start to the end",
@@ -78,6 +100,15 @@ FIGURES = {
     'end = "u"': "figures.end = 'u': must be one number, and not an array",
     'end = "max"': "figures.end = 'max': max is a function: write max(...)",
     'end = "out[0]"': "figures.end = 'out[0]': out gives a variable by its name: write out[\"der(u)\"]",
+    'end = "u[-12]"': "figures.end = 'u[-12]': IndexError: index -12 is out of bounds for axis 0 with size 11",
+    f'end = "1{" " * 2000}"': "figures.end = ",
+    'end = "at(u)"': "figures.end = 'at(u)': at takes 2 values (y, time), each once, and not 1",
+    'end = "round(1, 2, 3)"': "figures.end = 'round(1, 2, 3)': round takes 1 to 2 values, each once, and not 3",
+    'end = "round(1, 400)"': "figures.end = 'round(1, 400)': ValueError: decimals must be within -300 ... 300",
+    'end = "at(u, when=1)"': "figures.end = 'at(u, when=1)': at has no parameter named when",
+    'end = "meen(u)"': "figures.end = 'meen(u)': 'meen' is neither a function nor a variable of the FMU; did you",
+    'end = "where(u)"': "figures.end = 'where(u)': where with one value gives a tuple of one array: write",
+    'status = "u[-1]"': "figures.status: the results have another column of this name",
     'alpha_u = "u[-1]"': "figures.alpha_u: the results have another column of this name",
 }
 """Entries of [figures]."""
@@ -131,6 +162,51 @@ def test_a_path_that_does_not_stay_in_the_folder_of_the_plan_is_refused(
     for key, line in zip(keys, lines, strict=True):
         assert line.startswith(f"{plan}: {key} = ")
         assert message in line
+
+
+def test_variables_have_the_type_bounds_unit_and_start_of_the_description(
+    model: Model, foreign: Callable[..., Path]
+) -> None:
+    mass, has = model.variables["m_rov"], read_model(foreign()).variables
+    assert mass == Variable(
+        "m_rov", mass.reference, "Real", "parameter", True, False, 1e-3, 1e6, "kg", 6.57, "Mass m_rov"
+    )
+    assert {name: v.start for name, v in has.items()} == {
+        **dict.fromkeys("abcuy", 0.0),
+        "gain": 1.0,
+        "mode": 0.0,
+        "fast": 0.0,
+    }
+    assert (has["u"].minimum, has["u"].maximum, has["u"].unit, has["u"].is_continuous) == (-inf, inf, "1", True)
+    assert [has["fast"].wrong(x) for x in (0.0, 1.0, 0.5)] == ["", "", "must be true or false, or 1 or 0"]
+    assert [has["gain"].wrong(x) for x in (2.0, 0.5)] == ["", "must be a whole number"]
+    assert (has["a"].wrong(10.0), has["a"].wrong(10.1)) == ("", "must be within -10 ... 10")
+
+
+def test_angles_of_an_attitude_are_recorded_and_a_plan_is_the_same_whatever_does_not_change_a_run(
+    tmp_path: Path,
+) -> None:
+    plan, kind = tmp_path / "plan.toml", Variable("", 0, "Real", "output", True, True, -inf, inf, "1", 0.0)
+    (tmp_path / "v.fmu").touch()
+    head = 'fmu = "v.fmu"\nstop_time = 1.0\nstep = 0.1\n'
+    tail = '[vary]\na.uniform = [0.0, 1.0]\n[figures]\nend = "b[-1]"\n'
+
+    def prepared(lines: str, names: Sequence[str] = "ab") -> Prepared:
+        plan.write_text(head + lines + tail)
+        has = {name: replace(kind, name=name) for name in names}
+        return prepare(load_plan(plan), plan, Model("v.fmu", b"", 2, has))
+
+    with_attitude = prepared("runs = 9\n", [*"ab", "phi", "theta", "psi"]).job
+    assert (with_attitude.angles, with_attitude.recorded) == (("phi", "theta"), ["b", "phi", "theta"])
+    assert prepared("runs = 9\n", [*"ab", "phi", "theta"]).job.angles == ()
+    found = prepared("runs = 9\n")
+    assert (len(found.job.trials), *found.warnings) == (
+        8,
+        "v.fmu has no inputs: its parameters and start values alone determine its runs",
+    )
+    assert prepared('runs = 5\ntitle = "T"\ntime_limit = 1\n').mark == found.mark
+    hypercube = 'sampler = "latin-hypercube"\n'
+    assert prepared(f"runs = 5\n{hypercube}").mark != prepared(f"runs = 9\n{hypercube}").mark
 
 
 def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ from distributed import LocalCluster
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.study import Progress, Results, study
+from rov_fmu.study.plan.model import read_model
+from rov_fmu.study.plan.plan import load_plan
+from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.results.store import Store
+from rov_fmu.study.run.child import Child
 from tests.commands import start, without_progress
 from tests.folders import beside
 
@@ -69,7 +75,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results
     return study(_plan(folder, foreign()), folder / "results", workers=1)
 
 
-def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
+def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     runs = whole.runs
     assert runs.index.tolist() == [*range(40)]
     assert {*runs.status} == {"done"}
@@ -82,6 +88,9 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
         y: Any = _expected(runs, t)
         assert part.y.to_numpy() == pytest.approx(y.to_numpy(), rel=1e-12)
         assert [bands[q][t] for q in bands] == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
+    monkeypatch.setattr("rov_fmu.study.results.results._AT_ONCE", 100)
+    pd.testing.assert_frame_equal(whole.bands("y", (0.0, 0.5, 1.0)), bands)
+    assert whole.trajectories([3, 5]).run.tolist() == [3] * 5 + [5] * 5
 
 
 @pytest.mark.long
@@ -110,12 +119,18 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
-    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1]", more='bad = "1/(mode - mode)"')
-    results = study(plan, tmp_path / "results", scheduler=scheduler)
-    failed, others = results.runs[results.runs["mode"] == 1], results.runs[results.runs["mode"] == 0]
+    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1, 6, 7, 8]", more='bad = "1/(mode - mode)"')
+    progress: list[Progress] = []
+    results = study(plan, tmp_path / "results", scheduler=scheduler, on_progress=progress.append)
+    failed, others = results.runs[results.runs["mode"] > 0], results.runs[results.runs["mode"] == 0]
     assert 0 < len(failed) < 30
     assert {*failed.status} == {"failed"}
-    assert {*failed.reason} == {"the step at 1 s: error; the FMU: the pump is blocked"}
+    assert {*zip(failed["mode"], failed.reason, strict=True)} == {
+        (1, "the step at 1 s: error; the FMU: the pump is blocked"),
+        (6, "setting the inputs at 1 s: discard"),
+        (7, "reading at 0.1 s: discard"),
+        (8, "initialization: error"),
+    }
     assert failed[["end", "sooner"]].isna().all(axis=None)
     table = pq.read_table(tmp_path / "results" / "runs")
     assert [table[name].null_count for name in ("end", "bad")] == [len(failed), 30]
@@ -123,6 +138,24 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     assert {*others.reason} == {"bad: ZeroDivisionError: division by zero"}
     assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
     assert {*results.trajectories().run} == {*others.index}
+    assert [progress[0].failed, progress[-1].failed] == [0, len(failed)]
+    assert [*results.failed.index, *results.incomplete.index] == [*failed.index, *others.index]
+
+
+def test_a_run_that_ends_its_process_fails_and_the_next_runs_tell_whether_the_vehicle_turned_over(
+    foreign: Foreign, tmp_path: Path
+) -> None:
+    """The output stands for an angle: with a = 2, it passes 90 degrees."""
+    plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]"), tmp_path / "unpacked"
+    job = prepare(load_plan(plan), plan, read_model(foreign())).job
+    job.model.unpack(folder)
+    child = Child(str(folder), replace(job, angles=["y"], trials=np.zeros((1, 4))))
+    (failed,) = child.runs(np.array([[0.0, 0.0, 0.0, 2.0]]))
+    assert (failed.status, failed.reason, failed.turned) == ("failed", "the FMU ended its process: SIGABRT", False)
+    assert np.isnan(failed.figures).tolist() == [True, True]
+    runs = child.runs(np.array([[2.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]))
+    child.close()
+    assert [(run.status, run.reason, run.turned) for run in runs] == [("done", "", True), ("done", "", False)]
 
 
 LIMIT = 2.0
@@ -155,7 +188,10 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     results = tmp_path / "results"
     study(_plan(tmp_path, foreign(), runs=16), results, scheduler=scheduler)
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
+    for draft in ("trajectories/part-000000090-000000099.parquet", "runs/.part-000000090-000000099.parquet.abc.part"):
+        (results / draft).write_bytes(b"of a process that was killed")
     _same(study(_plan(tmp_path, foreign(), runs=40, limit=99.0), results, scheduler=scheduler), whole)
+    assert not [*results.glob("*/*part-000000090*")]
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
     others = {
@@ -169,6 +205,21 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
         assert line.startswith(f"rov-fmu: {results}: {reason}")
         assert line.count("\n") == 1
     _same(Results(results), whole)
+
+
+def test_a_folder_of_another_vehicle_or_without_its_description_is_refused(tmp_path: Path) -> None:
+    store = Store(tmp_path / "results")
+    with store.held():
+        store.belongs_to({}, "1", "rov", 9)
+        store.write(2, 4, b"", None)
+        assert store.missing(9) == [(0, 2), (4, 9)]
+        with pytest.raises(
+            FileError, match="another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"
+        ):
+            store.belongs_to({}, "2", "rov", 9)
+        (store.folder / "study.json").unlink()
+        with pytest.raises(FileError, match=r"has runs, but study\.json, which describes them, is missing"):
+            store.belongs_to({}, "1", "rov", 9)
 
 
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from cycler import cycler
 from lxml import etree
 from markupsafe import Markup
+from matplotlib import rc_params_from_file
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -39,40 +40,20 @@ KNOTS = 3600.0 / 1852.0
 """Knots in 1 m/s."""
 _IN_KNOTS: Any = partial(mul, KNOTS), partial(mul, 1.0 / KNOTS)
 """The functions from m/s to knots and back."""
-_PAD = 3.5
-"""The distance of the numbers from an axis, points."""
 _FONTS = "system-ui, sans-serif"
 STYLE: Any = {
-    "svg.fonttype": "none",
-    "font.family": "DejaVu Sans",
-    "mathtext.fontset": "dejavusans",
-    "text.parse_math": False,  # names and units may come from anyone; `with_formulas` marks our own formulas
-    "font.size": 9.5,
-    "axes.facecolor": "none",
+    **rc_params_from_file(Path(__file__).with_name("plots.mplstyle"), use_default_template=False),
     "axes.prop_cycle": cycler(color=[LIGHT[role] for role in LINES]),
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.8,
     "axes.edgecolor": LIGHT["muted"],
     "axes.labelcolor": LIGHT["muted"],
-    "axes.grid": True,
-    "axes.axisbelow": True,
     "axes.titlecolor": LIGHT["ink"],
     "grid.color": LIGHT["rule"],
-    "grid.linewidth": 0.6,
-    "xtick.major.pad": _PAD,
-    "ytick.major.pad": _PAD,
-    "xtick.bottom": False,
-    "ytick.left": False,
     "xtick.color": LIGHT["muted"],
     "ytick.color": LIGHT["muted"],
     "text.color": LIGHT["ink"],
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "legend.handlelength": 1.8,
 }
+_PAD: float = STYLE["xtick.major.pad"]
+"""The distance of the numbers from an axis, points."""
 _NO_XML = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f]|\xef\xbf[\xbe\xbf]")
 """The characters of a text that XML does not allow."""
 _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
@@ -126,11 +107,11 @@ def add_knots(ax: Axes, along: Literal["x", "y"], gap: float = 0.0) -> None:
     axis.set_major_locator(MaxNLocator(5))
 
 
-def add_legend(figure: Figure, columns: int = 2) -> None:
+def add_legend(figure: Figure) -> None:
     """Add one legend for all panels below them, where it hides nothing, if a line or an area has a name."""
     named = {label: look for ax in figure.axes for look, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if named:
-        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns, columnspacing=1.0)
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2, columnspacing=1.0)
 
 
 def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = "1") -> None:
@@ -150,13 +131,13 @@ def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = 
     ax.locator_params("y", nbins=4)
 
 
-def with_even_text(draw: Draw, size: float = STYLE["font.size"]) -> Draw:
-    """Return a function that draws the same figure with all text in one size, in points."""
+def with_even_text(draw: Draw) -> Draw:
+    """Return a function that draws the same figure with all text in one size."""
 
     def drawn(figure: Figure) -> None:
         draw(figure)
         for text in figure.findobj(Text):
-            text.set_fontsize(size)
+            text.set_fontsize(STYLE["font.size"])
 
     return drawn
 

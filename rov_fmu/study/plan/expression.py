@@ -43,6 +43,14 @@ class ExpressionError(ValueError):
     """A text is not an expression that a figure may have; the message is the reason."""
 
 
+class BeyondError(IndexError):
+    """An array has no such index; `length` is its length."""
+
+    def __init__(self, index: int, length: int) -> None:
+        super().__init__(f"index {index} is out of bounds for axis 0 with size {length}")
+        self.length = length
+
+
 @dataclass(frozen=True)
 class Function:
     """A function that an expression may call."""
@@ -298,13 +306,15 @@ def _slice(array: _Value, *ends: _Value) -> _Value:
 def _index(array: _Value, index: _Value) -> _Value:
     """Return the part of an array that has an index: a whole number, an array of these, or an array of Booleans."""
     array = _array(array)
-    if not isinstance(index, np.ndarray):
-        return array[_whole_number(index)]
-    if index.dtype.kind == "b":
+    if isinstance(index, np.ndarray) and index.dtype.kind == "b":
         return array[index]
-    whole = index.astype(np.intp)
-    if not (whole == index).all():
+    whole: Any = index.astype(np.intp) if isinstance(index, np.ndarray) else _whole_number(index)
+    if not np.all(whole == index):
         raise IndexError("an index must be a whole number")
+    beyond = np.atleast_1d(whole)
+    beyond = beyond[(beyond < -len(array)) | (beyond >= len(array))]
+    if beyond.size:
+        raise BeyondError(beyond[0], len(array))
     return array[whole]
 
 

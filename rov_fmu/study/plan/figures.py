@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
 from rov_fmu.io.messages import brief
-from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, Expression, Function
+from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, BeyondError, Expression, Function
 
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
@@ -163,6 +163,8 @@ def _number(expression: Expression, values: Mapping[str, Any]) -> float:
         raise _NoNumberError("ZeroDivisionError: division by zero") from error
     except TimeError as error:
         raise _NoNumberError(str(error)) from error
+    except BeyondError as error:
+        raise _NoNumberError(brief(f"IndexError: {error}")) from error
     except Exception as error:  # NumPy raises many kinds
         raise _NoNumberError(brief(f"{type(error).__name__}: {error}")) from error
     if isinstance(value, np.ndarray):
@@ -187,11 +189,11 @@ def unusable(text: str, variables: Iterable[str], varied: Collection[str], times
         try:
             _number(expression, values)
         except _NoNumberError as error:
-            numbers = expression.names.intersection(varied)
-            if numbers and isinstance(error.__cause__, TypeError):
+            cause, numbers = error.__cause__, expression.names.intersection(varied)
+            if numbers and isinstance(cause, TypeError):
                 return f"{error}; {min(numbers)} varies, and what varies is a number"
             # No operation gives an array that is longer than a run.
-            beyond = isinstance(error.__cause__, IndexError) and f"{error}".endswith(f" size {len(times)}")
-            if beyond or isinstance(error.__cause__, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
+            beyond = isinstance(cause, BeyondError) and cause.length == len(times)
+            if beyond or isinstance(cause, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
                 return str(error)
     return ""

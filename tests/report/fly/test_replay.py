@@ -4,13 +4,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from rov_fmu.bridges import mcap
 from rov_fmu.cli import main
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.report.conftest import until
+from tests.report.conftest import flown_vehicle, until
 from tests.report.test_live import a_recording
 from tests.tank.readers.motion import DIVE
 from tests.tank.readers.writers import LOGS
@@ -113,12 +115,9 @@ def test_a_log_of_each_format_is_flown_to_its_end(suffix: str, tmp_path: Path, r
     assert "The prediction is off by" in page.inner_text("#live-message")
 
 
-@pytest.mark.interop
-def test_the_bands_and_the_unknown_force_of_the_identification_are_charts(
-    csv: Path, tmp_path: Path, replay: Callable[..., Any]
-) -> None:
-    mcap = pytest.importorskip("rov_fmu.bridges.mcap")
-    pytest.importorskip("foxglove")
+@pytest.fixture
+def identified(csv: Path, tmp_path: Path) -> Path:
+    """What `identify --mcap` writes: a band of the depth from 5 s on, and the unknown force of heave."""
     number = mcap.Number("m", "a number")
     written = mcap.Recording({"name": "VideoRay"})
     name = topic_name(csv.name)
@@ -129,7 +128,48 @@ def test_the_bands_and_the_unknown_force_of_the_identification_are_charts(
         depth(n * 100_000_000, {"measured": 0.0} | band)
         force(n * 100_000_000, {"force": 0.02 * n, "low": 0.02 * n - 0.5, "high": 0.02 * n + 0.5})
     (tmp_path / "logs.mcap").write_bytes(written.content())
-    page = replay(csv, "--identified", str(tmp_path / "logs.mcap"))
+    return tmp_path / "logs.mcap"
+
+
+def test_a_recording_has_commands_measurements_bands_and_the_unknown_force(
+    csv: Path, identified: Path, vehicle: Vehicle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 200 samples of a quantity, every second is flown where more than 100 are too many."""
+    monkeypatch.setattr("rov_fmu.report.page.recording._MOST_SAMPLES", 100)
+    found = recording_of(csv, vehicle, identified)
+    columns = np.loadtxt(csv, delimiter=",", skiprows=1).T
+    _, depth, heading = found["signals"]
+    assert [(one["axis"], one["quantity"], one["isPosition"]) for one in found["signals"]] == [
+        *((0, "surge velocity", False), (1, "depth", True), (2, "heading", True))
+    ]
+    assert depth["times"] == pytest.approx(0.2 * np.arange(100))
+    assert depth["values"] == pytest.approx(columns[5][::2], abs=1e-8)
+    assert np.sin(heading["values"]) == pytest.approx(np.sin(np.radians(columns[6][::2])), abs=1e-8)
+    held = np.searchsorted(found["times"], 10.0, side="right") - 1
+    assert found["commands"]["u_t"][held] == pytest.approx(0.01 * columns[3][100])
+    assert depth["band"]["times"] == pytest.approx(0.1 * np.arange(50, 200))
+    assert depth["band"]["values"] == pytest.approx(0.01 * np.arange(50, 200))
+    (force,) = found["forces"]
+    assert (force["axis"], force["band"]["values"]) == (1, pytest.approx([0.5] * 200))
+    assert force["values"] == pytest.approx(0.02 * np.arange(200))
+    assert force["times"] == force["band"]["times"] == pytest.approx(0.1 * np.arange(200))
+    (tmp_path / "log_heave.csv").write_text("time [s],command [%],z [m]\n0,30,0\n1,-50,1\n2,-50,2\n", encoding="utf-8")
+    commands = recording_of(tmp_path / "log_heave.csv", vehicle)["commands"]
+    assert [commands[name][:2] for name in ("u_l", "u_r", "u_t")] == [[0.0, 0.0], [0.0, 0.0], [0.3, -0.5]]
+    with_mix = flown_vehicle("everything")
+    titles = [f"thruster {t.name} [%]" for t in with_mix.layout.thrusters]
+    given = [100.0 * with_mix.layout.gains[t.name].get("u_sway", 0.0) * 0.4 for t in with_mix.layout.thrusters]
+    rows = [",".join(map(str, (n, *given, n))) for n in range(5)]
+    (tmp_path / "mixed.csv").write_text("\n".join([",".join(["time [s]", *titles, "depth [m]"]), *rows]), "utf-8")
+    mixed = {name: values[0] for name, values in recording_of(tmp_path / "mixed.csv", with_mix)["commands"].items()}
+    assert mixed == pytest.approx(dict.fromkeys(with_mix.layout.commands, 0.0) | {"u_sway": 0.4}, abs=1e-9)
+
+
+@pytest.mark.interop
+def test_the_bands_and_the_unknown_force_of_the_identification_are_charts(
+    csv: Path, identified: Path, replay: Callable[..., Any]
+) -> None:
+    page = replay(csv, "--identified", str(identified))
     page.evaluate("() => { live.flight.seek(15); live.draw(); }")
     assert page.text_content("#live-chart-heave .marks").endswith("± 1.50")
     page.select_option("#live-view", "force")

@@ -1,0 +1,147 @@
+"""The plots of a vehicle: its thrusters from above and from starboard, its thrust, and its velocities."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from decimal import Decimal
+from itertools import combinations
+from math import ceil, exp, hypot, sin
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
+
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.report.page.fmu_page import plot_steady, plot_steps
+from rov_fmu.report.plots.drawing import draw_thrusters
+from rov_fmu.report.plots.geometry import place, scenes
+from rov_fmu.report.plots.steps import draw_curve, held_commands, tables_by_axis
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.report.plots.test_identification import bars, lines
+from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY
+
+ONE = VEHICLES["yaw only"]
+
+
+def panel(draw: Callable[..., None], *given: Any, size: tuple[float, float] = (3.7, 2.9)) -> Axes:
+    """Return the panel that a function draws, laid out."""
+    figure = Figure(figsize=size, layout="constrained")
+    draw(ax := figure.subplots(), *given)
+    figure.draw_without_rendering()
+    return ax
+
+
+# ---- Thrusters -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("view", ["from above", "from starboard"])
+@pytest.mark.parametrize("vehicle", [VIDEORAY, SIX, ONE], ids=["VideoRay", "six axes", "yaw only"])
+def test_a_drawing_holds_its_arrows_and_names_which_do_not_cover_each_other(vehicle: Vehicle, view: str) -> None:
+    """An arrow points along its force; y and z are down. Its name is within 0.35 inches of its end, beside the axes."""
+    scene = scenes(vehicle)[view]
+    size, (down, sight, sign) = scene.size, (1, 2, -1.0) if view == "from above" else (2, 1, 1.0)
+    ax = panel(draw_thrusters, vehicle, scene, size=scene.inches)
+    boxes = {text.get_text(): text.get_window_extent() for text in ax.texts if text.get_text()}
+    for text, box in boxes.items():
+        assert min(box.x0, box.y0) >= 0.0, text
+        assert box.x1 <= ax.figure.bbox.x1, text
+        assert box.y1 <= ax.bbox.y1, text
+        assert sum(box.overlaps(other) for other in boxes.values()) == 1, text
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    tips = [text.xy for text in ax.texts if isinstance(text, Annotation)]
+    assert all(left < x < right and high < y < low for x, y in tips)
+    axes = ax.transData.transform([(1.4 * n * size, 0.0) for n in np.linspace(0.0, 1.0, 200)])
+    for thruster in vehicle.layout.thrusters:
+        at, d = place(vehicle, thruster), thruster.direction.value
+        assert max(map(abs, at)) <= size
+        (mark,) = (mark for mark in scene.marks if f"$F_{{{thruster.name}}}$" in mark.label)
+        assert (*mark.at, *mark.along) == pytest.approx((at[0], at[down], d[0], d[down]), abs=1e-3)
+        assert mark.toward == pytest.approx(sign * d[sight] if abs(d[sight]) > 0.995 else 0.0)
+        assert (mark.tip(size) in tips) is not bool(mark.toward)
+        box, (x, y) = boxes[mark.label], ax.transData.transform(mark.at if mark.toward else mark.tip(size))
+        assert hypot(max(box.x0 - x, x - box.x1, 0.0), max(box.y0 - y, y - box.y1, 0.0)) < 35.0
+        assert not any(box.contains(*point) for point in axes)
+
+
+def test_the_arm_of_the_paper_stands_where_its_torque_says() -> None:
+    """(4): x F_y - y F_x of a force ahead is ±R sin γ, behind the centre of mass. The drawing has R, γ and a scale."""
+    k = VIDEORAY
+    for thruster, side in zip(k.layout.thrusters[:2], (1.0, -1.0), strict=True):
+        x, y, _ = place(k, thruster)
+        assert x < 0.0
+        assert hypot(x, y) == pytest.approx(k["R"])
+        assert -y == pytest.approx(side * k["R"] * sin(k["gamma"]))
+    texts = {text.get_text() for text in panel(draw_thrusters, k, scenes(k)["from above"]).texts}
+    forces = ("$F_{l}$", "$F_{r}$", "$F_{t}$")
+    assert texts == {"", "$R$", r"$\gamma$", "$x, u$", "$y$", r"$\psi, r$", *forces, "0.1 m"}
+
+
+# ---- Over the command and over time ----------------------------------------------------------------------------------
+
+
+def test_the_plot_of_thrust_has_its_dead_band() -> None:
+    """The thrust is a_t m^2 + b_t m, where m is what the command exceeds the dead band by."""
+    k, m = HEAVY, 0.5 - HEAVY["c_0_t200"]
+    ax = panel(draw_curve, k, *k.layout.curves)
+    commands, force = np.array(ax.lines[0].get_data())
+    for command, end, sign in ((50.0, "", 1.0), (-50.0, "_reverse", -1.0)):
+        expected = sign * (k[f"a_t_t200{end}"] * m**2 + k[f"b_t_t200{end}"] * m)
+        assert force[commands == command] == pytest.approx([expected])
+    assert (commands.min(), commands.max()) == ax.get_xlim() == (-100.0, 100.0)
+    assert not force[abs(commands) <= 8.72].any()
+    assert bars(ax)[0][:2] == pytest.approx((-8.72, 17.44))
+
+
+def test_the_plots_of_velocities_have_the_model_what_was_measured_degrees_and_knots() -> None:
+    """Table 7 prints 2.82 rad/s in yaw at 50 %, and 2.61 rad/s and 1.41 s of the test.
+
+    a_d V^2 + b_d V = alpha F gives 2.8544 rad/s, and 2.5744 rad/s without alpha.
+    """
+    tables, degrees = tables_by_axis(VIDEORAY), 180.0 / np.pi
+    turning, ahead = (panel(plot_steady, VIDEORAY, axis, tables[axis.name]) for axis in (YAW, SURGE))
+    for label, V in (("tuned", 2.8544), ("without tuning", 2.5744), ("measured", 2.61)):
+        assert dict(zip(*lines(turning)[label], strict=True))[50.0] == pytest.approx(V * degrees, rel=1e-4)
+    assert turning.get_title(loc="left") == "Steady yaw velocity (°/s)"
+    assert (turning.get_xlim(), turning.get_ylim()[0], turning.child_axes) == ((0.0, 100.0), 0.0, [])
+    (knots,) = ahead.child_axes
+    assert knots.get_ylim()[1] == pytest.approx(ahead.get_ylim()[1] * 3600.0 / 1852.0)
+    assert bars(turning)[0][:2] == pytest.approx((20.0, 50.0))
+    steps = panel(plot_steps, VIDEORAY, YAW, held_commands(VIDEORAY, tables.values()), tables["yaw"])
+    assert steps.get_title(loc="left") == "Yaw velocity after a step (°/s)"
+    assert [text.get_text() for text in steps.texts] == ["20 %", "30 %", "50 %", "70 %"]
+    (t, v), V_ss, Tau = (np.array(line.get_data()) for line in steps.lines[6:9])
+    assert (t[0], v[0], t[-1]) == (0.0, 0.0, ceil(3.3 * 3.1302))
+    assert [v[-1], np.interp(1.5031, t, v)] == pytest.approx(
+        2.8544 * degrees * np.array([1.0, 1.0 - exp(-1.0)]), rel=5e-3
+    )
+    assert [*V_ss[1], *Tau[:, 0]] == pytest.approx(
+        [2.61 * degrees, 2.61 * degrees, 1.41, (1.0 - exp(-1.0)) * 2.61 * degrees]
+    )
+
+
+def test_directions_that_differ_and_lines_near_each_other_are_told_apart() -> None:
+    assert not panel(plot_steady, ONE, YAW, None).patches, "it holds for every command"
+    narrow = panel(plot_steady, replace(HEAVY, command_range=(0.2, 0.7)), HEAVE, None)
+    assert [bar[:2] for bar in bars(narrow)] == [(20.0, 50.0), (-70.0, 50.0)]
+    assert narrow.get_xlim() == (-100.0, 100.0)
+    assert narrow.get_ylim()[0] < 0.0
+    steps = panel(plot_steps, HEAVY, HEAVE, [*map(Decimal, (10, 12, 100))], None)
+    assert [text.get_text() for text in steps.texts] == ["−100 %", "−12 %", "−10 %", "10 %", "12 %", "100 %"]
+    boxes = [text.get_window_extent() for text in steps.texts]
+    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
+    (knots,) = steps.child_axes
+    numbers = [label.get_window_extent() for label in knots.get_yticklabels()]
+    assert not any(box.overlaps(number) for box in boxes for number in numbers)
+
+
+def test_step_responses_have_commands_of_all_tables_or_even_tens() -> None:
+    for ends, commands in {
+        (0.1, 1.0): (10, 40, 70, 100),
+        (0.2, 0.7): (20, 40, 50, 70),
+        (0.001, 0.002): (1,),
+        (0.41, 0.48): (41, 43, 46, 48),
+    }.items():
+        assert held_commands(replace(VIDEORAY, command_range=ends), ()) == [*map(Decimal, commands)]
+    assert held_commands(VIDEORAY, tables_by_axis(VIDEORAY).values()) == [*map(Decimal, (20, 30, 50, 70))]
