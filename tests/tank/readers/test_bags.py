@@ -29,7 +29,7 @@ def told(log: Read) -> tuple[str, ...]:
 def test_a_bag_is_read_in_si_units_and_in_the_frames_of_the_sea(ned: bool, tmp_path: Path) -> None:
     """Frames that are named ned are those already."""
     log = read_log(Ros(2).write(tmp_path, messages_of(Ros(2), DIVE, ned=ned)), BLUEROV2)
-    motion.check(log.log, has_distance=True)
+    motion.check(log.log)
     assert told(log) == (
         "dive.db3: the commands of the thrusters are those of /thrusters",
         "dive.db3: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "

@@ -20,6 +20,9 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.readers.bags import _RC_OUT
 
+RATES = np.array([0.1, -0.2, 0.3])
+"""The velocities in roll, pitch and yaw that logs state beside the angles, rad/s."""
+
 
 @dataclass
 class Dive:
@@ -68,13 +71,13 @@ def table(path: Path, titles: str, *columns: Array) -> Path:
 
 
 TITLES = ["time [s]", *(f"u_{n} [us]" for n in range(1, 7)), "depth [m]", "roll [rad]", "pitch [rad]", "heading [rad]"]
-TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "voltage [V]"]
+TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "heave velocity [m/s]", "voltage [V]"]
 MATLAB = {f"c{n}": title for n, title in enumerate(TITLES)}
 """The names of variables and what they stand for."""
 
 
 def columns(dive: Dive) -> list[Array]:
-    moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity[:, :2].T, dive.voltage]
+    moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity.T, dive.voltage]
     return [dive.start + dive.time, *dive.pulses.T, *moved]
 
 
@@ -135,7 +138,8 @@ def _mavlink(dive: Dive) -> Iterator[tuple[float, str, dict[str, float]]]:
         yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6), "port": 0, **servos}
         boot = {"time_boot_ms": round(time * 1e3)}
         angles = dict(zip(("roll", "pitch", "yaw"), dive.euler[n].tolist(), strict=True))
-        yield time, "ATTITUDE", {**boot, **angles, "rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
+        rates = dict(zip(("rollspeed", "pitchspeed", "yawspeed"), RATES, strict=True))
+        yield time, "ATTITUDE", {**boot, **angles, **rates}
         local = [*dive.position[n].tolist(), *dive.over_ground[n].tolist()]
         yield time, "LOCAL_POSITION_NED", {**boot, **dict(zip(("x", "y", "z", "vx", "vy", "vz"), local, strict=True))}
         yield time, "SYS_STATUS", {"voltage_battery": round(1000.0 * dive.voltage[n])}
@@ -282,7 +286,7 @@ def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: boo
             log.message(velocity, time, *dive.position[n], *dive.over_ground[n], True)
         else:
             frame, moved = (3, dive.velocity) if velocity == "body" else (1, dive.over_ground)
-            log.message("vehicle_odometry", time, *dive.position[n], *moved[n], 0.0, 0.0, 0.3, frame)
+            log.message("vehicle_odometry", time, *dive.position[n], *moved[n], *RATES, frame)
         log.message("battery_status", time, dive.voltage[n])
         log.message("cpuload", time, 0.5)
     return log
@@ -343,11 +347,12 @@ class Ros:
             "geometry_msgs/msg/Quaternion", **dict(zip("xyzw", Rotation.from_matrix(R).as_quat().tolist(), strict=True))
         )
 
-    def odometry(self, header: Any, place: Iterable[float], R: Any, velocity: Iterable[float]) -> Any:
+    def odometry(self, header: Any, place: Iterable[float], R: Any, *velocities: Iterable[float]) -> Any:
         pose = self.message(
             "geometry_msgs/msg/Pose", position=self.vector("Point", place), orientation=self.quaternion(R)
         )
-        twist = self.message("geometry_msgs/msg/Twist", linear=self.vector("Vector3", velocity))
+        linear, angular = (self.vector("Vector3", velocity) for velocity in velocities)
+        twist = self.message("geometry_msgs/msg/Twist", linear=linear, angular=angular)
         return self.message(
             "nav_msgs/msg/Odometry",
             header=header,
@@ -384,7 +389,8 @@ def messages_of(
     earth, body = (np.eye(3), np.eye(3)) if ned else (ENU, FLU)
     for n, (time, R) in enumerate(zip(dive.time, dive.rotation, strict=True)):
         header = ros.header(time, "world_ned" if ned else "world")
-        yield "/odom", time, ros.odometry(header, earth @ dive.position[n], earth @ R @ body, body @ dive.velocity[n])
+        pose, velocities = (earth @ dive.position[n], earth @ R @ body), (body @ dive.velocity[n], body @ RATES)
+        yield "/odom", time, ros.odometry(header, *pose, *velocities)
         yield "/thrusters", time, commands(ros, dive, n)
         battery = ros.message("sensor_msgs/msg/BatteryState", header=ros.header(time), voltage=dive.voltage[n])
         yield "/battery", time, battery
