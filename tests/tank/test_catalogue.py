@@ -55,7 +55,7 @@ def test_signs_and_units_of_messages(kind: str, field: str, number: float, quant
     assert value == pytest.approx(expected, rel=1e-9, nan_ok=True)
 
 
-LARGEST = {
+LARGEST: dict[str, dict[float, str | None]] = {
     "Depth": {100.0: "depth [m]", 101.0: "depth [cm]", 10_001.0: "depth [mm]"},
     "yaw": {2.1 * pi: "heading [rad]", 6.6: "heading [deg]"},
     "roll": {pi: "roll angle [rad]", 3.2: "roll angle [deg]"},

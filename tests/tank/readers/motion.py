@@ -1,6 +1,7 @@
 """The dive that most tests of log formats write, and what must be read of it."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,13 +36,15 @@ DIVE = Dive(
 
 
 NO_RATES = {"roll velocity", "pitch velocity", "yaw velocity"}
-LACKING = {writers.flash: NO_RATES, writers.ulog: NO_RATES}
-LACKING |= dict.fromkeys((writers.csv, writers.mat), {*NO_RATES, "distance"})
+LACKING: dict[Callable[[Path, Dive], Path], set[str]] = {
+    **dict.fromkeys((writers.flash, writers.ulog), NO_RATES),
+    **{writer: {*NO_RATES, "distance"} for writer in (writers.csv, writers.mat)},
+}
 """The quantities that the logs of some writers do not have."""
 
 
 def expected(dive: Dive = DIVE) -> dict[str, tuple[Array, float]]:
-    """Return what the sensors measure, and the resolution of the formats: 0.01 degrees, 1 mV, and numbers of 32 bits."""
+    """Return what the sensors measure, within the resolution of the formats: 0.01 degrees, 1 mV, numbers of 32 bits."""
     axes = ("surge", "sway", "heave"), ("roll", "pitch", "yaw")
     rates = np.tile(RATES, (len(dive.time), 1))
     return {

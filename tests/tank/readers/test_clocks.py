@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import restart_rows, usual_delay
 from rov_fmu.tank.columns import Names, names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
@@ -58,6 +60,28 @@ def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
         assert depth.values == pytest.approx(motion.DEPTH[part])
         assert log.commands is not None
         assert log.commands.at(log.commands.rows)[:, 5] == pytest.approx(motion.THRUSTERS["6"][part], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("later", "rows"),
+    [
+        (np.arange(10.0), [40]),
+        (np.arange(9.0), []),  # too few
+        (10.0 + 2.0 * np.arange(10), [40]),
+        (10.5 + 0.8 * np.arange(10), []),  # less than half of the times come again
+        (np.arange(-10.0, 0.0), [40]),
+        (np.tile(np.arange(14.0), 2), [40, 54]),
+    ],
+)
+def test_a_restart_is_ten_messages_of_times_that_come_again_or_are_all_earlier(later: Array, rows: list[int]) -> None:
+    before = np.append(2.0 * np.arange(20), 100.0 + np.arange(20))
+    assert restart_rows(np.append(before, later)) == rows
+
+
+def test_a_delay_of_less_than_a_second_is_of_the_same_clock() -> None:
+    sent = np.array([0.0, 1.0, np.nan, 3.0])
+    for delay, usual in ((0.9, 0.0), (-0.9, 0.0), (1.1, 1.1), (-1.1, -1.1)):
+        assert usual_delay(np.column_stack([sent, sent + delay])) == pytest.approx(usual)
 
 
 def csv(folder: Path, header: str, times: list[str]) -> Path:

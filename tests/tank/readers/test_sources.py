@@ -11,11 +11,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.channels import frames_of, of_scalar
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.log import Log
+from rov_fmu.tank.log import Log, Source
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import commanded, used
@@ -121,7 +123,10 @@ def test_newtons_are_no_fractions_and_have_a_unit(tmp_path: Path) -> None:
     forces = [ROS.message(kind, data=np.array([10.0 * c[n] for c in motion.THRUSTERS.values()])) for n in range(100)]
     messages = [("/thruster_forces", time, force) for time, force in zip(TIME, forces, strict=True)]
     path = ROS.write(tmp_path, [*messages, *numbers("/bar30/depth", motion.DEPTH)])
-    assert one(path).commands is None
+    log = one(path)
+    assert log.commands is None
+    assert log.unread["/thruster_forces"] == f"{kind}, 100 messages"
+    assert log.unread["/thruster_forces.data[0]"] == "0 to 2.5"
     log = one(path, topics={f"/thruster_forces.data[{n}]": f"u_{n + 1} [N 10]" for n in range(6)})
     assert commanded(log, "2") == pytest.approx(motion.THRUSTERS["2"])
     _, (line,) = names_of(BLUEROV2, RovTables(topics={"/f.data": "u_1 [N]"}))
@@ -251,6 +256,66 @@ def test_a_barometer_inside_the_hull(tmp_path: Path) -> None:
     )
     both = one(ROS.write(tmp_path / "b", [*pulses(), *pressures("/hull", HULL), *pressures("/bar30", WATER)]))
     assert values(both, "depth") == pytest.approx(motion.DEPTH)
+    assert (
+        "dive.db3: pressure from /bar30, 10 Hz; also in /hull, not used\ndive.db3: depth from /bar30, 10 Hz; also in "
+        in (told(both))
+    )
+    assert "the depth is computed from the pressure, for fresh water" in told(both)
+
+
+AIR = 101325.0
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "reason"),
+    [
+        (100.0, 0.0099 * AIR, "its pressures of 100 ... 1003 are below 1 % of an atmosphere, so they are not in Pa"),
+        (100.0, 0.0101 * AIR, ""),
+        (1.049 * AIR - 195.0, 1.049 * AIR, "its pressure changes by only 20 mm of water and is that of the air"),
+        (0.951 * AIR - 195.0, 0.951 * AIR, "its pressure changes by only 20 mm of water and is that of the air"),
+        (1.051 * AIR - 195.0, 1.051 * AIR, ""),
+        (AIR - 197.0, AIR, ""),
+    ],
+)
+def test_pressures_that_tell_no_depth(low: float, high: float, reason: str) -> None:
+    pressure, depth = of_scalar(QUANTITIES["pressure"], Source("p"), np.arange(2.0), np.array([low, high]))
+    assert not pressure.unused
+    assert depth.unused.startswith(reason)
+    assert bool(depth.unused) == bool(reason)
+
+
+@pytest.mark.parametrize(
+    ("earth", "body", "is_ned", "is_frd"),
+    [
+        ("world", "base_link", False, False),
+        ("world_ned", "base_link", True, True),
+        ("world_ned", "base_flu", True, False),
+        ("", "base_frd", True, True),
+        ("map", "base_frd", False, True),
+    ],
+)
+def test_frames_are_those_of_rep_103_unless_their_names_say_otherwise(
+    earth: str, body: str, is_ned: bool, is_frd: bool
+) -> None:
+    from_earth, from_body = frames_of(Source("t", frames=(earth, body)))
+    assert from_earth.tolist() == (np.eye(3) if is_ned else ENU).tolist()
+    assert from_body.tolist() == (np.eye(3) if is_frd else FLU).tolist()
+
+
+@pytest.mark.parametrize("outputs", [[800.0, 2200.0, 0.0, 65535.0], [1.0, -1.0, 0.5], [799.0], [2201.0], [1.01, 0.2]])
+def test_outputs_are_pulses_or_fractions_or_are_refused(outputs: list[float], tmp_path: Path) -> None:
+    kind = "std_msgs/msg/Float64MultiArray"
+    message = ROS.message(kind, data=np.array([*outputs, *outputs[-1:] * 6][:6]))
+    path = ROS.write(tmp_path, [("/thrusters", time, message) for time in TIME])
+    if min(outputs) > 1000.0 or len(outputs) in (1, 2):
+        with pytest.raises(
+            DataFileError, match=r"are neither fractions within -1 \.\.\. 1 nor pulses in us: name their"
+        ):
+            one(path)
+        return
+    expected = {800.0: -1.0, 2200.0: 1.0, 0.0: 0.0, 65535.0: 0.0}
+    for n, value in enumerate(outputs, start=1):
+        assert commanded(one(path), str(n))[-1] == expected.get(value, value)
 
 
 def test_pressures_of_ardusub(tmp_path: Path) -> None:
