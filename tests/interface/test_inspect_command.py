@@ -308,7 +308,10 @@ def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: P
     )
     assert not draft.exists()
     assert main(["identify", str(folder), "-o", str(tmp_path / "v.toml")]) == 2
-    assert f"{draft}: there is no such file" in capsys.readouterr().err
+    assert (
+        f"{draft}: there is no such file. It must give the vehicle's name, and everything that no test "
+        in capsys.readouterr().err
+    )
     assert main(["identify", str(folder), "--draft"]) == 0
     document = parsed(draft.read_text(encoding="utf-8"))
     assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("My ROV (2)", "my_rov_2")

@@ -39,6 +39,17 @@ def given(name: str, value: float, unit: str) -> str:
 
 HEAVE_ALONE = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
 WITH_THRUST = HEAVE_ALONE | {"thrust_t200.csv": pulled(30.0, 20.0)}
+LIMITS = """[windows]
+heave = [{}, {}]
+surge = [{}, {}]
+[priors]
+inertia = {}
+[logs]
+neutral = {}
+span = {}
+"""
+LOGGED = {"a": ",voltage [V]", "b": ",salinity"}
+ROWS = "".join(f"{n},{0.1 * n % 1:.1f},{n},{n}\n" for n in range(30))
 WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (f'against = "videoray2"\n{BLUEROV2}', HEAVE_ALONE, "/rov.toml: against = 'videoray2': must be a vehicle file"),
     (
@@ -131,7 +142,24 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         HEAVE_ALONE,
         "/rov.toml: axes.heave.Z_wdot: there is no such key; give -Z_wdot, which is positive, as m_a of [axes.heave]",
     ),
-    (f"{BLUEROV2}[windows]\nheave = [0.7, 0.2]\n", HEAVE_ALONE, "/rov.toml: windows.heave = [0.7, 0.2]: must be ["),
+    (
+        f"{BLUEROV2}{LIMITS.format(-1.01, 1, 0.2, 0.2, -0.1, 0, 1e4)}",
+        HEAVE_ALONE,
+        " | ".join(
+            f"/rov.toml: {line}"
+            for line in (
+                "windows.heave = [-1.01, 1]: must be [low, high] within -1 ... 1, fractions of the full command: 20 %",
+                "windows.surge = [0.2, 0.2]: must be [low, high]",
+                "priors.inertia = -0.1: must be 0 or above",
+                "logs.neutral = 0: must be greater than 0",
+            )
+        ),
+    ),
+    (
+        f"{BLUEROV2}[fit]\nvoltage = true\n",
+        {f"{name}.csv": f"time [s],u_5 [1],depth [m]{title}\n{ROWS}" for name, title in LOGGED.items()},
+        "/rov.toml: fit.voltage: every log must have the column voltage [V], but there is none in b.csv",
+    ),
     (
         f'{BLUEROV2}[fit]\nlag = ["rear"]\n',
         HEAVE_ALONE,

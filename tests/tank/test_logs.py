@@ -115,12 +115,23 @@ def test_rows_that_arrive_late_are_sorted(tmp_path: Path) -> None:
             r"line 3, column 'command \[%\]' = none: is no number, and no row has both a time and",
         ),
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
+        (
+            [f"{10.1 * n},30,1" for n in range(N)],
+            r"column time \[s\] gives 0\.099 rows a second\. Is its unit another one",
+        ),
+        ([f"{9e-6 * n},30,1" for n in range(N)], r"column time \[s\] gives 1\.11e\+05 rows a second"),
         ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
     ],
 )
 def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match=told):
         read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+
+
+def test_the_slowest_and_the_fastest_rate_that_are_likely(tmp_path: Path) -> None:
+    for step in (10.0, 1.01e-5):
+        rows = [f"{step * n},{30 * (n > 9)},{n}" for n in range(N)]
+        assert not read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE).findings
 
 
 # ---- Several commands ------------------------------------------------------------------------------------------------

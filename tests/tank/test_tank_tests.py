@@ -141,6 +141,8 @@ BAD: list[tuple[str, str, str]] = [
     ("steady_surge.csv", STEADY + "20,0\n", "line 2 | 'velocity [m/s]' = 0 | sign"),
     ("steady_surge.csv", STEADY + "0,0.1\n", "line 2 | 'command [%]' = 0 | must not be 0, because nothing moves then"),
     ("steady_surge.csv", STEADY + "120,0.3\n", "line 2 | [%]' = '120' | at most 100"),
+    ("steady_surge.csv", STEADY.replace("%", "us") + "1901,0.3\n", "[us]' = 1901: is beyond full thrust; [us NEUTRAL"),
+    ("thrust_rear.csv", "command [%],force [N]\n60,10\n-9,0.49\n-8,0.51\n", "line 4 | = 0.51: must have the sign"),
     ("steady_surge.csv", STEADY + "0.2,0.3\n", "'command [%]' | Are they fractions? Then write [1]"),
     ("steady_surge.csv", "command [%],velocity\n20,0.3\n", "line 1 | column 2 = 'velocity' | [m/s]"),
     ("steady_surge.csv", "command [%],velocity [m/s],command [1]\n", "line 1 | column 3 | [1]' | twice"),
@@ -164,6 +166,15 @@ def test_bad_file_is_one_clear_line(case: int, folder: Path, capsys: pytest.Capt
     without_curve(folder, name.removesuffix(".csv").rpartition("_")[2])
     path.write_text(content, encoding="utf-8", errors="surrogateescape")
     refused(folder, (str(path), *named.split(" | ")), capsys)
+
+
+def test_ten_wrong_rows_are_told_and_the_others_are_counted(folder: Path) -> None:
+    for rows, lines in ((10, 10), (12, 11)):
+        (folder / "steady_surge.csv").write_text(STEADY + "0,1\n" * rows, encoding="utf-8")
+        with pytest.raises(DataFileError) as error:
+            load_tests(folder)
+        assert len(str(error.value).splitlines()) == lines
+    assert str(error.value).endswith("steady_surge.csv: 2 more rows like these")
 
 
 STILL = [f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)]

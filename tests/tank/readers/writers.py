@@ -236,7 +236,7 @@ ULOG_FORMATS = {
     "actuator_motors": "float[12] control",
     "actuator_outputs": "uint32_t noutputs;uint8_t[4] _padding0;float[16] output",
     "vehicle_attitude": "uint64_t timestamp_sample;float[4] q",
-    "vehicle_odometry": "float[3] position;float[3] velocity;float[3] angular_velocity;uint8_t velocity_frame",
+    "vehicle_odometry": "float[4] q;float[3] position;float[3] velocity;float[3] angular_velocity;uint8_t velocity_frame",
     "vehicle_local_position": "float x;float y;float z;float vx;float vy;float vz;bool v_xy_valid",
     "vehicle_angular_velocity": "float[3] xyz",
     "battery_status": "float voltage_v",
@@ -273,7 +273,7 @@ class ULogWriter:
 
 
 def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True) -> ULogWriter:
-    """Return the messages of a dive. The attitude is published 2 ms after it was sampled."""
+    """Return the messages of a dive. The attitude is published 2 ms after it was sampled, or is that of the odometry."""
     log = ULogWriter()
     for n, time in enumerate(dive.time):
         if pulses:
@@ -281,12 +281,12 @@ def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: boo
         else:
             log.message("actuator_motors", time, *(dive.pulses[n] - 1500.0) / 400.0, *[np.nan] * 6)
         quaternion = Rotation.from_matrix(dive.rotation[n]).as_quat(scalar_first=True)
-        log.message("vehicle_attitude", time + 0.002, round((ULOG_BOOT + time) * 1e6), *quaternion)
         if velocity == "vehicle_local_position":
+            log.message("vehicle_attitude", time + 0.002, round((ULOG_BOOT + time) * 1e6), *quaternion)
             log.message(velocity, time, *dive.position[n], *dive.over_ground[n], True)
         else:
             frame, moved = (3, dive.velocity) if velocity == "body" else (1, dive.over_ground)
-            log.message("vehicle_odometry", time, *dive.position[n], *moved[n], *RATES, frame)
+            log.message("vehicle_odometry", time, *quaternion, *dive.position[n], *moved[n], *RATES, frame)
         log.message("battery_status", time, dive.voltage[n])
         log.message("cpuload", time, 0.5)
     return log
