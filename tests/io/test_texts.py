@@ -1,10 +1,10 @@
-"""Texts of any length in messages, the share of a part of the work, and a folder that has gone."""
+"""Texts of any length in messages, and a temporary folder that has gone."""
 
 import shutil
 from pathlib import Path
 
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import brief, lines_on, only, part, shown
+from rov_fmu.io.messages import brief, lines_on, only, shown
 from rov_fmu.io.toml_file import join_names
 
 
@@ -19,13 +19,6 @@ def test_long_texts_and_lists_are_cut() -> None:
     assert join_names(names[:11]) == ", ".join(names[:10]) + ", ..."
     assert lines_on(Path("a"), ["b", "c", "b", ""]) == ["a: b", "a: c", "a: 1 more mistake"]
     assert lines_on(Path("a"), names)[9:] == ["a: n9", "a: 12 more mistakes"]
-
-
-def test_the_share_of_a_part_is_one_of_the_whole() -> None:
-    shares: list[float] = []
-    for share in (0.0, 0.5, 1.0):
-        part(lambda _, share: shares.append(share), 0.25, 0.75)("a step", share)
-    assert shares == [0.25, 0.5, 0.75]
 
 
 def test_a_temporary_folder_may_be_gone_already() -> None:

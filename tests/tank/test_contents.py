@@ -1,4 +1,4 @@
-"""What a file contains tells its format, not its name; tables of makers; and jumps of sensors."""
+"""Variables of MATLAB, logs with the names of tables, and jumps of sensors."""
 
 import shutil
 from pathlib import Path
@@ -13,10 +13,10 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
 from tests.folders import rows_of
-from tests.tank.logs import channel, commanded, commands, log, measured, read_log
+from tests.tank.logs import channel, commanded, commands, log, measured
 from tests.tank.readers import motion
-from tests.tank.readers.motion import BLUEROV2, DIVE, LACKING, TIME
-from tests.tank.readers.writers import LOGS, csv, table
+from tests.tank.readers.motion import BLUEROV2, TIME
+from tests.tank.readers.writers import table
 from tests.tank.test_several_files import ROV
 
 FOLDER = ROV.replace("Dive of May", "x")
@@ -35,24 +35,6 @@ def dive(path: Path) -> Path:
 
 
 # ---- Formats ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("suffix", [*LOGS, ".csv"])
-def test_a_log_is_read_under_any_name(suffix: str, tmp_path: Path) -> None:
-    """What is listed of it is what was written."""
-    write = {**LOGS, ".csv": csv}[suffix]
-    other = Path(shutil.copy(write(tmp_path, DIVE), tmp_path / "any.log"))
-    motion.check(read_log(other, BLUEROV2).log, lacking=LACKING.get(write, ()))
-    (one,) = inspect(other, [BLUEROV2])
-    written = {f"thruster {name}": (values, 1e-6) for name, values in motion.THRUSTERS.items()} | motion.expected()
-    assert [row.name for row in one.commands] == [*written][:6]
-    assert [row.unit for row in one.commands] == ["1"] * 6
-    for row in (*one.commands, *one.channels):
-        values, within = written[row.name]
-        if row.name != "heading":  # which wraps
-            assert (row.low, row.high) == pytest.approx((values.min(), values.max()), abs=within), row.name
-        assert (row.samples, row.gaps) == (100, [])
-        assert (row.end - row.start, row.rate) == pytest.approx((9.9, 10.0), abs=1e-3)
 
 
 def test_variables_of_matlab(tmp_path: Path) -> None:

@@ -239,14 +239,19 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
     [
         ("m_rov =", "m_rof =", "body.m_rof: there is no such key; did you mean m_rov?"),
         ("value = 6.57", 'value = "?"', "body.m_rov.value = '?': must be a number"),
-        ('"force [N]"', '"force [lb]"', "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or"),
+        (
+            '"force [N]"',
+            '"force [lb]"\nTiefe = "depth [ft]"',
+            "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or 'force [lbf]' | "
+            "/rov.toml: columns.Tiefe = 'depth [ft]': must be 'depth [m]' or",
+        ),
         ("[columns]", "[column]", "column: there is no such key; did you mean columns?"),
     ],
 )
 def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, line: str, tmp_path: Path) -> None:
     """The headers are those that [columns] explains, although the vehicle cannot be used."""
     rov = DOWN.replace("[known]", "[body]") + HEADERS
-    check_refused(folder_of(tmp_path / "tests", rov.replace(old, new), FILES), [f"/rov.toml: {line}"])
+    check_refused(folder_of(tmp_path / "tests", rov.replace(old, new), FILES), f"/rov.toml: {line}".split(" | "))
 
 
 def check_lines(text: str, folder: Path) -> None:

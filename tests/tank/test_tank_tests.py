@@ -168,15 +168,6 @@ def test_bad_file_is_one_clear_line(case: int, folder: Path, capsys: pytest.Capt
     refused(folder, (str(path), *named.split(" | ")), capsys)
 
 
-def test_ten_wrong_rows_are_told_and_the_others_are_counted(folder: Path) -> None:
-    for rows, lines in ((10, 10), (12, 11)):
-        (folder / "steady_surge.csv").write_text(STEADY + "0,1\n" * rows, encoding="utf-8")
-        with pytest.raises(DataFileError) as error:
-            load_tests(folder)
-        assert len(str(error.value).splitlines()) == lines
-    assert str(error.value).endswith("steady_surge.csv: 2 more rows like these")
-
-
 STILL = [f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)]
 
 

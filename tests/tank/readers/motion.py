@@ -38,7 +38,7 @@ DIVE = Dive(
 NO_RATES = {"roll velocity", "pitch velocity", "yaw velocity"}
 LACKING: dict[Callable[[Path, Dive], Path], set[str]] = {
     **dict.fromkeys((writers.flash, writers.ulog), NO_RATES),
-    **{writer: {*NO_RATES, "distance"} for writer in (writers.csv, writers.mat)},
+    writers.csv: {*NO_RATES, "distance"},
 }
 """The quantities that the logs of some writers do not have."""
 

@@ -52,7 +52,7 @@ def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path
 
 
 def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> None:
-    """The topics count from 0; the IMU measures the attitude, and the pressure is not needed."""
+    """The topics count from 0; the IMU measures the attitude."""
     ros = Ros(2)
     messages: list[tuple[str, float, Any]] = []
     for n, (time, R) in enumerate(zip(TIME, DIVE.rotation, strict=True)):
@@ -62,13 +62,7 @@ def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> 
         messages += [("/bar30/depth", time, number(data=float(motion.DEPTH[n])))]
         header = ros.header(time, "imu_link")
         imu = ros.message("sensor_msgs/msg/Imu", header=header, orientation=ros.quaternion(ENU @ R @ FLU))
-        pressure = ros.message("sensor_msgs/msg/FluidPressure", header=header, fluid_pressure=2e5)
-        battery = ros.message("sensor_msgs/msg/BatteryState", header=header, voltage=motion.VOLTAGE[n])
-        messages += [
-            ("/imu", time - ARRIVAL, imu),
-            ("/pressure", time, pressure),
-            ("/battery", time - ARRIVAL, battery),
-        ]
+        messages += [("/imu", time - ARRIVAL, imu)]
     log = read_log(ros.write(tmp_path, messages), BLUEROV2).log
     assert axes(log) == ["heave", "roll", "pitch", "yaw"]
     assert measured(log, "depth") == pytest.approx(motion.DEPTH)

@@ -1,6 +1,5 @@
 """Clocks that restart, and times in every unit."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -8,36 +7,14 @@ import pytest
 
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import restart_rows, usual_delay
-from rov_fmu.tank.columns import Names, names_of
+from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
-from tests.tank.logs import measured, read_log
-from tests.tank.readers import motion, test_mavlink
+from tests.tank.logs import read_log
+from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
 from tests.tank.readers.test_mavlink import N
-from tests.tank.readers.writers import BOOT, START, Ros, outputs, write_tlog
-
-
-def test_two_boots_in_a_telemetry_log_are_two_logs(tmp_path: Path) -> None:
-    """The second boot begins 60 s later, at a time since boot that occurs in the first one."""
-    path = write_tlog(tmp_path / "a.tlog", test_mavlink.dive(20.0))
-    again = write_tlog(tmp_path / "b.tlog", test_mavlink.dive(18.0)).read_bytes()
-    first, later = struct.pack(">Q", round((BOOT + 18.05) * 1e6))[:3], b""
-    assert again.startswith(first)
-    with path.open("ab") as file:
-        position = 0
-        while position < len(again):  # a time of arrival of 8 bytes, and a message of MAVLink 2
-            (arrival,) = struct.unpack(">Q", again[position : position + 8])
-            length = 12 + again[position + 9]
-            later += struct.pack(">Q", arrival + 60_000_000) + again[position + 8 : position + 8 + length]
-            position += 8 + length
-        file.write(later)
-    log = read_log(path, BLUEROV2)
-    assert [one.file for one in log.logs] == ["a.tlog", "a.tlog (from 58 s)"]
-    assert [finding.names for finding in log.findings if finding.kind == "clock restarts"] == [{"at": "58"}]
-    one, other = (measured(one, "depth") for one in log.logs)
-    assert one == pytest.approx(other)
-    assert len(one) == N
+from tests.tank.readers.writers import START, Ros, outputs
 
 
 def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
@@ -52,8 +29,10 @@ def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
         pose = ros.message("geometry_msgs/msg/Pose", position=place)
         messages += [("/rc/out", time, commands)]
         messages += [("/pose", time, ros.message("geometry_msgs/msg/PoseStamped", header=header, pose=pose))]
-    logs = read_logs(ros.write(tmp_path, messages), BLUEROV2, Names())
+    read = read_log(ros.write(tmp_path, messages), BLUEROV2)
+    logs = read.logs
     assert [one.file for one in logs] == ["dive.db3", "dive.db3 (from 5 s)"]
+    assert [finding.names for finding in read.findings if finding.kind == "clock restarts"] == [{"at": "5"}]
     for log, part in zip(logs, (TIME < 4.95, TIME >= 4.95), strict=True):
         depth = log.used("depth")
         assert depth is not None

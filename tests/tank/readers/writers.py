@@ -14,7 +14,6 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
@@ -60,7 +59,7 @@ class Dive:
         return np.asarray(np.array(self.origin) + travelled)
 
 
-# ---- Text and MATLAB -------------------------------------------------------------------------------------------------
+# ---- Text ------------------------------------------------------------------------------------------------------------
 
 
 def table(path: Path, titles: str, *columns: Array) -> Path:
@@ -72,8 +71,6 @@ def table(path: Path, titles: str, *columns: Array) -> Path:
 
 TITLES = ["time [s]", *(f"u_{n} [us]" for n in range(1, 7)), "depth [m]", "roll [rad]", "pitch [rad]", "heading [rad]"]
 TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "heave velocity [m/s]", "voltage [V]"]
-MATLAB = {f"c{n}": title for n, title in enumerate(TITLES)}
-"""The names of variables and what they stand for."""
 
 
 def columns(dive: Dive) -> list[Array]:
@@ -83,11 +80,6 @@ def columns(dive: Dive) -> list[Array]:
 
 def csv(folder: Path, dive: Dive) -> Path:
     return table(folder / "dive.csv", ",".join(TITLES), *columns(dive))
-
-
-def mat(folder: Path, dive: Dive) -> Path:
-    savemat(folder / "dive.mat", {"log": dict(zip(MATLAB, columns(dive), strict=True))})
-    return folder / "dive.mat"
 
 
 # ---- MAVLink ---------------------------------------------------------------------------------------------------------
@@ -236,7 +228,8 @@ ULOG_FORMATS = {
     "actuator_motors": "float[12] control",
     "actuator_outputs": "uint32_t noutputs;uint8_t[4] _padding0;float[16] output",
     "vehicle_attitude": "uint64_t timestamp_sample;float[4] q",
-    "vehicle_odometry": "float[4] q;float[3] position;float[3] velocity;float[3] angular_velocity;uint8_t velocity_frame",
+    "vehicle_odometry": "float[4] q;float[3] position;float[3] velocity;float[3] angular_velocity;"
+    "uint8_t velocity_frame",
     "vehicle_local_position": "float x;float y;float z;float vx;float vy;float vz;bool v_xy_valid",
     "vehicle_angular_velocity": "float[3] xyz",
     "battery_status": "float voltage_v",
@@ -273,7 +266,7 @@ class ULogWriter:
 
 
 def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True) -> ULogWriter:
-    """Return the messages of a dive. The attitude is published 2 ms after it was sampled, or is that of the odometry."""
+    """Return the messages of a dive. The attitude is published 2 ms after it was sampled, or stands in the odometry."""
     log = ULogWriter()
     for n, time in enumerate(dive.time):
         if pulses:
