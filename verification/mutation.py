@@ -72,8 +72,8 @@ TESTS = {
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/claims/*": "fmu/claims",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
-    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_wrench.py "
-    "identify/likelihood/test_records.py identify/test_identify.py",
+    "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
+    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_wrench.py identify/test_identify.py",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
     "rov_fmu/report/page/*": "report/test_equations.py report/test_fmu_page.py report",
     "rov_fmu/report/*": "report/test_report.py report",
@@ -85,8 +85,8 @@ TESTS = {
     "study/test_plans.py tank cli/test_messages.py",
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py fmu/test_declared_numbers.py",
-    "rov_fmu/io/toml_file.py": "vehicle/test_checks.py tank/test_description_mistakes.py study/test_plans.py io "
-    "cli/test_messages.py",
+    "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_json_schema.py io cli/test_messages.py "
+    "tank/test_description_mistakes.py study/test_plans.py",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
     "rov_fmu/*": "cli/test_start.py cli/test_messages.py cli",

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import brief, lines_on, only, shown
+from rov_fmu.io.messages import brief, first_of, lines_on, only, shown
 from rov_fmu.io.toml_file import join_names
 
 
@@ -15,6 +15,8 @@ def test_long_texts_and_lists_are_cut() -> None:
     assert (shown(-12), shown(10**5000)) == ("-12", brief(hex(10**5000)))
     names = [f"n{n}" for n in range(22)]
     assert only("z", names) == f", only {', '.join(names[:20])}, 2 more"
+    assert only("nn1", ["n1"]) == ", only n1"
+    assert first_of(names * 5)[99:] == [names[11], "10 more"]
     assert join_names(names[:10]) == ", ".join(names[:10])
     assert join_names(names[:11]) == ", ".join(names[:10]) + ", ..."
     assert lines_on(Path("a"), ["b", "c", "b", ""]) == ["a: b", "a: c", "a: 1 more mistake"]
