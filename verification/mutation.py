@@ -72,6 +72,8 @@ TESTS = {
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/claims/*": "fmu/claims",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
+    "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
+    "identify/test_next_test.py identify/test_wrench.py tank",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
     "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_wrench.py identify/test_identify.py",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",

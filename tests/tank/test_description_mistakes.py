@@ -156,6 +156,11 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         ),
     ),
     (
+        f'base = "bluerov2_heavy"\n{HEAD}[fit]\nattitude = true\n',
+        HEAVE_ALONE,
+        "/rov.toml: fit.attitude: the vehicle has the axis roll, pitch, which is simulated: leave it out",
+    ),
+    (
         f"{BLUEROV2}[fit]\nvoltage = true\n",
         {f"{name}.csv": f"time [s],u_5 [1],depth [m]{title}\n{ROWS}" for name, title in LOGGED.items()},
         "/rov.toml: fit.voltage: every log must have the column voltage [V], but there is none in b.csv",

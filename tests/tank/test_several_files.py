@@ -79,6 +79,9 @@ def test_the_page_that_flies_joins_the_files_of_a_dive(folder: Path) -> None:
     assert depths == pytest.approx(1.0 + 0.1 * slow, abs=1e-6)
     held = np.searchsorted(recording["times"], (0.9, 1.1), side="right") - 1
     assert [recording["commands"]["u_5"][n] for n in held] == [0.0, 0.5]
+    (folder / "rov.toml").unlink()
+    with pytest.raises(FileError, match="there is no column of commands"):
+        recording_of(folder / "heading.csv", load_vehicle(SHIPPED["bluerov2"]))
 
 
 def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:

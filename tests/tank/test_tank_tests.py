@@ -150,7 +150,7 @@ BAD: list[tuple[str, str, str]] = [
     ("time_constant_yaw.csv", TAU + "20,-3\n", "line 2 | 'time constant [s]' = -3 | above 0"),
     ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0,30,0\n", "line 4 | 'time [s]' = 0: | goes back"),
     ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", "line 1 | 'depth [m]' or"),
-    ("stedy_surge.csv", STEADY, "neither a log, which has a column 'time [s]' | steady_"),
+    ("stedy_surge.csv", STEADY, "neither a log, which has a column 'time [s]' | ; did you mean steady?"),
     ("dive.csv", "time,u_l [%],depth [m]\n0,0,0\n", "line 1 | 'time': must be 'time [s]' or 'time [ms]'"),
     ("steady_sway.csv", STEADY, "no thruster of the vehicle drives sway"),
     ("steady_twist.csv", STEADY, "twist is not an axis | surge, heave and yaw"),

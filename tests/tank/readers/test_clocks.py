@@ -46,7 +46,7 @@ def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
     [
         (np.arange(10.0), [40]),
         (np.arange(9.0), []),  # too few
-        (10.0 + 2.0 * np.arange(10), [40]),
+        (10.0 + np.arange(10), [40]),
         (10.5 + 0.8 * np.arange(10), []),  # less than half of the times come again
         (np.arange(-10.0, 0.0), [40]),
         (np.tile(np.arange(14.0), 2), [40, 54]),

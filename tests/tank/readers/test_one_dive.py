@@ -10,6 +10,14 @@ from tests.tank.logs import read_log
 from tests.tank.readers import motion, writers
 from tests.tank.readers.motion import BLUEROV2, DIVE, LACKING
 
+TOLD = {
+    ".csv": [],
+    ".tlog": ["time of arrival", "unknown direction"],
+    "BlueOS": ["time of arrival", "damaged pieces", "source of commands"],
+    ".bin": ["unknown direction"],
+    ".ulg": ["unknown direction"],
+}
+"""The kinds of findings by format but for bags of ROS."""
 FORMATS = {**writers.LOGS, ".csv": writers.csv, "BlueOS": writers.blueos}
 
 
@@ -17,7 +25,9 @@ FORMATS = {**writers.LOGS, ".csv": writers.csv, "BlueOS": writers.blueos}
 def test_one_dive_is_read_under_any_name(name: str, tmp_path: Path) -> None:
     """What a file contains tells its format. What is listed of it is what was written."""
     path = Path(shutil.copy(FORMATS[name](tmp_path, DIVE), tmp_path / "any.log"))
-    motion.check(read_log(path, BLUEROV2).log, lacking=LACKING.get(FORMATS[name], ()))
+    read = read_log(path, BLUEROV2)
+    motion.check(read.log, lacking=LACKING.get(FORMATS[name], ()))
+    assert [finding.kind for finding in read.findings] == TOLD.get(name, ["source of commands", "unknown direction"])
     (one,) = inspect(path, [BLUEROV2])
     written = {f"thruster {name}": (values, 1e-6) for name, values in motion.THRUSTERS.items()} | motion.expected()
     assert [row.name for row in one.commands] == [*written][:6]

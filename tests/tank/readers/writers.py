@@ -158,6 +158,10 @@ def blueos(folder: Path, dive: Dive) -> Path:
             data = json.dumps({"header": {"system_id": 1, "component_id": 1}, "message": {"type": name, **fields}})
             stamp = round((BOOT + time) * 1e9)
             writer.add_message(channels[topic], stamp, data.encode(), stamp)
+        told = {"type": "PARAM_VALUE", "param_id": [*b"MOT_1_DIRECTION\0"], "param_value": 1.0}
+        kept = writer.register_channel("mavlink/1/1/PARAM_VALUE", "json", schema)
+        for data in (json.dumps({"message": told}), "a damaged message"):
+            writer.add_message(kept, stamp, data.encode(), stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
