@@ -137,25 +137,6 @@ def test_the_slowest_and_the_fastest_rate_that_are_likely(tmp_path: Path) -> Non
 # ---- Several commands ------------------------------------------------------------------------------------------------
 
 
-def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
-    """The dive goes down, ahead and around; commands are pulses of 1500 ± 400 µs, fractions and percent."""
-    rows = []
-    for n in range(90):
-        left, right, top = 0.4 * (n >= 30), 0.4 * (30 <= n < 60) - 0.4 * (n >= 60), 0.5 * (n < 30)
-        motion = f"{n / 50},{(350 + n) % 360},{n / 100}"
-        rows.append(f"{n / 10},{1500 + 400 * left:.0f},{right},{100 * top},{motion},ok")
-    header = "time [s],u_l [us],u_r [1],t [%],depth [m],heading [deg],Surge Velocity [m/s],mode"
-    found = read(tmp_path, header, rows)
-    log = found.log
-    assert measured(log, "depth") == pytest.approx(np.arange(90) / 50)
-    assert measured(log, "heading") == pytest.approx(np.radians(350 + np.arange(90)))
-    assert measured(log, "surge velocity") == pytest.approx(np.arange(90) / 100)
-    assert commanded(log, "l") == pytest.approx([0.0] * 30 + [0.4] * 60)
-    assert commanded(log, "r") == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
-    assert commanded(log, "t") == pytest.approx([0.5] * 30 + [0.0] * 60)
-    assert not found.findings
-
-
 def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) -> None:
     rows = [f"{n / 10},{0.8 * (n > 9)},{STEP[n]},{n}" for n in range(N)]
 
@@ -170,21 +151,6 @@ def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) ->
 
 
 # ---- Pulses ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("unit", "pulse", "command"),
-    [
-        ("us", 1700, 0.5),
-        ("µs", 1300, -0.5),
-        ("us 1520 500", 1770, 0.5),
-        ("us 1500 -400", 1700, -0.5),
-    ],
-)
-def test_a_pulse_is_a_command_by_neutral_and_span(unit: str, pulse: float, command: float, tmp_path: Path) -> None:
-    rows = [f"{n / 10},{pulse if n >= 20 else 1900 if n >= 10 else 1500},{n}" for n in range(N)]
-    log = read(tmp_path, f"time [s],command [{unit}],depth [m]", rows, HEAVE).log
-    assert commanded(log, COMMAND)[-1] == pytest.approx(command)
 
 
 def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:

@@ -73,13 +73,11 @@ def csv(folder: Path, header: str, times: list[str]) -> Path:
 @pytest.mark.parametrize(
     ("header", "times"),
     [
-        ("time [us]", [f"{123_000_000 + 200_000 * n}" for n in range(N)]),
-        ("time [ns]", [f"{1_669_909_208_877_428_140 + 200_000_000 * n}" for n in range(N)]),
         ("%time", [f"{1_669_909_208_877_428_140 + 200_000_000 * n}" for n in range(N)]),
         ("time [s]", [f"2026-05-01T23:59:{50 + n // 5:02d}.{2 * (n % 5)}Z" for n in range(50)]),
         ("stamp", [f"2026-05-01 10:00:{n // 5:02d},{200 * (n % 5):03d}000111+02:00" for n in range(N)]),
     ],
-    ids=["microseconds", "nanoseconds", "rostopic echo -p", "ISO 8601", "ISO 8601 with an offset"],
+    ids=["rostopic echo -p", "ISO 8601", "ISO 8601 with an offset"],
 )
 def test_times_in_any_unit(header: str, times: list[str], tmp_path: Path) -> None:
     if header == "stamp":  # decimal commas need another separator
