@@ -87,8 +87,8 @@ TESTS = {
     "study/test_plans.py tank cli/test_messages.py",
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py fmu/test_declared_numbers.py",
-    "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_json_schema.py io cli/test_messages.py "
-    "tank/test_description_mistakes.py study/test_plans.py",
+    "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
+    "vehicle/test_fuzzed_vehicles.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
     "rov_fmu/*": "cli/test_start.py cli/test_messages.py cli",

@@ -48,13 +48,6 @@ def test_many_unknown_tables(
     assert lines[10:] == [f"rov-fmu: {path}: {number - 10} more mistakes"]
 
 
-def test_a_toml_file_of_endless_depth_is_one_line(tmp_path: Path, capsys: Capsys) -> None:
-    path, command = _vehicle(tmp_path)
-    path.write_text("a = " + 10_000 * "[", encoding="utf-8")
-    assert main(command) == 2
-    assert capsys.readouterr().err.startswith(f"rov-fmu: {path}: not TOML: ")
-
-
 def test_a_toml_file_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsys) -> None:
     path, command = _vehicle(tmp_path)
     with path.open("ab") as file:

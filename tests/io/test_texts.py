@@ -3,6 +3,8 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import brief, first_of, lines_on, only, shown
 from rov_fmu.io.toml_file import join_names
@@ -23,8 +25,14 @@ def test_long_texts_and_lists_are_cut() -> None:
     assert lines_on(Path("a"), names)[9:] == ["a: n9", "a: 12 more mistakes"]
 
 
-def test_a_temporary_folder_may_be_gone_already() -> None:
+def test_a_temporary_folder_is_removed_at_the_second_attempt_and_may_be_gone_already(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first attempt fails, as if a thread were still writing."""
+    attempts, remove = iter((False, True)), shutil.rmtree
     with temporary_folder("rov-fmu-test-") as folder:
-        Path(folder, "file").touch()
-        shutil.rmtree(folder)
+        monkeypatch.setattr(shutil, "rmtree", lambda *given, **options: next(attempts) and remove(*given, **options))
     assert not Path(folder).exists()
+    monkeypatch.undo()
+    with temporary_folder("rov-fmu-test-") as folder:
+        shutil.rmtree(folder)

@@ -49,6 +49,15 @@ def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path
     assert commands.rows[step + 1] - first == pytest.approx(TIME[10] + ARRIVAL - TIME[0], abs=1e-6)
 
 
+def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:
+    """A message of one byte stands among those of 64 bits."""
+    ros = Ros(2)
+    messages = [*messages_of(ros, DIVE), ("/battery", 5.0, ros.message("std_msgs/msg/Bool"))]
+    log = read_log(ros.write(tmp_path, messages), BLUEROV2)
+    motion.check(log.log)
+    assert "dive.db3: 1 damaged piece left out" in told(log)
+
+
 def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> None:
     """The topics count from 0; the IMU measures the attitude."""
     ros = Ros(2)
