@@ -31,7 +31,9 @@ def test_a_temporary_folder_is_removed_at_the_second_attempt_and_may_be_gone_alr
     """The first attempt fails, as if a thread were still writing."""
     attempts, remove = iter((False, True)), shutil.rmtree
     with temporary_folder("rov-fmu-test-") as folder:
-        monkeypatch.setattr(shutil, "rmtree", lambda *given, **options: next(attempts) and remove(*given, **options))
+        monkeypatch.setattr(
+            shutil, "rmtree", lambda *given, **options: remove(*given, **options) if next(attempts) else None
+        )
     assert not Path(folder).exists()
     monkeypatch.undo()
     with temporary_folder("rov-fmu-test-") as folder:
