@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.io.csv_table import read_columns
-from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.catalogue import QUANTITIES, as_json
 from rov_fmu.tank.channels import Topic, channels_of
 from rov_fmu.tank.columns import TIME, columns_of
 from rov_fmu.tank.inspection.headers import guessed
 from rov_fmu.tank.log import Source
+from rov_fmu.tank.readers.tables import rules_of_page
 
 COLUMNS = {name: quantity.column for name, quantity in QUANTITIES.items()} | {"time": TIME} | columns_of("thrust")
 EQUAL = {
@@ -53,6 +55,18 @@ def test_signs_and_units_of_messages(kind: str, field: str, number: float, quant
     *_, found = channels_of([topic], None)
     assert found.quantity.name == quantity
     assert found.values[-1] == pytest.approx(expected, nan_ok=True)
+
+
+def test_the_page_that_flies_gets_the_quantities_of_an_axis() -> None:
+    keys = "name", "short", "isPressure", "isPosition", "largest", "wraps"
+    assert [tuple(one[key] for key in keys) for axis in (HEAVE, YAW) for one in as_json(axis)] == [
+        ("depth", "depth", False, True, 1e7, False),
+        ("pressure", "pressure", True, True, 1e9, False),
+        ("heave velocity", "velocity", False, False, 1e3, False),
+        ("heading", "heading", False, True, 1e7, True),
+        ("yaw velocity", "velocity", False, False, 1e3, False),
+    ]
+    assert rules_of_page()["pressures"]["least"] == pytest.approx(1013.25)
 
 
 LARGEST: dict[str, dict[float, str | None]] = {

@@ -213,9 +213,10 @@ def two_modules(folder: Path, **functions: int) -> Path:
     [
         ({}, 1),
         ({"PWM_MAIN_FUNC1": 420, "PWM_AUX_FUNC1": 101, "PWM_AUX_FUNC2": 102}, 1),
+        ({"PWM_MAIN_FUNC1": 0, "PWM_AUX_FUNC1": 101}, 0),
         ({f"PWM_MAIN_FUNC{n}": 100 + n for n in range(1, 7)} | {"PWM_AUX_FUNC1": 420}, 0),
     ],
-    ids=["as many outputs as thrusters", "AUX", "MAIN"],
+    ids=["as many outputs as thrusters", "AUX", "AUX alone", "MAIN"],
 )
 def test_the_module_that_drives_the_motors(functions: dict[str, int], instance: int, tmp_path: Path) -> None:
     log = one(two_modules(tmp_path, **functions))

@@ -160,8 +160,8 @@ def blueos(folder: Path, dive: Dive) -> Path:
             writer.add_message(channels[topic], stamp, data.encode(), stamp)
         told = {"type": "PARAM_VALUE", "param_id": [*b"MOT_1_DIRECTION\0"], "param_value": 1.0}
         kept = writer.register_channel("mavlink/1/1/PARAM_VALUE", "json", schema)
-        for data in (json.dumps({"message": told}), "a damaged message"):
-            writer.add_message(kept, stamp, data.encode(), stamp)
+        for data in (json.dumps({"message": told}), "damaged", "[]"):
+            writer.add_message(kept, stamp - 5 * 10**9, data.encode(), stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
