@@ -18,7 +18,7 @@ from tests.tank.readers.writers import ULogWriter, ulog_of
 @pytest.mark.parametrize("pulses", [False, True])
 def test_a_ulog_is_read_in_si_units(velocity: str, pulses: bool, tmp_path: Path) -> None:
     log = read_log(ulog_of(DIVE, velocity, pulses=pulses).write(tmp_path / "dive.ulg"), BLUEROV2)
-    motion.check(log.log, lacking=motion.NO_RATES if velocity == "vehicle_local_position" else ())
+    motion.check(log.log)
     assert not [finding for finding in log.findings if finding.kind != "unknown direction"]
 
 

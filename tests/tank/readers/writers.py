@@ -280,6 +280,7 @@ def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: boo
         quaternion = Rotation.from_matrix(dive.rotation[n]).as_quat(scalar_first=True)
         if velocity == "vehicle_local_position":
             log.message("vehicle_attitude", time + 0.002, round((ULOG_BOOT + time) * 1e6), *quaternion)
+            log.message("vehicle_angular_velocity", time, *RATES)
             log.message(velocity, time, *dive.position[n], *dive.over_ground[n], True)
         else:
             frame, moved = (3, dive.velocity) if velocity == "body" else (1, dive.over_ground)
