@@ -83,8 +83,9 @@ TESTS = {
     "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",
-    "rov_fmu/io/csv_table.py": "io tank/test_logs.py vehicle/test_thrust_tables.py fmu/results/test_experiments.py "
-    "study/test_plans.py tank cli/test_messages.py",
+    "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_edges.py tank/test_tank_tests.py "
+    "tank/readers/test_sources.py vehicle/test_thrust_tables.py fmu/results/test_experiments.py study/test_plans.py "
+    "cli/test_messages.py io",
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py fmu/test_declared_numbers.py",
     "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
