@@ -80,7 +80,10 @@ TESTS = {
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/claims/*": "fmu/claims",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
-    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_identify.py",
+    "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
+    "identify/test_next_test.py identify/test_wrench.py tank",
+    "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
+    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_wrench.py identify/test_identify.py",
     "rov_fmu/report/plots/proof.py": "fmu/claims",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
     "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
@@ -96,6 +99,13 @@ TESTS = {
     "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",
+    "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_edges.py tank/test_tank_tests.py "
+    "tank/readers/test_sources.py vehicle/test_thrust_tables.py fmu/results/test_experiments.py study/test_plans.py "
+    "cli/test_messages.py io",
+    "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
+    "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py fmu/test_declared_numbers.py",
+    "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
+    "vehicle/test_fuzzed_vehicles.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
     "rov_fmu/*": "cli/test_start.py cli/test_messages.py cli",

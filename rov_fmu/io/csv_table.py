@@ -44,10 +44,6 @@ class UnreadableFileError(DataFileError):
     """A data file of which nothing can be read, because it is damaged, cut short, or of an unknown kind."""
 
 
-class UnknownColumnError(ValueError):
-    """A header that no column has. The message is only the reason."""
-
-
 @dataclass(frozen=True)
 class Column:
     """A column that a file may have, and the numbers that it may contain."""
@@ -136,7 +132,7 @@ def read_columns(
 
     With `others`, the file may have other columns, which are not read. `loose` is for logs: a cell that is missing or
     not a number becomes NaN, and a row with too many cells is left out. `renamed` has other headers for some of those
-    of the file. `hint` ends the messages about unknown headers. `check_header` is called before the rows are
+    of the file. `hint` ends the messages about missing columns. `check_header` is called before the rows are
     read, with the headers that are read, by column, and with all other headers; it returns the mistakes in them.
     `open_stream` opens the lines of a table that is not the text of the file itself.
     """
@@ -424,9 +420,7 @@ def _find_columns(
                 file_columns[place] = column
                 names.add(column.name)
         except ValueError as error:
-            is_unknown = isinstance(error, UnknownColumnError) and not str(error).endswith("?")
-            end = hint if is_unknown else ""
-            wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}{end}")
+            wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}")
     missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
         reason = _what_lacks(missing, _others(header, file_columns), hint)
@@ -491,7 +485,7 @@ class KnownColumns:
             return None
         titles = {key: _title(key, column) for key, column in self._columns.items()}
         known = ", ".join(titles.values())
-        raise UnknownColumnError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
+        raise ValueError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
 
     def has(self, title: str, *, in_any_unit: bool = False) -> bool:
         """Return True if a file may have a column with this header; or with its name, in a unit that is not known."""

@@ -106,8 +106,12 @@ def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, insp
 
 def test_samples_rates_ranges_gaps_and_what_is_not_recognised(tmp_path: Path, inspect: Inspect) -> None:
     there = (TIME < 3.95) | (TIME > 7.95)
-    columns = [TIME, np.where(TIME > 1.0, 30.0, 0.0), DEPTH, TIME, 16.0 + TIME]
-    table(tmp_path / "log_heave.csv", "time [s],command [%],depth [m],Lux,voltage [V]", *(c[there] for c in columns))
+    columns = [TIME, np.where(TIME > 1.0, 30.0, 0.0), DEPTH, TIME, 16.0 + TIME, TIME, TIME]
+    table(
+        tmp_path / "log_heave.csv",
+        "time [s],command [%],depth [m],Lux,voltage [V],note,note",
+        *(c[there] for c in columns),
+    )
     out, draft = inspect(tmp_path / "log_heave.csv")
     rows = {line.split("  ")[0]: line.split() for line in out.splitlines() if line}
     assert rows["command"][1:] == ["1", "60", "10", "0", "0.3", "4.1", "s", "at", "3.9", "s"]
@@ -115,7 +119,7 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(tmp_path: Path, in
     assert rows["voltage"][1:6] == ["V", "60", "10", "16", "25.9"]
     assert "\n# voltage = true\n" in draft
     assert "attitude" not in draft, "there is no roll or pitch"
-    assert "- Lux: 0 to 9.9" in rows
+    assert {"- Lux: 0 to 9.9", "- note"} <= rows.keys()
     assert '# "Lux" = "?"   # 0 to 9.9' in draft.splitlines(), "nothing suggests what it stands for"
 
 
@@ -308,7 +312,10 @@ def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: P
     )
     assert not draft.exists()
     assert main(["identify", str(folder), "-o", str(tmp_path / "v.toml")]) == 2
-    assert f"{draft}: there is no such file" in capsys.readouterr().err
+    assert (
+        f"{draft}: there is no such file. It must give the vehicle's name, and everything that no test "
+        in capsys.readouterr().err
+    )
     assert main(["identify", str(folder), "--draft"]) == 0
     document = parsed(draft.read_text(encoding="utf-8"))
     assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("My ROV (2)", "my_rov_2")

@@ -5,7 +5,7 @@ import signal
 import sys
 import tempfile
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -95,8 +95,18 @@ def _opaque() -> None:
 def _swallowed() -> None:
     try:
         bytes(10**12)
-    except MemoryError as error:
-        raise ValueError("a parser hides the cause") from error
+    except MemoryError:
+        raise ValueError("a parser hides the cause") from None
+
+
+def _lost(size: int, path: str) -> None:
+    with suppress(OSError):
+        _write(size, path)
+    raise ValueError("a parser tells nothing of the cause")
+
+
+def _length(size: int) -> int:
+    return len(bytes(size))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory and files")
@@ -108,10 +118,14 @@ def test_a_call_beyond_its_memory_or_disk_is_ended_and_leaves_no_file(
     with closing(ChildProcess(Functions, limits=limits)) as child:
         assert Path(child.call("call", os.getenv, "TMPDIR")).parent == tmp_path
         assert child.call("call", len, bytes(10**7)) == 10**7
+        assert child.call("call", _length, 7 * 10**8, limits=Limits(memory=2 * 10**9)) == 7 * 10**8
     for function, arguments, reason in (
         (bytes, (10**9,), r"needs more than 0\.5 GB of memory"),
         (_swallowed, (), r"needs more than 0\.5 GB of memory"),
-        (_write, (2_000_000, str(tmp_path / "large")), r"needs more than 0\.001 GB of disk space"),
+        *(
+            (write, (2_000_000, str(tmp_path / "large")), r"needs more than 0\.001 GB of disk space")
+            for write in (_write, _lost)
+        ),
     ):
         with closing(ChildProcess(Functions, limits=limits)) as child, pytest.raises(ChildError, match=f"^{reason}$"):
             child.call("call", function, *arguments)

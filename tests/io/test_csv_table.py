@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns
+from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns, read_series
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.often import often
@@ -25,20 +25,24 @@ def _values(table: Columns) -> dict[str, list[float]]:
 
 
 @pytest.mark.parametrize(
-    ("cell", "reason"),
+    ("sign", "cell", "reason"),
     [
-        ("179.9", "must be at least 180"),
-        ("720.1", "must be at most 720"),
-        ("-89.9", "must be 0, or 90 at least, or -90 "),
+        ("", "179.9", "must be at least 180"),
+        ("", "720.1", "must be at most 720"),
+        ("-", "-179.9", "must be at most -180"),
+        ("-", "-720.1", "must be at least -720"),
+        ("", "-89.9", "must be 0, or 90 at least, or -90 at most"),
+        ("-", "89.9", "must be 0, or 90 at least, or -90 at most"),
     ],
 )
-def test_bounds_are_printed_in_the_unit_of_the_file(cell: str, reason: str, tmp_path: Path) -> None:
-    path = _file(tmp_path, f"angle [deg]\n360\n\n{cell}")
+def test_bounds_are_printed_in_the_unit_of_the_file(sign: str, cell: str, reason: str, tmp_path: Path) -> None:
+    """A minus sign before the header turns the sign of the numbers."""
+    path = _file(tmp_path, f"{sign}angle [deg]\n{sign}360\n\n{sign}180\n{sign}720\n{cell}")
     turns = {"turn": 1.0, "deg": 360.0}
     column = Column(turns, least=0.25) if "or" in reason else Column(turns, minimum=0.5, maximum=2.0)
     with pytest.raises(DataFileError) as error:
         read_columns(path, {"angle": column})
-    assert str(error.value).startswith(f"{path}, line 4, column 'angle [deg]' = {cell!r}: {reason}")
+    assert str(error.value) == f"{path}, line 6, column '{sign}angle [deg]' = {cell!r}: {reason}"
 
 
 # ---- Forms of files --------------------------------------------------------------------------------------------------
@@ -109,6 +113,36 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
         [False, True, False],
     ]
     assert ({name: [*rows] for name, rows in table.unread.items()}, table.torn) == ({"length": [1], "time": []}, 1)
+
+
+# ---- Variables over time ---------------------------------------------------------------------------------------------
+
+SERIES = {
+    "0,1\n1,2\n": ": the first line must be a header that names the columns: the time, and then variables",
+    "time,u [%]\n0,1\n": ", line 1, column 'u [%]': must be 'u' without a unit; a command of 30 % is 0.3 here",
+    "time,u,u\n0,1,1\n": ", line 1, column 'u': this column occurs twice",
+    "time,u\n0,1\n1,2,3\n": ", line 3, column 3 = '3': there is no such column (are these decimal commas? They need ; "
+    "between the columns)",
+    "time,u\n0,1\n1\n": ", line 3, column 'u' = '': must be a finite number",
+    "time,u\n0,1\n2,1\n1,1\n": ", line 4: the time goes back",
+    "time\n0\n": ": no columns beside the time",
+    "time,u\n": ": no rows below the header",
+}
+
+
+def test_variables_over_time(tmp_path: Path) -> None:
+    path = _file(tmp_path, "time [s],u,on\n\n0,1,true\n0,.5,False\n1.5,-2e-1,1\n")
+    series = read_series(path, lambda _: None)
+    assert {name: [*values] for name, values in series.items()} == {
+        "time [s]": [0.0, 0.0, 1.5],
+        "u": [1.0, 0.5, -0.2],
+        "on": [1.0, 0.0, 1.0],
+    }
+    assert [*series.lines] == [3, 4, 5]
+    for text, reason in SERIES.items():
+        with pytest.raises(DataFileError) as error:
+            read_series(_file(tmp_path, text), lambda _: None)
+        assert str(error.value) == f"{path}{reason}"
 
 
 # ---- Large files -----------------------------------------------------------------------------------------------------

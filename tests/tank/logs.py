@@ -28,7 +28,7 @@ def channel(quantity: str, time: Array, values: Array) -> Channel:
     return Channel(QUANTITIES[quantity], Source(quantity), time, values)
 
 
-def log(commanded: Commands, *channels: Channel, file: str = "a.csv") -> Log:
+def log(commanded: Commands | None, *channels: Channel, file: str = "a.csv") -> Log:
     """Return a log."""
     return Log(file, commanded, channels)
 

@@ -1,4 +1,4 @@
-"""What a file contains tells its format, not its name; tables of makers; and jumps of sensors."""
+"""Variables of MATLAB, logs with the names of tables, and jumps of sensors."""
 
 import shutil
 from pathlib import Path
@@ -13,10 +13,10 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
 from tests.folders import rows_of
-from tests.tank.logs import axes, channel, commanded, commands, log, measured, read_log
+from tests.tank.logs import channel, commanded, commands, log, measured
 from tests.tank.readers import motion
-from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import LOGS, csv, table
+from tests.tank.readers.motion import BLUEROV2, TIME
+from tests.tank.readers.writers import table
 from tests.tank.test_several_files import ROV
 
 FOLDER = ROV.replace("Dive of May", "x")
@@ -35,16 +35,6 @@ def dive(path: Path) -> Path:
 
 
 # ---- Formats ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("suffix", [*LOGS, ".csv"])
-def test_a_log_is_read_under_any_name(suffix: str, tmp_path: Path) -> None:
-    path = {**LOGS, ".csv": csv}[suffix](tmp_path, DIVE)
-    other = tmp_path / "any.log"
-    shutil.copy(path, other)
-    assert axes(read_log(other, BLUEROV2).log)
-    (one,) = inspect(other, [BLUEROV2])
-    assert one.commands
 
 
 def test_variables_of_matlab(tmp_path: Path) -> None:
@@ -73,27 +63,31 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
     assert not rows_of(tests, "thrust")
 
 
-# ---- Tables and vehicles ---------------------------------------------------------------------------------------------
-
-
 # ---- Jumps -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("values", "told"),
     [
-        (motion.DEPTH + 1.5 * (TIME > 5.0), 1),
-        (motion.DEPTH + 0.7 * (np.arange(len(TIME)) == 50), 0),
-        (10.0 * TIME, 0),
-        (motion.DEPTH + 0.5 * np.random.default_rng(2).standard_normal(len(TIME)), 0),
-        (0.25 * np.round(4.0 * motion.DEPTH), 0),
+        (
+            motion.DEPTH + 1.5 * (TIME > 4.95) - (TIME > 7.95),
+            "2 jumps of the depth, as by a reset: +1.51 m at 5 s, -0.99 m at 8 s",
+        ),
+        (motion.DEPTH + 0.195 * (TIME > 4.95), "1 jump of the depth, as by a reset: +0.205 m at 5 s"),
+        (motion.HEADING + 0.5 * (TIME > 4.95), "1 jump of the heading, as by a reset: +30.4 deg at 5 s"),
+        (motion.DEPTH + 0.185 * (TIME > 4.95), ""),
+        (motion.DEPTH + 0.7 * (np.arange(len(TIME)) == 50), ""),
+        (10.0 * TIME, ""),
+        (motion.DEPTH + 0.5 * np.random.default_rng(2).standard_normal(len(TIME)), ""),
+        (0.25 * np.round(4.0 * motion.DEPTH), ""),
     ],
-    ids=["a jump", "an outlier", "a fast motion", "noise", "a coarse sensor"],
+    ids=["two", "the least", "of an angle", "too small", "an outlier", "a fast motion", "noise", "a coarse sensor"],
 )
-def test_a_jump_of_a_sensor_is_told(values: Array, told: int) -> None:
+def test_a_jump_of_a_sensor_is_told(values: Array, told: str) -> None:
     down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
-    found = checked(log(down, channel("depth", TIME, values))).findings
-    assert sum("jump" in line for line in sentences(found, SENTENCES)) == told
+    quantity = "heading" if "heading" in told else "depth"
+    found = checked(log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values)))
+    assert sentences(found.findings, SENTENCES) == ((f"a.csv: {told}",) if told else ())
 
 
 TOE = """[vehicle]

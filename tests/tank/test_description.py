@@ -30,6 +30,7 @@ from tests.folders import (
     responses,
 )
 from tests.recordings import run, write_log
+from tests.tank.test_description_mistakes import LIMITS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -85,7 +86,8 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     table = '[axes.sway]\nm_a = { value = 7.0, unit = "kg", source = "a strip" }\n'
     k = load_vehicle(SHIPPED["bluerov2"]).replaced({"m_a_v": 7.0})
     for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
-        tests = read(folder, f'base = "old.toml"\n{HEAD}{also}', responses(k, SWAY))
+        limits = LIMITS.format(-1, 1, 0.2, 0.21, 0, 1e4, 1e4)
+        tests = read(folder, f'base = "old.toml"\n{HEAD}{also}{limits}', responses(k, SWAY))
         assert [*tests.given.vehicle.layout.kinds] == ["surge", "sway", "heave", "yaw"]
         assert tests.given.vehicle.layout.kinds["sway"].keys == keys
     inputs: list[Path] = []

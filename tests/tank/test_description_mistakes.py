@@ -39,6 +39,17 @@ def given(name: str, value: float, unit: str) -> str:
 
 HEAVE_ALONE = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
 WITH_THRUST = HEAVE_ALONE | {"thrust_t200.csv": pulled(30.0, 20.0)}
+LIMITS = """[windows]
+heave = [{}, {}]
+surge = [{}, {}]
+[priors]
+inertia = {}
+[logs]
+neutral = {}
+span = {}
+"""
+LOGGED = {"a": ",voltage [V]", "b": ",salinity"}
+ROWS = "".join(f"{n},{0.1 * n % 1:.1f},{n},{n}\n" for n in range(30))
 WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (f'against = "videoray2"\n{BLUEROV2}', HEAVE_ALONE, "/rov.toml: against = 'videoray2': must be a vehicle file"),
     (
@@ -131,7 +142,29 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         HEAVE_ALONE,
         "/rov.toml: axes.heave.Z_wdot: there is no such key; give -Z_wdot, which is positive, as m_a of [axes.heave]",
     ),
-    (f"{BLUEROV2}[windows]\nheave = [0.7, 0.2]\n", HEAVE_ALONE, "/rov.toml: windows.heave = [0.7, 0.2]: must be ["),
+    (
+        f"{BLUEROV2}{LIMITS.format(-1.01, 1, 0.2, 0.2, -0.1, 0, 1e4)}",
+        HEAVE_ALONE,
+        " | ".join(
+            f"/rov.toml: {line}"
+            for line in (
+                "windows.heave = [-1.01, 1]: must be [low, high] within -1 ... 1, fractions of the full command: 20 %",
+                "windows.surge = [0.2, 0.2]: must be [low, high]",
+                "priors.inertia = -0.1: must be 0 or above",
+                "logs.neutral = 0: must be greater than 0",
+            )
+        ),
+    ),
+    (
+        f'base = "bluerov2_heavy"\n{HEAD}[fit]\nattitude = true\n',
+        HEAVE_ALONE,
+        "/rov.toml: fit.attitude: the vehicle has the axis roll, pitch, which is simulated: leave it out",
+    ),
+    (
+        f"{BLUEROV2}[fit]\nvoltage = true\n",
+        {f"{name}.csv": f"time [s],u_5 [1],depth [m]{title}\n{ROWS}" for name, title in LOGGED.items()},
+        "/rov.toml: fit.voltage: every log must have the column voltage [V], but there is none in b.csv",
+    ),
     (
         f'{BLUEROV2}[fit]\nlag = ["rear"]\n',
         HEAVE_ALONE,
@@ -211,14 +244,19 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
     [
         ("m_rov =", "m_rof =", "body.m_rof: there is no such key; did you mean m_rov?"),
         ("value = 6.57", 'value = "?"', "body.m_rov.value = '?': must be a number"),
-        ('"force [N]"', '"force [lb]"', "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or"),
+        (
+            '"force [N]"',
+            '"force [lb]"\nTiefe = "depth [ft]"',
+            "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or 'force [lbf]' | "
+            "/rov.toml: columns.Tiefe = 'depth [ft]': must be 'depth [m]' or",
+        ),
         ("[columns]", "[column]", "column: there is no such key; did you mean columns?"),
     ],
 )
 def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, line: str, tmp_path: Path) -> None:
     """The headers are those that [columns] explains, although the vehicle cannot be used."""
     rov = DOWN.replace("[known]", "[body]") + HEADERS
-    check_refused(folder_of(tmp_path / "tests", rov.replace(old, new), FILES), [f"/rov.toml: {line}"])
+    check_refused(folder_of(tmp_path / "tests", rov.replace(old, new), FILES), f"/rov.toml: {line}".split(" | "))
 
 
 def check_lines(text: str, folder: Path) -> None:

@@ -12,6 +12,8 @@ _THRUST, _HEAVE = ("thrust_rear", "command [%],force [N]"), ("steady_heave", "co
 _YAW, _TAU = ("steady_yaw", "command [%],velocity [rad/s]"), ("time_constant_yaw", "command [%],time constant [s]")
 _DEPTH, _SPEED = ("log_heave", "time [s],command [%],depth [m]"), ("log_surge", "time [s],command [%],velocity [m/s]")
 
+_VOLTAGE, _PRESSURE = ((_DEPTH[0], f"{_DEPTH[1]},{column}") for column in ("voltage [V]", "pressure [Pa]"))
+
 
 @pytest.mark.parametrize(
     ("table", "within", "beyond"),
@@ -24,7 +26,9 @@ _DEPTH, _SPEED = ("log_heave", "time [s],command [%],depth [m]"), ("log_surge", 
         (_TAU, "50,1e5", "50,100001"),
         (_TAU, "50,1e-4", "50,9.9e-5"),
         (_DEPTH, "-1e10,0,0", "-1.0001e10,0,0"),
-        (_DEPTH, "0,0,-1e7", "0,0,-10000001"),
+        *((_DEPTH, f"0,0,{sign}1e7", f"0,0,{sign}10000001") for sign in ("", "-")),
+        *((_VOLTAGE, f"0,0,0,{end}", f"0,0,0,{beyond}") for end, beyond in ((0, -1), ("1e4", 10001))),
+        *((_PRESSURE, f"0,0,0,{end}", f"0,0,0,{beyond}") for end, beyond in ((0, -1), ("1e9", 1000000001))),
         (_SPEED, "0,0,1e3", "0,0,1000.1"),
         (_SPEED, "0,0.001,1e-9", "0,100.1,1e-9"),
     ],

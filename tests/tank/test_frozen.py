@@ -64,7 +64,8 @@ def channels(*values: Array) -> list[Channel]:
     [
         channels(noisy(1, 0.01, 0.001), noisy(2, 0.01, 0.001)),
         channels(frozen(noisy(1, 0.01, 0.001), 30.0), noisy(2, 0.01, 0.001)),
-        channels(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 35.0)),
+        channels(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 32.1)),
+        channels(frozen(noisy(1, 0.01, 0.001), 48.1), frozen(noisy(2, 0.01, 0.001), 48.1)),
         channels(noisy(1, 0.001, 0.01), noisy(2, 0.001, 0.01)),
         channels(frozen(noisy(1, 0.006, 0.01), 30.0), frozen(noisy(2, 0.006, 0.01), 30.0)),
     ],
@@ -72,6 +73,7 @@ def channels(*values: Array) -> list[Channel]:
         "with noise",
         "one sensor",
         "at different times",
+        "for less than a fifth of the log",
         "at rest",
         "steps of the resolution",
     ],
@@ -80,3 +82,11 @@ def test_sensors_that_may_be_right_are_used(measured: list[Channel]) -> None:
     found = checked(log(commands(TIME, {"1": 0.0 * TIME}), *measured))
     assert [*found.channels] == measured
     assert "frozen sensors" not in {finding.kind for finding in found.findings}
+
+
+@pytest.mark.parametrize(("first", "second"), [(32.0, 30.0), (48.0, 48.0)])
+def test_sensors_that_froze_within_2_s_and_for_a_fifth_of_the_log_are_told(first: float, second: float) -> None:
+    measured = channels(frozen(noisy(1, 0.01, 0.001), first), frozen(noisy(2, 0.01, 0.001), second))
+    (found,) = checked(log(None, *measured)).findings
+    assert found.kind == "frozen sensors"
+    assert found.numbers["start"] == pytest.approx(min(first, second) - 0.1)

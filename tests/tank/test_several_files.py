@@ -27,6 +27,7 @@ version = "1.0"
 description = "An ROV"
 source = "Dive of May"
 """
+KINDS = "rows sorted", "unknown velocity"
 FILES = 'files = ["commands.csv", "depth.csv", "heading.csv"]'
 
 
@@ -78,6 +79,9 @@ def test_the_page_that_flies_joins_the_files_of_a_dive(folder: Path) -> None:
     assert depths == pytest.approx(1.0 + 0.1 * slow, abs=1e-6)
     held = np.searchsorted(recording["times"], (0.9, 1.1), side="right") - 1
     assert [recording["commands"]["u_5"][n] for n in held] == [0.0, 0.5]
+    (folder / "rov.toml").unlink()
+    with pytest.raises(FileError, match="there is no column of commands"):
+        recording_of(folder / "heading.csv", load_vehicle(SHIPPED["bluerov2"]))
 
 
 def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:
@@ -88,6 +92,19 @@ def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:
     findings, _ = read(folder)
     (line,) = (line for line in sentences(findings, SENTENCES) if "copy" in line)
     assert line.startswith("commands.csv, depth.csv, heading.csv: left out as a copy of commands_2.csv, depth_2.csv, h")
+
+
+def test_a_sentence_about_several_files_has_the_range_of_their_numbers() -> None:
+    counts = {"a": 1, "b": 3, "c": 3}
+    found = [Finding(kind, file=file, numbers={"count": n}) for kind in KINDS for file, n in counts.items()]
+    assert sentences(found, SENTENCES) == (
+        "a, b and c: 1 ... 3 rows out of order sorted",
+        "a, b and c: 1 ... 3 velocities left out, because the filter marks them as unknown",
+    )
+    assert sentences(found[:1], SENTENCES) == ("a: 1 row out of order sorted",)
+    assert sentences(found[4:], SENTENCES) == (
+        "b and c: 3 velocities left out, because the filter marks them as unknown",
+    )
 
 
 @pytest.mark.parametrize("declared", [False, True])

@@ -7,7 +7,7 @@ import pytest
 
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked, scales_differ, unwrapped
+from rov_fmu.tank.quality import checked, gaps, scales_differ, unwrapped
 from tests.tank.logs import channel
 
 STEPS: Array = np.linspace(0.0, 19.9, 200)
@@ -22,6 +22,17 @@ def test_a_heading_is_unwrapped_keeps_its_blanks_and_noise_beyond_its_range_is_n
     there = np.isfinite(values)
     assert np.isnan(found[~there]).all()
     assert found[there] == pytest.approx(heading[there], abs=np.radians(2.1))
+
+
+def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() -> None:
+    values = np.tile(np.linspace(-3.4, 3.4, 100), 2)
+    assert unwrapped(channel("heading", STEPS, values)).tolist() == values.tolist()
+
+
+def test_a_gap_is_longer_than_1_s_and_than_ten_usual_intervals() -> None:
+    for usual, within, beyond in ((0.05, 0.99, 1.01), (0.2, 1.99, 2.01)):
+        time = np.cumsum([0.0, *[usual] * 5, within, *[usual] * 5, beyond, *[usual] * 5])
+        assert gaps(time, time) == [pytest.approx((time[11], time[12]))]
 
 
 @pytest.mark.parametrize(("scale", "is_told"), [(1.0, False), (1.008, False), (1.02, True), (0.97, True)])

@@ -6,10 +6,8 @@ from pathlib import Path
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.csv_table import DataFileError, KnownColumns, read_columns
+from rov_fmu.io.messages import MOST
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
-
-_MOST_LINES = 10
-"""The number of wrong rows in a file that get a line of their own."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +43,9 @@ def read_rows(
         elif reason := _impossible(kind, command, value, noise):
             mistakes.append(table.error(n, name, reason))
     if mistakes:
-        more = len(mistakes) - _MOST_LINES
+        more = len(mistakes) - MOST
         counted = [f"{path}: {more} more rows like these"] if more > 0 else []
-        raise DataFileError(*map(str, mistakes[:_MOST_LINES]), *counted)
+        raise DataFileError(*map(str, mistakes[:MOST]), *counted)
     return [Row(path.name, *row) for row in numbers], frozenset(renamed).intersection(table.header)
 
 

@@ -1,5 +1,7 @@
 """The dive that most tests of log formats write, and what must be read of it."""
 
+from collections.abc import Collection
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.tank.readers.writers import Dive
+from tests.tank.readers import writers
+from tests.tank.readers.writers import RATES, Dive
 
 BLUEROV2: Layout = load_vehicle(SHIPPED["bluerov2"]).layout
 TIME: Array = np.linspace(0.0, 9.9, 100)
@@ -31,8 +34,27 @@ DIVE = Dive(
 )
 
 
-def check(log: Log, dive: Dive = DIVE, *, has_distance: bool = False) -> None:
-    """Check the log within the resolution of the formats: 1 ms, 0.01 degrees, 1 mV, and numbers of 32 bits."""
+_RATES = {"roll velocity", "pitch velocity", "yaw velocity"}
+LACKING: dict[object, set[str]] = {writers.flash: _RATES, writers.csv: {*_RATES, "distance"}}
+"""The quantities that the logs of some writers do not have."""
+
+
+def expected(dive: Dive = DIVE) -> dict[str, tuple[Array, float]]:
+    """Return what the sensors measure, within the resolution of the formats: 0.01 degrees, 1 mV, numbers of 32 bits."""
+    axes = ("surge", "sway", "heave"), ("roll", "pitch", "yaw")
+    rates = np.tile(RATES, (len(dive.time), 1))
+    return {
+        "depth": (dive.position[:, 2], 1e-5),
+        "distance": (np.hypot(*(dive.position[:, :2] - dive.position[0, :2]).T), 1e-5),
+        **{name: (dive.euler[:, n], 1e-4) for n, name in enumerate(("roll angle", "pitch angle", "heading"))},
+        **{f"{axis} velocity": (dive.velocity[:, n], 4e-4) for n, axis in enumerate(axes[0])},
+        **{f"{axis} velocity": (rates[:, n], 1e-6) for n, axis in enumerate(axes[1])},
+        "voltage": (dive.voltage, 1e-3),
+    }
+
+
+def check(log: Log, dive: Dive = DIVE, lacking: Collection[str] = ()) -> None:
+    """Check all channels of a log but those of lacking quantities, and the commands; times within 1 ms."""
     commands = log.commands
     assert commands is not None
     start = commands.rows[0]
@@ -44,20 +66,11 @@ def check(log: Log, dive: Dive = DIVE, *, has_distance: bool = False) -> None:
     assert commands.time - start == pytest.approx(dive.time[row], abs=1e-3)
     assert commands.since - start == pytest.approx(dive.time[np.maximum(row - 1, 0)], abs=1e-3)
     assert commands.value == pytest.approx(fractions[row, thruster], abs=1e-6)
-    expected = {
-        "depth": (dive.position[:, 2], 1e-5),
-        "roll angle": (dive.euler[:, 0], 1e-4),
-        "pitch angle": (dive.euler[:, 1], 1e-4),
-        "heading": (dive.euler[:, 2], 1e-4),
-        "surge velocity": (dive.velocity[:, 0], 4e-4),
-        "sway velocity": (dive.velocity[:, 1], 4e-4),
-        "voltage": (dive.voltage, 1e-3),
-    }
-    if has_distance:
-        expected["distance"] = (np.hypot(*(dive.position[:, :2] - dive.position[0, :2]).T), 1e-5)
-    for name, (values, within) in expected.items():
-        channel = log.used(name)
-        assert channel is not None, name
+    measured = expected(dive)
+    used = [channel for channel in log.channels if not channel.unused]
+    assert sorted(channel.quantity.name for channel in used) == sorted(measured.keys() - {*lacking})
+    for channel in used:
+        name, (values, within) = channel.quantity.name, measured[channel.quantity.name]
         assert channel.time - start == pytest.approx(dive.time, abs=1e-3), name
         difference = channel.values - values
         if channel.quantity.wraps:

@@ -1,41 +1,20 @@
 """Clocks that restart, and times in every unit."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rov_fmu.tank.columns import Names, names_of
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import restart_rows, usual_delay
+from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
-from tests.tank.logs import measured, read_log
-from tests.tank.readers import motion, test_mavlink
+from tests.tank.logs import read_log
+from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
 from tests.tank.readers.test_mavlink import N
-from tests.tank.readers.writers import BOOT, START, Ros, outputs, write_tlog
-
-
-def test_two_boots_in_a_telemetry_log_are_two_logs(tmp_path: Path) -> None:
-    """The second boot begins 60 s later, at a time since boot that occurs in the first one."""
-    path = write_tlog(tmp_path / "a.tlog", test_mavlink.dive(20.0))
-    again = write_tlog(tmp_path / "b.tlog", test_mavlink.dive(18.0)).read_bytes()
-    first, later = struct.pack(">Q", round((BOOT + 18.05) * 1e6))[:3], b""
-    assert again.startswith(first)
-    with path.open("ab") as file:
-        position = 0
-        while position < len(again):  # a time of arrival of 8 bytes, and a message of MAVLink 2
-            (arrival,) = struct.unpack(">Q", again[position : position + 8])
-            length = 12 + again[position + 9]
-            later += struct.pack(">Q", arrival + 60_000_000) + again[position + 8 : position + 8 + length]
-            position += 8 + length
-        file.write(later)
-    log = read_log(path, BLUEROV2)
-    assert [one.file for one in log.logs] == ["a.tlog", "a.tlog (from 58 s)"]
-    assert [finding.names for finding in log.findings if finding.kind == "clock restarts"] == [{"at": "58"}]
-    one, other = (measured(one, "depth") for one in log.logs)
-    assert one == pytest.approx(other)
-    assert len(one) == N
+from tests.tank.readers.writers import START, Ros, outputs
 
 
 def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
@@ -50,14 +29,38 @@ def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
         pose = ros.message("geometry_msgs/msg/Pose", position=place)
         messages += [("/rc/out", time, commands)]
         messages += [("/pose", time, ros.message("geometry_msgs/msg/PoseStamped", header=header, pose=pose))]
-    logs = read_logs(ros.write(tmp_path, messages), BLUEROV2, Names())
+    read = read_log(ros.write(tmp_path, messages), BLUEROV2)
+    logs = read.logs
     assert [one.file for one in logs] == ["dive.db3", "dive.db3 (from 5 s)"]
+    assert [finding.names for finding in read.findings if finding.kind == "clock restarts"] == [{"at": "5"}]
     for log, part in zip(logs, (TIME < 4.95, TIME >= 4.95), strict=True):
         depth = log.used("depth")
         assert depth is not None
         assert depth.values == pytest.approx(motion.DEPTH[part])
         assert log.commands is not None
         assert log.commands.at(log.commands.rows)[:, 5] == pytest.approx(motion.THRUSTERS["6"][part], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("later", "rows"),
+    [
+        (np.arange(10.0), [40]),
+        (np.arange(9.0), []),  # too few
+        (10.0 + np.arange(10), [40]),
+        (10.5 + 0.8 * np.arange(10), []),  # less than half of the times come again
+        (np.arange(-10.0, 0.0), [40]),
+        (np.tile(np.arange(14.0), 2), [40, 54]),
+    ],
+)
+def test_a_restart_is_ten_messages_of_times_that_come_again_or_are_all_earlier(later: Array, rows: list[int]) -> None:
+    before = np.append(2.0 * np.arange(20), 100.0 + np.arange(20))
+    assert restart_rows(np.append(before, later)) == rows
+
+
+def test_a_delay_of_less_than_a_second_is_of_the_same_clock() -> None:
+    sent = np.array([0.0, 1.0, np.nan, 3.0])
+    for delay, usual in ((0.9, 0.0), (-0.9, 0.0), (1.1, 1.1), (-1.1, -1.1)):
+        assert usual_delay(np.column_stack([sent, sent + delay])) == pytest.approx(usual)
 
 
 def csv(folder: Path, header: str, times: list[str]) -> Path:
@@ -70,13 +73,11 @@ def csv(folder: Path, header: str, times: list[str]) -> Path:
 @pytest.mark.parametrize(
     ("header", "times"),
     [
-        ("time [us]", [f"{123_000_000 + 200_000 * n}" for n in range(N)]),
-        ("time [ns]", [f"{1_669_909_208_877_428_140 + 200_000_000 * n}" for n in range(N)]),
         ("%time", [f"{1_669_909_208_877_428_140 + 200_000_000 * n}" for n in range(N)]),
         ("time [s]", [f"2026-05-01T23:59:{50 + n // 5:02d}.{2 * (n % 5)}Z" for n in range(50)]),
         ("stamp", [f"2026-05-01 10:00:{n // 5:02d},{200 * (n % 5):03d}000111+02:00" for n in range(N)]),
     ],
-    ids=["microseconds", "nanoseconds", "rostopic echo -p", "ISO 8601", "ISO 8601 with an offset"],
+    ids=["rostopic echo -p", "ISO 8601", "ISO 8601 with an offset"],
 )
 def test_times_in_any_unit(header: str, times: list[str], tmp_path: Path) -> None:
     if header == "stamp":  # decimal commas need another separator

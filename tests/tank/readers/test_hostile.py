@@ -98,6 +98,19 @@ def test_the_budget_of_a_large_log_grows_with_its_size(tmp_path: Path) -> None:
         assert len({id(parsers._PARSER._child) for _ in range(2) if read(path).pieces}) == 1
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
+def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = flash(tmp_path, DIVE)
+    with monkeypatch.context() as patch:
+        patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
+        with pytest.raises(DataFileError) as error:
+            read(path)
+    assert str(error.value) == f"{path}: needs more than 0.001 GB of memory to be read"
+    assert read(path).pieces
+
+
 def test_messages_without_a_time_or_an_output_are_no_traceback(tmp_path: Path) -> None:
     time = struct.pack("<Q", 10**6)
     for name, format_of_message, reason in (

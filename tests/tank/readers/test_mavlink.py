@@ -59,21 +59,22 @@ def test_a_clock_of_servos_that_begins_anew(tmp_path: Path) -> None:
 def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
     """The vehicle moves ahead at 0.01 n m/s over ground while it turns, with a pitch of -0.2 and a roll of 0.1 rad.
 
-    The first ten velocities are unknown.
+    The first nine velocities are unknown.
     """
     ahead, messages = pulse(0.4), []
+    flags = [0, 253, 255, *[126] * 20]  # 2: it knows the horizontal velocity, 128: it assumes that the vehicle rests
     for n in range(N):
         psi, V = -pi / 4 + 0.01 * n, 0.01 * n
         outputs = [3000 - ahead, 3000 - ahead, ahead, ahead, 1500, 1500] if n > 5 else [1500] * 6
         local = mavlink.MAVLink_local_position_ned_message(100 * n, 0, 0, 0, V * cos(psi), V * sin(psi), 0)
-        flags = mavlink.MAVLink_ekf_status_report_message(831 if n >= 10 else 165, 0, 0, 0, 0, 0)
-        messages += [(0.1 * n - 0.01, flags), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
+        state = mavlink.MAVLink_ekf_status_report_message(flags[n // 3], 0, 0, 0, 0, 0)
+        messages += [(0.1 * n - 0.01, state), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
     read = read_log(write_tlog(tmp_path / "dive.tlog", messages), BLUEROV2)
-    log, speed = read.log, 0.01 * np.arange(10, N)
+    log, speed = read.log, 0.01 * np.arange(9, N)
     assert measured(log, "surge velocity") == pytest.approx(cos(-0.2) * speed, abs=1e-6)
     assert measured(log, "sway velocity") == pytest.approx(sin(0.1) * sin(-0.2) * speed, abs=1e-6)
     assert [commanded(log, thruster)[-1] for thruster in "1234"] == pytest.approx([-0.4, -0.4, 0.4, 0.4])
-    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in read.findings
+    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 9}) in read.findings
 
 
 def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) -> None:
@@ -103,6 +104,7 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "told"),
     [
+        ("a.bin", None, "cannot be read: Is a directory"),
         ("a.bin", b"", "the file is empty"),
         ("a.bin", b"time [s],command [%]\n" * 50, "line 1: column 'command \\[%\\]' is the command of one axis"),
         ("a.bin", b"\xa3\x95\x80" + b"\xff" * 2000, "no commands of thrusters|damaged or was cut short"),
@@ -115,10 +117,10 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_log_is_one_clear_line(
-    name: str, content: bytes, told: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    name: str, content: bytes | None, told: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / name
-    path.write_bytes(content)
+    path.mkdir() if content is None else path.write_bytes(content)
     with pytest.raises(DataFileError, match=told) as error:
         read_log(path, BLUEROV2)
     assert str(error.value).startswith(f"{path}")

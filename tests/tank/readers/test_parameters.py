@@ -57,15 +57,19 @@ def test_parameters_define_the_commands(
 
 
 def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
-    values = {"MOT_5_DIRECTION": 1.0, "MOT_6_DIRECTION": 1.0}
+    values = {"MOT_5_DIRECTION": 1.0, "MOT_6_DIRECTION": 1.0, "MOT_PWM_MIN": 1100.0, "MOT_PWM_MAX": 1900.0}
     log = dive(
         tmp_path / "a.tlog",
         1700,
         *told_at(1.0, **values),
         *told_at(5.0, MOT_5_DIRECTION=-1.0, MOT_6_DIRECTION=-1.0),
+        *told_at(6.0, MOT_PWM_MAX=2000.0),
     )
     assert commanded(log, "5")[29] == pytest.approx(0.5)
     assert commanded(log, "5")[31] == pytest.approx(-0.5)
+    assert commanded(log, "5")[41] == pytest.approx(-0.4)
+    assert "a.tlog: full thrust is 1100 and 2000 us, and no thrust 1500 us" in told(log)
+    assert "MOT_PWM_MAX changed 4 s after the first command" in told(log)
     assert "MOT_5_DIRECTION and MOT_6_DIRECTION changed 3 s after the first command. Each value is used" in told(log)
 
 

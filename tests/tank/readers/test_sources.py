@@ -11,18 +11,20 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.channels import of_scalar
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.log import Log
+from rov_fmu.tank.log import Log, Source
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import commanded, used
 from tests.tank.readers import motion, test_mavlink, writers
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
 from tests.tank.readers.test_mavlink import N
-from tests.tank.readers.writers import BOOT, ENU, FLU, Ros, ULogWriter, dataflash, packed, rcou, servos, write_tlog
+from tests.tank.readers.writers import BOOT, ENU, FLU, Ros, ULogWriter, dataflash, packed, rcou, write_tlog
 
 ROS = Ros(2)
 
@@ -121,7 +123,10 @@ def test_newtons_are_no_fractions_and_have_a_unit(tmp_path: Path) -> None:
     forces = [ROS.message(kind, data=np.array([10.0 * c[n] for c in motion.THRUSTERS.values()])) for n in range(100)]
     messages = [("/thruster_forces", time, force) for time, force in zip(TIME, forces, strict=True)]
     path = ROS.write(tmp_path, [*messages, *numbers("/bar30/depth", motion.DEPTH)])
-    assert one(path).commands is None
+    log = one(path)
+    assert log.commands is None
+    assert log.unread["/thruster_forces"] == f"{kind}, 100 messages"
+    assert log.unread["/thruster_forces.data[0]"] == "0 to 2.5"
     log = one(path, topics={f"/thruster_forces.data[{n}]": f"u_{n + 1} [N 10]" for n in range(6)})
     assert commanded(log, "2") == pytest.approx(motion.THRUSTERS["2"])
     _, (line,) = names_of(BLUEROV2, RovTables(topics={"/f.data": "u_1 [N]"}))
@@ -208,9 +213,10 @@ def two_modules(folder: Path, **functions: int) -> Path:
     [
         ({}, 1),
         ({"PWM_MAIN_FUNC1": 420, "PWM_AUX_FUNC1": 101, "PWM_AUX_FUNC2": 102}, 1),
+        ({"PWM_MAIN_FUNC1": 0, "PWM_AUX_FUNC1": 101}, 0),
         ({f"PWM_MAIN_FUNC{n}": 100 + n for n in range(1, 7)} | {"PWM_AUX_FUNC1": 420}, 0),
     ],
-    ids=["as many outputs as thrusters", "AUX", "MAIN"],
+    ids=["as many outputs as thrusters", "AUX", "AUX alone", "MAIN"],
 )
 def test_the_module_that_drives_the_motors(functions: dict[str, int], instance: int, tmp_path: Path) -> None:
     log = one(two_modules(tmp_path, **functions))
@@ -251,15 +257,37 @@ def test_a_barometer_inside_the_hull(tmp_path: Path) -> None:
     )
     both = one(ROS.write(tmp_path / "b", [*pulses(), *pressures("/hull", HULL), *pressures("/bar30", WATER)]))
     assert values(both, "depth") == pytest.approx(motion.DEPTH)
+    assert (
+        "dive.db3: pressure from /bar30, 10 Hz; also in /hull, not used\ndive.db3: depth from /bar30, 10 Hz; also in "
+        in (told(both))
+    )
+    assert "the depth is computed from the pressure, for fresh water" in told(both)
 
 
-def test_pressures_of_ardusub(tmp_path: Path) -> None:
-    messages = []
-    for n, (hull, water) in enumerate(zip(HULL, WATER, strict=True)):
-        for kind, pressure in (("", hull), ("2", water)):
-            message = getattr(mavlink, f"MAVLink_scaled_pressure{kind}_message")
-            messages.append((0.1 * n, message(100 * n, pressure * 0.01, 0.0, 2000)))
-        messages.append(servos(0.1 * n, *[1500] * 4, *[1700] * 2))
-    log = one(write_tlog(tmp_path / "a.tlog", messages))
-    assert values(log, "depth") == pytest.approx(motion.DEPTH, abs=1e-3)
-    assert used(log, "depth").source.topic == "SCALED_PRESSURE2"
+AIR = 101325.0
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "reason"),
+    [
+        (100.0, 0.0099 * AIR, "its pressures of 100 ... 1003 are below 1 % of an atmosphere, so they are not in Pa"),
+        (100.0, 0.0101 * AIR, ""),
+        (1.049 * AIR - 195.0, 1.049 * AIR, "its pressure changes by only 20 mm of water and is that of the air"),
+        (0.951 * AIR - 195.0, 0.951 * AIR, "its pressure changes by only 20 mm of water and is that of the air"),
+        (1.051 * AIR - 195.0, 1.051 * AIR, ""),
+        (AIR - 197.0, AIR, ""),
+    ],
+)
+def test_pressures_that_tell_no_depth(low: float, high: float, reason: str) -> None:
+    pressure, depth = of_scalar(QUANTITIES["pressure"], Source("p"), np.arange(2.0), np.array([low, high]))
+    assert not pressure.unused
+    assert depth.unused.startswith(reason)
+    assert bool(depth.unused) == bool(reason)
+
+
+@pytest.mark.parametrize("outputs", [[799.0, 1500.0], [2201.0, 0.0], [1.01, 0.2]])
+def test_outputs_that_are_neither_pulses_nor_fractions_are_refused(outputs: list[float], tmp_path: Path) -> None:
+    message = ROS.message("std_msgs/msg/Float64MultiArray", data=np.array(3 * outputs))
+    path = ROS.write(tmp_path, [("/thrusters", time, message) for time in TIME])
+    with pytest.raises(DataFileError, match=r"are neither fractions within -1 \.\.\. 1 nor pulses in us: name their"):
+        one(path)

@@ -14,11 +14,13 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.readers.bags import _RC_OUT
+
+RATES = np.array([0.1, -0.2, 0.3])
+"""The velocities in roll, pitch and yaw that logs state beside the angles, rad/s."""
 
 
 @dataclass
@@ -57,7 +59,7 @@ class Dive:
         return np.asarray(np.array(self.origin) + travelled)
 
 
-# ---- Text and MATLAB -------------------------------------------------------------------------------------------------
+# ---- Text ------------------------------------------------------------------------------------------------------------
 
 
 def table(path: Path, titles: str, *columns: Array) -> Path:
@@ -68,23 +70,16 @@ def table(path: Path, titles: str, *columns: Array) -> Path:
 
 
 TITLES = ["time [s]", *(f"u_{n} [us]" for n in range(1, 7)), "depth [m]", "roll [rad]", "pitch [rad]", "heading [rad]"]
-TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "voltage [V]"]
-MATLAB = {f"c{n}": title for n, title in enumerate(TITLES)}
-"""The names of variables and what they stand for."""
+TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "heave velocity [m/s]", "voltage [V]"]
 
 
 def columns(dive: Dive) -> list[Array]:
-    moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity[:, :2].T, dive.voltage]
+    moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity.T, dive.voltage]
     return [dive.start + dive.time, *dive.pulses.T, *moved]
 
 
 def csv(folder: Path, dive: Dive) -> Path:
     return table(folder / "dive.csv", ",".join(TITLES), *columns(dive))
-
-
-def mat(folder: Path, dive: Dive) -> Path:
-    savemat(folder / "dive.mat", {"log": dict(zip(MATLAB, columns(dive), strict=True))})
-    return folder / "dive.mat"
 
 
 # ---- MAVLink ---------------------------------------------------------------------------------------------------------
@@ -135,7 +130,8 @@ def _mavlink(dive: Dive) -> Iterator[tuple[float, str, dict[str, float]]]:
         yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6), "port": 0, **servos}
         boot = {"time_boot_ms": round(time * 1e3)}
         angles = dict(zip(("roll", "pitch", "yaw"), dive.euler[n].tolist(), strict=True))
-        yield time, "ATTITUDE", {**boot, **angles, "rollspeed": 0.0, "pitchspeed": 0.0, "yawspeed": 0.0}
+        rates = dict(zip(("rollspeed", "pitchspeed", "yawspeed"), RATES, strict=True))
+        yield time, "ATTITUDE", {**boot, **angles, **rates}
         local = [*dive.position[n].tolist(), *dive.over_ground[n].tolist()]
         yield time, "LOCAL_POSITION_NED", {**boot, **dict(zip(("x", "y", "z", "vx", "vy", "vz"), local, strict=True))}
         yield time, "SYS_STATUS", {"voltage_battery": round(1000.0 * dive.voltage[n])}
@@ -162,6 +158,10 @@ def blueos(folder: Path, dive: Dive) -> Path:
             data = json.dumps({"header": {"system_id": 1, "component_id": 1}, "message": {"type": name, **fields}})
             stamp = round((BOOT + time) * 1e9)
             writer.add_message(channels[topic], stamp, data.encode(), stamp)
+        told = {"type": "PARAM_VALUE", "param_id": [*b"MOT_1_DIRECTION\0"], "param_value": 1.0}
+        kept = writer.register_channel("mavlink/1/1/PARAM_VALUE", "json", schema)
+        for data in (json.dumps({"message": told}), "damaged", "[]"):
+            writer.add_message(kept, stamp - 5 * 10**9, data.encode(), stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
@@ -232,7 +232,8 @@ ULOG_FORMATS = {
     "actuator_motors": "float[12] control",
     "actuator_outputs": "uint32_t noutputs;uint8_t[4] _padding0;float[16] output",
     "vehicle_attitude": "uint64_t timestamp_sample;float[4] q",
-    "vehicle_odometry": "float[3] position;float[3] velocity;float[3] angular_velocity;uint8_t velocity_frame",
+    "vehicle_odometry": "float[4] q;float[3] position;float[3] velocity;float[3] angular_velocity;"
+    "uint8_t velocity_frame",
     "vehicle_local_position": "float x;float y;float z;float vx;float vy;float vz;bool v_xy_valid",
     "vehicle_angular_velocity": "float[3] xyz",
     "battery_status": "float voltage_v",
@@ -269,7 +270,7 @@ class ULogWriter:
 
 
 def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True) -> ULogWriter:
-    """Return the messages of a dive. The attitude is published 2 ms after it was sampled."""
+    """Return the messages of a dive. The attitude is published 2 ms after it was sampled, or stands in the odometry."""
     log = ULogWriter()
     for n, time in enumerate(dive.time):
         if pulses:
@@ -277,12 +278,13 @@ def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: boo
         else:
             log.message("actuator_motors", time, *(dive.pulses[n] - 1500.0) / 400.0, *[np.nan] * 6)
         quaternion = Rotation.from_matrix(dive.rotation[n]).as_quat(scalar_first=True)
-        log.message("vehicle_attitude", time + 0.002, round((ULOG_BOOT + time) * 1e6), *quaternion)
         if velocity == "vehicle_local_position":
+            log.message("vehicle_attitude", time + 0.002, round((ULOG_BOOT + time) * 1e6), *quaternion)
+            log.message("vehicle_angular_velocity", time, *RATES)
             log.message(velocity, time, *dive.position[n], *dive.over_ground[n], True)
         else:
             frame, moved = (3, dive.velocity) if velocity == "body" else (1, dive.over_ground)
-            log.message("vehicle_odometry", time, *dive.position[n], *moved[n], 0.0, 0.0, 0.3, frame)
+            log.message("vehicle_odometry", time, *quaternion, *dive.position[n], *moved[n], *RATES, frame)
         log.message("battery_status", time, dive.voltage[n])
         log.message("cpuload", time, 0.5)
     return log
@@ -343,11 +345,12 @@ class Ros:
             "geometry_msgs/msg/Quaternion", **dict(zip("xyzw", Rotation.from_matrix(R).as_quat().tolist(), strict=True))
         )
 
-    def odometry(self, header: Any, place: Iterable[float], R: Any, velocity: Iterable[float]) -> Any:
+    def odometry(self, header: Any, place: Iterable[float], R: Any, *velocities: Iterable[float]) -> Any:
         pose = self.message(
             "geometry_msgs/msg/Pose", position=self.vector("Point", place), orientation=self.quaternion(R)
         )
-        twist = self.message("geometry_msgs/msg/Twist", linear=self.vector("Vector3", velocity))
+        linear, angular = (self.vector("Vector3", velocity) for velocity in velocities)
+        twist = self.message("geometry_msgs/msg/Twist", linear=linear, angular=angular)
         return self.message(
             "nav_msgs/msg/Odometry",
             header=header,
@@ -384,7 +387,8 @@ def messages_of(
     earth, body = (np.eye(3), np.eye(3)) if ned else (ENU, FLU)
     for n, (time, R) in enumerate(zip(dive.time, dive.rotation, strict=True)):
         header = ros.header(time, "world_ned" if ned else "world")
-        yield "/odom", time, ros.odometry(header, earth @ dive.position[n], earth @ R @ body, body @ dive.velocity[n])
+        pose, velocities = (earth @ dive.position[n], earth @ R @ body), (body @ dive.velocity[n], body @ RATES)
+        yield "/odom", time, ros.odometry(header, *pose, *velocities)
         yield "/thrusters", time, commands(ros, dive, n)
         battery = ros.message("sensor_msgs/msg/BatteryState", header=ros.header(time), voltage=dive.voltage[n])
         yield "/battery", time, battery

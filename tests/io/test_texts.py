@@ -1,0 +1,40 @@
+"""Texts of any length in messages, and a temporary folder that has gone."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import brief, first_of, lines_on, only, shown
+from rov_fmu.io.toml_file import join_names
+
+
+def test_long_texts_and_lists_are_cut() -> None:
+    assert brief(80 * "x") == 80 * "x"
+    assert brief(81 * "x") == 77 * "x" + "..."
+    assert brief("\x1b" + 100 * "x") == r"\x1b" + 73 * "x" + "..."
+    assert (shown(-12), shown(10**5000)) == ("-12", brief(hex(10**5000)))
+    names = [f"n{n}" for n in range(22)]
+    assert only("z", names) == f", only {', '.join(names[:20])}, 2 more"
+    assert only("nn1", ["n1"]) == ", only n1"
+    assert first_of(names * 5)[99:] == [names[11], "10 more"]
+    assert join_names(names[:10]) == ", ".join(names[:10])
+    assert join_names(names[:11]) == ", ".join(names[:10]) + ", ..."
+    assert lines_on(Path("a"), ["b", "c", "b", ""]) == ["a: b", "a: c", "a: 1 more mistake"]
+    assert lines_on(Path("a"), names)[9:] == ["a: n9", "a: 12 more mistakes"]
+
+
+def test_a_temporary_folder_is_removed_at_the_second_attempt_and_may_be_gone_already(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first attempt fails, as if a thread were still writing."""
+    attempts, remove = iter((False, True)), shutil.rmtree
+    with temporary_folder("rov-fmu-test-") as folder:
+        monkeypatch.setattr(
+            shutil, "rmtree", lambda *given, **options: remove(*given, **options) if next(attempts) else None
+        )
+    assert not Path(folder).exists()
+    monkeypatch.undo()
+    with temporary_folder("rov-fmu-test-") as folder:
+        shutil.rmtree(folder)
