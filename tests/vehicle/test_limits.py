@@ -43,6 +43,7 @@ def test_the_bounds_of_a_coefficient_are_included_and_told(unit: str, shown: str
         "M_q": "; give -M_q, which is positive, as b_d of [axes.pitch]",
         "Y_rdot": "; give its negative as m_a_vr in [cross]",
         "N_v|v|": "; give its negative as a_d_rv in [cross]",
+        "N_v|r|": "",
         "Y_r": "; give its negative as b_d_vr in [cross]",
         "Q_u": "",
     }.items(),
@@ -63,6 +64,13 @@ def test_an_entry_of_the_mass_matrix_is_less_than_the_mean_of_the_masses(share: 
     found = lines(check_mass(rov.layout, values))
     assert (found == []) == possible
     assert all(f"within ±{most:.4g} for a positive definite matrix, but it is {share * most:.4g}" in x for x in found)
+
+
+def test_a_mass_matrix_that_has_no_inverse_is_refused() -> None:
+    axes = tuple(VehicleAxis(axis, ("m_a", "a_d", "b_d")) for axis in (SURGE, SWAY))
+    rov = numbered(Layout(axes, (), (), cross=(("m_a", "u", "v"),)), m_a_u=6.5, m_a_v=6.5, m_a_uv=MASS + 6.5)
+    (line,) = lines(check_mass(rov.layout, rov.coefficients))
+    assert line.startswith("cross: the mass matrix must be positive definite, not singular")
 
 
 # ---- Tables ----

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import log
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +71,10 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         lambda text: text.replace("{ a_d_u =", "{ m_rov ="),
         "estimates.b_d_u.correlation.m_rov = -0.883478: there is no such coefficient in this table",
     ),
+    "with itself": (
+        lambda text: text.replace("{ a_d_u =", "{ b_d_u ="),
+        "estimates.b_d_u.correlation.b_d_u = -0.883478: of a coefficient with itself is 1 and is not given",
+    ),
     "above 1": (
         lambda text: text.replace("-0.883478", "-1.5"),
         "estimates.b_d_u.correlation.a_d_u = -1.5: must be greater than or equal to -1",
@@ -113,11 +118,13 @@ def test_a_correlation_of_1_is_allowed(tmp_path: Path) -> None:
 def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path) -> None:
     path = tmp_path / "with.toml"
     text = ALONE.replace('6.57, unit = "kg"', '6.57, unit = "kg", interval = [6.374, 6.766]')
+    text = text.replace("value = 0.6324,", "value = 0.6324, interval = [0.0, 1.0244],")  # which ends at a bound
+    text = text.replace("value = 1.1,", "value = 1.1, interval = [1.0, 1.331],")
     path.write_text(text, encoding="utf-8")
     found = load_vehicle(path).uncertainty
-    assert found.names == ("m_rov",)
-    assert found.errors == pytest.approx([0.1], rel=1e-4)
-    drawn = found.drawn(qmc.Sobol(1, scramble=False).random(1024))
+    assert found.names == ("m_rov", "b_d_w", "alpha_u")
+    assert found.errors == pytest.approx([0.1, 0.2, 1.1 * log(1.331) / 3.92], rel=1e-4)
+    drawn = found.drawn(qmc.Sobol(3, scramble=False).random(1024))
     assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002
     assert np.isfinite(drawn).all(), "the first number of Sobol's sequence is 0"
 
@@ -159,6 +166,10 @@ def test_draws_at_a_bound_agree_with_bounded_fits(b: float) -> None:
         (-0.004, (-1.2, 1.2), ("-0.0040", "-1.2", "1.2")),
         (5.8e-12, (-0.35, 0.35), ("0", "-0.35", "0.35")),
         (2.5, None, ("2.500", "", "")),
+        (1234567.0, None, ("1.235e+6", "", "")),
+        (123456.0, None, ("123500", "", "")),
+        (1.23456e-5, None, ("0.00001235", "", "")),
+        (1.23456e-6, None, ("1.235e-6", "", "")),
         (39.99999999999999, (39.99999999999998, 40.00000000000001), ("40.00", "40.00", "40.00")),
     ],
 )
