@@ -171,17 +171,16 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"alternatives.other.a_d_u.value": -1.0},
         "alternatives.other.a_d_u.value = -1.0 … 0 ... 1000000 N.s2/m2",
     ),
-    # several mistakes at once, of form and of content
-    "many": (
-        {
-            "validity.command_max": 1.01,
-            "curves.frame.b_t_reverse": GONE,
-            "thruster.5.curve": "T200",
-            "axes.yaw.beta.value": 0.0,
-            "inputs.idle": {"5": 0.0},
-            "alternatives.other.a_d_u.unit": "lb",
-        },
-        "validity.command_max\nthruster.5.curve\ninputs.idle\ncurves.frame.b_t_reverse\naxes.yaw.beta",
+    # other tables
+    "a command beyond full": ({"validity.command_max": 1.01}, "validity.command_max = 1.01: must be … equal to 1"),
+    "a thrust curve that is half reversed": (
+        {"curves.frame.b_t_reverse": GONE},
+        "curves.frame.b_t_reverse: this key is missing, and a_t_reverse is there",
+    ),
+    "no hash": ({"provenance.inputs": {"rov.toml": "abc"}}, "provenance.inputs.rov.toml = 'abc'"),
+    "a battery that nothing needs": (
+        {"battery": {"voltage": quantity(12.0, "V")}},
+        "battery: no thrust depends on the voltage: give a curve V_0 and n_V, or tables; or leave it out",
     ),
     "coupling without sway": (
         {**_NO_BOOST, "body.coupling": True, "axes.sway": GONE},

@@ -14,8 +14,7 @@ from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.vehicle.test_checks import GONE, changed, check_mistakes, quantity
-from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, THRUST_EFFECTS, carried, sources_of
+from tests.vehicles import THRUST_EFFECTS, carried, sources_of
 
 TEXT = THRUST_EFFECTS.read_text(encoding="utf-8")
 _FILES = ("thrust_12_v.csv", "thrust_16_v.csv")
@@ -268,10 +267,3 @@ def test_the_ends_of_what_is_allowed_are_allowed(changes: dict[str, Any], folder
     path = folder / "rov.toml"
     path.write_text(changed({**changes, "commands.pulse": [500, 510, 2500]}, TEXT), encoding="utf-8")
     assert load_vehicle(path).layout.pulse == (500.0, 510.0, 2500.0)
-
-
-def test_a_battery_that_nothing_needs_is_refused(folder: Path) -> None:
-    path = folder / "rov.toml"
-    text = EVERYTHING.read_text(encoding="utf-8")
-    path.write_text(text + '\n[battery]\nvoltage = { value = 12.0, unit = "V", source = "x" }\n', encoding="utf-8")
-    assert "battery: no thrust depends on the voltage" in refusal(path)

@@ -167,6 +167,3 @@ def test_a_step_that_fails_inside_returns_the_last_successful_time(fmu3: fmi3.Fm
         assert rov.time() == 0.0025
         assert rov.mode() == FAILED
         assert [m.text.partition(":")[0] for m in rov.log] == ["fmi3SetFloat64", "fmi3DoStep"]
-
-
-# ---- A host in C ----
