@@ -80,7 +80,8 @@ def card_text(vehicle: Vehicle) -> str:
     lines = [f"Model card of {vehicle.name}"]
     for heading, paragraphs in card(vehicle).items():
         lines += ["", heading]
-        lines += [fill(f"- {one}", _WIDTH, subsequent_indent="  ", break_long_words=False) for one in paragraphs]
+        form = {"initial_indent": "- ", "subsequent_indent": "  ", "break_long_words": False}
+        lines += [fill(one, _WIDTH, **form) for one in paragraphs]
     return "\n".join(lines) + "\n"
 
 

@@ -62,9 +62,10 @@ def test_what_the_equation_lacks_is_told(name: str) -> None:
 
 @pytest.mark.parametrize("name", _ROVS)
 def test_a_card_is_read_as_it_was_written(name: str) -> None:
-    text = card_text(_ROVS[name])
-    assert max(map(len, text.splitlines())) <= 100
-    assert read_card(text) == {f"Model card of {_ROVS[name].name}": [], **card(_ROVS[name])}
+    rov = replace(_ROVS[name], limits=(f"Words: {'long' * 20}{' and short' * 20}.", "long" * 30))
+    text = card_text(rov)
+    assert [line for line in text.splitlines() if len(line) > 100] == [f"- {'long' * 30}"]
+    assert read_card(text) == {f"Model card of {rov.name}": [], **card(rov)}
 
 
 def _holds(rov: Vehicle) -> list[str]:
