@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import fmpy
 import pytest
 from pythonfmu import FmuBuilder
 
@@ -313,4 +314,4 @@ def test_what_an_fmu_does_not_have_is_named(foreign: Path, videoray_fmu: Path, t
         binaries = dict.fromkeys(n for n in archive.namelist() if n.startswith("binaries/"))
     bare = _with(videoray_fmu, binaries, tmp_path / "bare.fmu")
     assert main(["prove", str(bare)]) == 2
-    assert "has no binary for this machine" in capsys.readouterr().err
+    assert capsys.readouterr().err == f"rov-fmu: {bare}: has no binary for this machine ({fmpy.platform}): none\n"

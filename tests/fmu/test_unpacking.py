@@ -195,7 +195,10 @@ WRONG: list[tuple[str, str, str, str]] = [
 
 @pytest.mark.parametrize(("text", "old", "new", "reason"), WRONG, ids=[row[3] for row in WRONG])
 def test_a_wrong_attribute_is_one_line(text: str, old: str, new: str, reason: str, tmp_path: Path) -> None:
-    right, wrong = (_archive(_member("modelDescription.xml", t.encode())) for t in (text, text.replace(old, new)))
+    folder = _member("resources/", mode=(stat.S_IFDIR | 0o755) << 16)
+    right, wrong = (
+        _archive(folder, _member("modelDescription.xml", t.encode())) for t in (text, text.replace(old, new))
+    )
     assert len(unpack_fmu(right, Path("a.fmu"), tmp_path / "right").modelVariables) >= 2
     with pytest.raises(FileError) as error:
         unpack_fmu(wrong, Path("a.fmu"), tmp_path / "wrong")

@@ -177,6 +177,7 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"curves.frame.b_t_reverse": GONE},
         "curves.frame.b_t_reverse: this key is missing, and a_t_reverse is there",
     ),
+    "no report": ({"provenance.report": "none.html"}, "provenance.report = 'none.html': there is no such file beside"),
     "no hash": ({"provenance.inputs": {"rov.toml": "abc"}}, "provenance.inputs.rov.toml = 'abc'"),
     "a battery that nothing needs": (
         {"battery": {"voltage": quantity(12.0, "V")}},
@@ -231,6 +232,10 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
     "a lift in the other order": (
         {"cross.Y_ru": quantity(0.1, "N.s2/(m.rad)")},
         "cross.Y_ru: write Y_ur, which is the same coefficient",
+    ),
+    "a cross term by its derivative": (
+        {"cross.N_v|v|": quantity(-0.1, "N.m.s2/m2")},
+        "cross.N_v|v| = 'N_v|v|': is not a coefficient of several axes; give its negative as a_d_rv in [cross]",
     ),
     "a cross term of one axis": (
         {"cross.m_a_uu": quantity(1.0, "kg")},

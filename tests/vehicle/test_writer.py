@@ -20,6 +20,8 @@ HASH = "0123456789abcdef" * 4
 
 def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
     inputs = {"log heave.csv": HASH, "ä.csv": HASH}
+    report = tmp_path / "report.html"
+    report.touch()
     made = replace(
         vehicle,
         name='ROV "Döv" \\ 1',
@@ -29,13 +31,13 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
         intervals={"m_rov": (6.5, 6.6), "b_d_w": (0.0, 1.25)},
         provenance=Provenance(
             tool="tool", method="heave: a\nyaw: b", inputs=inputs, warnings=("a warning", "b"), facts=("a fact", "c")
-        ),
+        ).model_copy(update={"report": report}),
     )
     path = tmp_path / "made.toml"
     write_vehicle(made, path)
     assert load_vehicle(path) == made
-    assert vehicle_text(made) == path.read_text(encoding="utf-8")
-    assert [p.name for p in tmp_path.iterdir()] == ["made.toml"]
+    assert vehicle_text(made, tmp_path) == path.read_text(encoding="utf-8")
+    assert {p.name for p in tmp_path.iterdir()} == {"made.toml", "report.html"}
 
 
 def test_the_first_words_of_a_file_say_what_it_was_made_from(vehicle: Vehicle) -> None:
