@@ -45,6 +45,13 @@ LEFT_OUT = {
         "Separate terms for static drag and a delay at the start; β < 1 stands for a slow start.",
         *(_TETHER, f"{_WATER} Depth has no limits.", "A current is steady and everywhere the same."),
     ],
+    "surge and sway without yaw": [
+        "Coupling between the axes.",
+        "Heave, yaw, pitch, roll.",
+        "Thrusters as machines: there is no lag, delay or loss of thrust with speed.",
+        "Separate terms for added mass, static drag and a delay at the start; β < 1 stands for a slow start.",
+        *(_TETHER, _WATER, _CURRENT),
+    ],
     "yaw only": [
         "Surge, sway, heave, pitch, roll.",
         "What differs between the two directions of drag.",

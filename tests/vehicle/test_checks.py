@@ -374,6 +374,17 @@ def test_numbers_that_are_probably_wrong_give_a_warning(case: str, tmp_path: Pat
     assert len(caught) == 1
 
 
-def test_a_coefficient_that_makes_the_mass_matrix_indefinite_cannot_be_set() -> None:
-    with pytest.raises(InputError, match=r"cross\.m_a_uq\.value = 3\.0: the entry of the mass matrix"):
-        load_vehicle(SIX_AXES).with_(m_a_uq=3.0)
+@pytest.mark.parametrize(
+    ("source", "values", "message"),
+    [
+        (SIX_AXES, {"m_a_uq": 3.0}, "cross.m_a_uq.value = 3.0: the entry of the mass matrix"),
+        (EVERYTHING, {"R": 0.0}, "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"),
+        (EVERYTHING, {"a_t_boost": -5.0}, "curve boost: must give a force above 0 at full command"),
+        (EVERYTHING, {"mass": 14.0}, "mass: there is no such coefficient of this vehicle; did you mean m_rov?"),
+        (EVERYTHING, {"m_rov": True}, "m_rov = True: must be a finite number"),
+        (EVERYTHING, {"m_rov": float("inf")}, "m_rov = inf: must be a finite number"),
+    ],
+)
+def test_a_coefficient_that_is_impossible_cannot_be_set(source: Path, values: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        load_vehicle(source).with_(**values)

@@ -127,6 +127,7 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     assert [sources_of(fin).keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(
         written.layout.fins
     )
+    assert {path.name for path in written.files} == {*_FILES}
     assert written.layout.voltage_source == "a battery of four cells"
     assert {name: tuned[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
         "lift_rudder": 10.0,

@@ -13,6 +13,7 @@ from scipy.optimize import lsq_linear
 from scipy.stats import kstest, norm, qmc, spearmanr
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -58,6 +59,14 @@ def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_pa
     assert {*refit.estimates} - {*others} == {"a_d_u"}
     assert others["b_d_u"] == refit.estimates["b_d_u"].model_copy(update={"correlation": {}})
     assert others["beta_w"] == refit.estimates["beta_w"]
+    by_hand = refit.with_(a_d_u=9.0)
+    assert (by_hand.estimates, {*refit.intervals} - {*by_hand.intervals}) == (others, {"a_d_u"})
+    axes = tuple(one for one in refit.layout.axes if one.axis is not HEAVE)
+    flat = refit.in_layout(replace(refit.layout, axes=axes))
+    assert flat.coefficients == {name: x for name, x in refit.coefficients.items() if not name.endswith("_w")}
+    assert flat.sources.keys() == flat.coefficients.keys() > flat.intervals.keys() == flat.estimates.keys()
+    assert flat.estimates["b_d_u"] == refit.estimates["b_d_u"]
+    assert all(row.correlation.keys() <= flat.estimates.keys() for row in flat.estimates.values())
     write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit[name] + 0.1 for name in refit.estimates}, "a test")
     assert "estimates" not in path.read_text(encoding="utf-8")
 

@@ -1,7 +1,9 @@
 """What is measured of an FMU, from answers that are made up: the numbers, the words and the verdicts."""
 
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,11 +16,11 @@ from rov_fmu.fmu.claims import measures
 from rov_fmu.fmu.claims.runs import Answer, Plan, RunError
 from rov_fmu.fmu.claims.subject import Subject
 from rov_fmu.fmu.experiments import Experiment
+from rov_fmu.io.csv_table import Series
 
 _VARIABLES = {"X_ext": "input", "u": "output", "der(u)": "local", **dict.fromkeys(("a_d_u", "F_0_u"), "parameter")}
-_TWO_PIECES = Experiment(
-    "held", 0.0, 2.0, 0.1, 1e-3, {"k": "2"}, {"time": [0.0, 1.0, 1.0], "X_ext": [1.0, 1.0, -1.0]}, None
-)
+_HELD = Series(time=array("d", (0.0, 1.0, 1.0)), X_ext=array("d", (1.0, 1.0, -1.0)))
+_TWO_PIECES = Experiment("held", 0.0, 2.0, 0.1, 1e-3, {"k": "2"}, _HELD, None)
 
 
 def subject(call: Callable[..., Any], *experiments: Experiment, **given: Any) -> Subject:
@@ -54,12 +56,14 @@ def _unasked(*_: Any) -> Any:
 
 
 def test_the_experiment_with_the_most_held_inputs_is_run() -> None:
-    ramp = Experiment("ramp", 0.0, 2.0, 0.1, 1e-3, {}, {"time": [0, 1], "X_ext": [0, 1], "u": [0, 0]}, None)
-    still = Experiment("still", 0.0, 2.0, 0.1, 1e-3, {}, None, None)
+    ramp = replace(
+        _TWO_PIECES, name="ramp", stimuli=Series({name: array("d", (0.0, 1.0)) for name in ("time", "X_ext", "u")})
+    )
+    still = replace(_TWO_PIECES, name="still", stimuli=None)
     found = subject(_unasked, still, ramp, _TWO_PIECES)
     assert found.plan == Plan(0.0, ((1.0, {"X_ext": 1.0}), (2.0, {"X_ext": -1.0})), {"k": "2"}, ["u"])
     assert (found.allowed, found.words) == (1e-3, "the experiment held (2 s)")
-    late = Experiment("late", 0.5, 0.75, 0.1, 1e-3, {}, _TWO_PIECES.stimuli, None)
+    late = replace(_TWO_PIECES, start=0.5, stop=0.75)
     assert subject(_unasked, late).plan.pieces == ((0.75, {"X_ext": 1.0}),)
 
 

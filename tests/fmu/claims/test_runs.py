@@ -88,6 +88,17 @@ def test_a_run_sets_inputs_at_each_piece_and_ends_as_fmi_demands(folder: Path) -
     ]
 
 
+def test_both_versions_of_fmi_are_run_alike(videoray_dir: Path, videoray3_dir: Path) -> None:
+    two, three = (Runs(str(folder)) for folder in (videoray_dir, videoray3_dir))
+    plan = Plan(0.0, ((1.0, {"u_l": 0.3}), (2.0, {"u_l": -0.5, "Z_ext": 1.0})), {"beta_r": "0.5"}, ["u", "w", "r"])
+    assert two.run(plan, 3).tolist() == three.run(plan, 3).tolist()
+    for runs in (two, three):
+        assert runs.step_tried(plan, -1.0).refused == 1
+        refused = runs.values_tried(plan, [("m_rov", -1.0), ("beta_u", 0.5)])
+        assert (refused.refused, refused.kept) == (1, 1)
+        assert refused.words.startswith("discard: fmi")
+
+
 def test_the_time_of_steps_is_measured_until_it_is_up(folder: Path) -> None:
     """A step takes 0.02 s at least. Two runs of two steps are begun anew, and one of forty steps is not completed."""
     for steps, most in ((1, 0.12), (20, 0.03)):
