@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.equation.layout import CurrentTable
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -263,8 +264,14 @@ def test_a_mistake_is_a_clear_line(name: str, folder: Path) -> None:
     check_mistakes(path, wanted)
 
 
-@pytest.mark.parametrize("changes", [{"battery.voltage": quantity(V, "V")} for V in (12.0, 16.0)])
-def test_the_ends_of_what_is_allowed_are_allowed(changes: dict[str, Any], folder: Path) -> None:
+@pytest.mark.parametrize(("voltage", "file"), [(12.0, _FILES[0]), (16.0, _FILES[1])])
+def test_at_the_ends_of_the_voltage_thrust_is_that_of_its_table(voltage: float, file: str, folder: Path) -> None:
+    """The shortest pulses are allowed, too. The main pair has 0.9 times the thrust of its tables."""
     path = folder / "rov.toml"
-    path.write_text(changed({**changes, "commands.pulse": [500, 510, 2500]}, TEXT), encoding="utf-8")
-    assert load_vehicle(path).layout.pulse == (500.0, 510.0, 2500.0)
+    changes = {"battery.voltage": quantity(voltage, "V"), "commands.pulse": [500, 510, 2500]}
+    path.write_text(changed(changes, TEXT), encoding="utf-8")
+    vehicle, table = load_vehicle(path), read_thrust(folder / file)
+    assert vehicle.layout.pulse == (500.0, 510.0, 2500.0)
+    ends = [vehicle.force(SURGE, command) for command in (-1.0, 1.0)]
+    assert ends == pytest.approx([1.8 * table.forces[0], 1.8 * table.forces[-1]])
+    assert vehicle.strongest(SURGE) == pytest.approx(ends[1])

@@ -1,6 +1,7 @@
 """The runs of an FMU: every call in its order, beside the calls that the FMU itself writes down."""
 
 import time
+from math import inf
 from pathlib import Path
 
 import fmpy
@@ -8,6 +9,7 @@ import pytest
 from pythonfmu import FmuBuilder
 
 from rov_fmu.fmu.claims.runs import Answer, Plan, Runs
+from rov_fmu.fmu.claims.subject import opened
 from verification.references.fmpy_slave import keep_loaded
 
 _SLAVE = """
@@ -97,6 +99,15 @@ def test_both_versions_of_fmi_are_run_alike(videoray_dir: Path, videoray3_dir: P
         refused = runs.values_tried(plan, [("m_rov", -1.0), ("beta_u", 0.5)])
         assert (refused.refused, refused.kept) == (1, 1)
         assert refused.words.startswith("discard: fmi")
+
+
+def test_an_fmu_of_either_version_tells_the_same_about_itself(videoray_fmu: Path, videoray3_fmu: Path) -> None:
+    for path in (videoray_fmu, videoray3_fmu):
+        with opened(path) as subject:
+            assert [subject.bounds[name] for name in ("m_rov", "X_ext", "u_l")] == [(1e-3, 1e6), (-inf, inf), (-1, 1)]
+            assert (subject.is_ours, subject.obstacle) == (True, "")
+            assert subject.numbers("input") == ["u_l", "u_r", "u_t", "X_ext", "Z_ext", "N_ext", "V_N", "V_E"]
+            assert subject.words == "the experiment manoeuvre (8 s)"
 
 
 def test_the_time_of_steps_is_measured_until_it_is_up(folder: Path) -> None:
