@@ -314,4 +314,4 @@ def test_what_an_fmu_does_not_have_is_named(foreign: Path, videoray_fmu: Path, t
         binaries = dict.fromkeys(n for n in archive.namelist() if n.startswith("binaries/"))
     bare = _with(videoray_fmu, binaries, tmp_path / "bare.fmu")
     assert main(["prove", str(bare)]) == 2
-    assert capsys.readouterr().err == f"rov-fmu: {bare}: has no binary for this machine ({fmpy.platform}): none\n"
+    assert capsys.readouterr().err == f"rov-fmu: {bare}: has no binary for this machine ({fmpy.platform}): c-code\n"

@@ -68,6 +68,12 @@ def test_a_million_steps_are_run_and_one_more_is_not(tmp_path: Path) -> None:
         read(tmp_path, 'stopTime="1000001" stepSize="1"')
 
 
+def test_what_is_no_archive_is_one_line(tmp_path: Path) -> None:
+    for path, reason in ((tmp_path / "none.fmu", "there is no such file"), (Path(__file__), "is not an FMU, or is")):
+        with pytest.raises(FileError, match=f"^{path}: {reason}"):
+            ReferenceResults(path)
+
+
 def test_parameters_and_references_are_read(tmp_path: Path) -> None:
     (one,) = read(tmp_path, inside=f'<!-- a word --><Parameters source="m.ssv"/>{_REFERENCES}<Annotations/>')
     assert (one.name, one.parameters, one.stimuli) == ("a", {"k": "2"}, None)
