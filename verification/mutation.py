@@ -72,7 +72,7 @@ TESTS = {
     "rov_fmu/identify/tuning.py": "identify/test_tuning.py identify",
     "rov_fmu/identify/likelihood/*": "identify/likelihood identify/test_identify.py identify",
     "rov_fmu/identify/*": "identify/test_findings.py identify/test_identify.py identify",
-    "rov_fmu/fmu/card.py": "fmu/test_card.py report/test_card.py fmu",
+    "rov_fmu/fmu/card.py": "fmu/results/test_card.py report/test_card.py fmu",
     "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/claims/*": "fmu/claims",
