@@ -122,7 +122,7 @@ def web_module(layout: Layout) -> bytes:
 def archive(files: Mapping[str, bytes]) -> bytes:
     """Return the FMU that contains these files, given by their path. The same files give the same bytes."""
     packed = BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as zipped:
+    with zipfile.ZipFile(packed, "w") as zipped:
         # the description comes first, so that an importer that reads a stream finds it at once
         for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
             entry = zipfile.ZipInfo(member, _EPOCH)

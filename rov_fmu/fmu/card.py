@@ -80,7 +80,9 @@ def card_text(vehicle: Vehicle) -> str:
     lines = [f"Model card of {vehicle.name}"]
     for heading, paragraphs in card(vehicle).items():
         lines += ["", heading]
-        lines += [fill(f"- {one}", _WIDTH, subsequent_indent="  ", break_long_words=False) for one in paragraphs]
+        lines += [
+            fill(one, _WIDTH, initial_indent="- ", subsequent_indent="  ", break_long_words=False) for one in paragraphs
+        ]
     return "\n".join(lines) + "\n"
 
 

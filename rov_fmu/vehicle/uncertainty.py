@@ -61,7 +61,7 @@ class Uncertainty:
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """The names in groups of correlated coefficients; coefficients of different groups are independent."""
-        _, numbers = connected_components(self.correlation != 0.0, directed=False)
+        _, numbers = connected_components(self.correlation != 0.0)
         groups: dict[int, list[str]] = {}
         for name, number in zip(self.names, numbers.tolist(), strict=True):
             groups.setdefault(number, []).append(name)

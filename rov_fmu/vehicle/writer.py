@@ -65,9 +65,9 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "axes": {name: {} for name in layout.kinds},
         "cross": {},
         "inputs": layout.mix,
-        "alternatives": {name: one.model_dump(exclude_none=True) for name, one in vehicle.alternatives.items()},
+        "alternatives": {name: one.model_dump() for name, one in vehicle.alternatives.items()},
         "estimates": {name: _estimated(row) for name, row in vehicle.estimates.items()},
-        "provenance": made.model_dump(exclude_none=True) if made else {},
+        "provenance": made.model_dump() if made else {},
     }
     for name, (*above, key) in layout.keys_in_file.items():
         if vehicle.sources.get(name, NOT_GIVEN) != NOT_GIVEN:

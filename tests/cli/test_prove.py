@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import fmpy
 import pytest
 from pythonfmu import FmuBuilder
 
@@ -137,6 +138,7 @@ def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> 
     [
         ("my tests/y.csv", "time,y\n0,0\n1,2.00001\n", "step 5.0e-06 1.0e-06 FAIL y"),
         ("my tests/y.csv", "time,y\n0,0\n3,2\n", "step inf 1.0e-06 FAIL y"),
+        ("my tests/y.csv", "time,y\n0,0.001\n", "step 1.0e-01 1.0e-06 FAIL y"),  # relative to 1 % of the nominal value
         ("k.ssv", _FOREIGN[f"{FOLDER}/k.ssv"].replace('"2"', '"2.1"'), "step 5.0e-02 1.0e-06 FAIL y"),  # type: ignore[union-attr]
         ("my tests/u.csv", "time,u\n0,10\n", "step inf 1.0e-06 FAIL fmi2DoStep failed with status"),
         (
@@ -312,4 +314,4 @@ def test_what_an_fmu_does_not_have_is_named(foreign: Path, videoray_fmu: Path, t
         binaries = dict.fromkeys(n for n in archive.namelist() if n.startswith("binaries/"))
     bare = _with(videoray_fmu, binaries, tmp_path / "bare.fmu")
     assert main(["prove", str(bare)]) == 2
-    assert "has no binary for this machine" in capsys.readouterr().err
+    assert capsys.readouterr().err == f"rov-fmu: {bare}: has no binary for this machine ({fmpy.platform}): c-code\n"

@@ -1,12 +1,14 @@
 """The archive that a build writes."""
 
 import zipfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
+import rov_fmu
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
@@ -41,6 +43,7 @@ def test_every_importer_can_unpack_the_archive(either_fmu: Path) -> None:
     assert not [n for n in names if Path(n).name in headers], "they are the importer's"
     for m in members:
         assert m.compress_type == zipfile.ZIP_DEFLATED
+        assert m.create_system == 3
         assert m.extract_version <= 20
         assert m.date_time == (1980, 1, 1, 0, 0, 0)
         assert "\\" not in m.filename
@@ -48,16 +51,34 @@ def test_every_importer_can_unpack_the_archive(either_fmu: Path) -> None:
         assert not m.flag_bits & 0x1
 
 
-@pytest.mark.long
-def test_platforms_that_are_lost_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("without_page")
+def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def compiled(
+        platforms: Sequence[str], _: object, __: str, done: Callable[[str], None], ___: int
+    ) -> dict[str, bytes]:
+        for name in platforms:
+            done(name)
+        return dict.fromkeys(platforms, bytes(7))
+
+    monkeypatch.setattr("rov_fmu.build.compile_all", compiled)
     path = tmp_path / "x.fmu"
     for before in (("win64", "linux64", "darwin64"), ("linux64",)):
         with zipfile.ZipFile(path, "w") as archive:
             for name in ("modelDescription.xml", *(f"binaries/{folder}/x.so" for folder in before)):
                 archive.writestr(name, "")
-        assert main(["build", str(BARE), "--platform", "linux64", "-o", str(path)]) == 0
-        lost = f"Replaced {path}, which also had darwin64 and win64.\n" if "win64" in before else f"{path}: "
-        assert capsys.readouterr().out.startswith(lost)
+        built = rov_fmu.load(BARE).build(path, platforms="linux32")
+        assert [*built.lost] == sorted(before)
+        assert (built.path, built.size, dict(built.binaries)) == (path, path.stat().st_size, {"linux32": 7})
+        assert 0.0 <= built.seconds["linux32"] < 60.0
+        with zipfile.ZipFile(path) as archive:
+            assert archive.read("binaries/linux32/bare.so") == bytes(7)
+        assert not built.was_run
+        assert built.note.startswith("The FMU is valid. It was not run, because it has no binary that FMPy loads")
+    monkeypatch.setattr("rov_fmu.build._check", lambda *_: ("", True))
+    assert main(["build", str(BARE), "--platform", "linux64", "--platform", "darwin64", "-o", str(path)]) == 0
+    assert capsys.readouterr().out.startswith(f"Replaced {path}, which also had linux32.\n")
 
 
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True)

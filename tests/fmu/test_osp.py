@@ -3,6 +3,7 @@
 import pytest
 from lxml import etree
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.variables import unit_of, variables
@@ -21,6 +22,18 @@ SEQUENCE = {
     "LinearDisplacement": {"m": 1},
     "AngularDisplacement": {"rad": 1},
 }
+
+
+LETTERS = {
+    name: letter
+    for letter, names in {
+        "x": "u p x phi X_ext K_ext V_N",
+        "y": "v q y theta Y_ext M_ext V_E",
+        "z": "w r z psi Z_ext N_ext V_D",
+    }.items()
+    for name in names.split()
+}
+"""The axis along or about which each variable acts, in the body frame or in NED; torques of curves act about z."""
 
 
 def groups_of(layout: Layout) -> list[etree._Element]:
@@ -54,9 +67,13 @@ def test_every_input_and_output_is_in_one_group(rov: Vehicle) -> None:
         assert [v.unit for v in members] == [variable.get("unit") for variable in group]
         (unit,) = {v.unit for v in members}
         assert unit_of(unit).exponents == SEQUENCE[group.tag.removeprefix(NAMESPACE)]
-        axes = [axis for variable in group if (axis := variable.get("axis"))]
-        assert set(axes) <= {"x", "y", "z"}
-        assert len(set(axes)) == len(axes)
-
-
-# ---- rov-fmu build --osp -------------------------------------------------------------------------------------------
+    order = [[*SEQUENCE].index(group.tag.removeprefix(NAMESPACE)) for group in groups]
+    assert order == sorted(order)
+    axes = {variable.get("ref"): variable.get("axis") for group in groups for variable in group}
+    directions = {f"F_{one.name}": map(one.effect, (SURGE, SWAY, HEAVE)) for one in rov.layout.thrusters}
+    along = {
+        name: next((letter for letter, x in zip("xyz", parts, strict=True) if abs(x) > 0.999), None)
+        for name, parts in directions.items()
+    }
+    about = {f"tau_{curve.name}": "z" for curve in rov.layout.turning_curves}
+    assert axes == {name: (LETTERS | along | about).get(name) for name in axes}

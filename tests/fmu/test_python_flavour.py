@@ -1,5 +1,6 @@
 """The FMU in pure Python is valid and gives the same results as the native one."""
 
+import json
 import os
 import random
 import shutil
@@ -148,31 +149,84 @@ def test_both_flavours_move_the_same_way(both: Both, seed: int) -> None:
             compare()
 
 
+class Slave:
+    """The slave in this process, without PythonFMU's library."""
+
+    def __init__(self, vehicle: Vehicle, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        for name, text in python_sources(vehicle, variables(vehicle)).items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(text, encoding="utf-8")
+        monkeypatch.syspath_prepend(folder)
+        self.rov = Rov(instance_name="rov", resources=str(folder))
+        self.places = {v.name: v.value_reference for v in variables(vehicle)}
+
+    def logged(self) -> list[str]:
+        """Return what was logged since the last time."""
+        messages = [message.msg for message in self.rov.log_queue]
+        self.rov.log_queue.clear()
+        return messages
+
+    def put(self, **values: float) -> list[str]:
+        """Set variables, and return what is logged."""
+        self.rov.set_real([self.places[name] for name in values], list(values.values()))
+        return self.logged()
+
+    def get(self, *names: str) -> list[float]:
+        values: list[float] = self.rov.get_real([self.places[name] for name in names])
+        return values
+
+    def step(self, t: float, h: float) -> tuple[bool, list[str]]:
+        """Take a step, and return whether it was taken, and what is logged."""
+        return self.rov.do_step(t, h), self.logged()
+
+
+def test_inputs_that_saturate_and_steps_that_cannot_be_taken_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slave = Slave(_PULSES, tmp_path, monkeypatch)
+    slave.rov.setup_experiment(1.0, 3.0, None)
+    slave.rov.exit_initialization_mode()
+    assert slave.put(u_l=1100.0, u_r=1900.0, voltage=12.0) == slave.put(voltage=16.0, X_ext=1e9) == []
+    assert slave.put(u_l=0.0) == ["u_l = 0 means that there is no signal: it acts as neutral; logged once."]
+    assert slave.put(u_l=1099.0, u_r=1901.0, u_rudder=2500.0) == [
+        "u_l = 1099.0 saturates at 1100; logged once.",
+        "u_r = 1901.0 saturates at 1900; logged once.",
+        "u_rudder = 2500.0 saturates at 1900; logged once.",
+    ]
+    assert slave.put(voltage=11.0) == ["voltage = 11.0 saturates at 12 for the thrust curve main; logged once."]
+    assert slave.put(u_l=0.0, u_r=2500.0, voltage=17.0, X_ext=0.0) == []
+    for h, words in ((0.0, "0.0 at t = 1.0"), (-0.1, "-0.1 at t = 1.0"), (inf, "inf at t = 1.0")):
+        assert slave.step(1.0, h) == (False, [f"step size {words} is not a step forward."])
+    assert slave.step(1.0, 2.1) == (False, ["a step of 2.1 s passes the stop time 3.0."])
+    before = slave.rov._get_fmu_state()
+    assert slave.put(u=1e300) == ["u must not be set after the initialization; it was not."]
+    assert slave.step(1.0, 0.5) == (True, [])
+    assert slave.step(1.5, 1.0) == (True, [])
+    assert slave.step(2.6, 0.1) == (True, ["the step from t = 2.6 does not begin at t = 2.5; logged once."])
+    after = slave.get("u", "r", "delayed_u_r", "F_bow")
+    slave.rov._set_fmu_state(json.loads(json.dumps(before)))
+    assert slave.get("u", "delayed_u_r") == [0.0, 1480.0], "the commands that were set have not arrived"
+    for t, h in ((1.0, 0.5), (1.5, 1.0), (2.6, 0.1)):
+        assert slave.step(t, h) == (True, [])
+    assert slave.get("u", "r", "delayed_u_r", "F_bow") == after
+    assert after[2] == 2500.0
+    overflow = ["the motion overflows within 0.1 s, or needs more than 100000 substeps."]
+    slave.put(X_ext=1.7e308)
+    assert slave.step(slave.rov.time, 0.1) == (False, overflow)
+    assert slave.get("u", "r", "delayed_u_r", "F_bow") == after
+
+
 def test_what_is_set_again_is_harmless_and_the_angles_replace_the_quaternion(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, text in python_sources(a_vehicle(SIX), variables(SIX)).items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    slave = Rov(instance_name="rov", resources=str(tmp_path))
-    place = {v.name: v.value_reference for v in variables(SIX)}
-
-    def put(**values: float) -> list[str]:
-        """Set variables, and return what is logged."""
-        slave.log_queue.clear()
-        slave.set_real([place[name] for name in values], list(values.values()))
-        return [message.msg for message in slave.log_queue]
-
-    def get(*names: str) -> list[float]:
-        return slave.get_real([place[name] for name in names])
-
+    slave = Slave(a_vehicle(SIX), tmp_path, monkeypatch)
+    put, get = slave.put, slave.get
     assert put(psi_0=0.5) == []
     expected = get(*QUATERNION)
     (warning,) = put(eta=0.0, epsilon_1=0.0, epsilon_2=0.0, epsilon_3=0.0)
     assert "eta = 0.0 is replaced by" in warning
     assert get(*QUATERNION) == expected
-    slave.exit_initialization_mode()
+    slave.rov.exit_initialization_mode()
     (warning,) = put(psi_0=0.5, m_rov=SIX["m_rov"])  # GEMSEO-FMU sets parameters again
     assert "psi_0 must not be set after the initialization, but it has this value already" in warning
     assert put(N_ext=1.0, psi_0=0.6) == ["psi_0 must not be set after the initialization; it was not."]

@@ -121,7 +121,7 @@ def test_an_archive_without_a_description_is_refused(tmp_path: Path) -> None:
 
 _VARIABLES = """<ModelVariables>
   <ScalarVariable name="p" valueReference="1" causality="parameter" variability="fixed">
-    <Real start="1" min="-INF" nominal="2"/></ScalarVariable>
+    <Real start="NaN" min="-INF" nominal="2"/></ScalarVariable>
   <ScalarVariable name="y" valueReference="2" causality="output"><Real derivative="1"/></ScalarVariable>
 </ModelVariables>"""
 _OF_2 = f"""<fmiModelDescription fmiVersion="2.0" modelName="a" guid="a" generationDateAndTime="today">
@@ -142,6 +142,7 @@ WRONG: list[tuple[str, str, str, str]] = [
     (_OF_2, 'derivative="1"', 'derivative="3"', "variable 'y': derivative: 3: must be an index from 1 to 2"),
     (_OF_2, 'dependencies=""', 'dependencies="1 x"', "Unknown: dependencies = 'x': must be a whole number"),
     (_OF_2, 'name="y"', 'name="p"', "variable 'p': name = 'p': another variable has this name"),
+    (_OF_2, '"-INF"', '"NaN"', "variable 'p': min = 'NaN': must be a finite number"),
     (_OF_2, '"output"', '"outputs"', "variable 'y': causality = 'outputs': must be one of parameter, calculated"),
     (_OF_2, '<Real derivative="1"/>', "", "variable 'y': must contain one of Real, Integer, Boolean, String, Enum"),
     (_OF_2, '"0.1"', '"soon"', "DefaultExperiment: stepSize = 'soon': must be a finite number"),
@@ -150,6 +151,43 @@ WRONG: list[tuple[str, str, str, str]] = [
     (_OF_2, "fmiModelDescription", "a", "must begin with <fmiModelDescription>, and not with <a>"),
     (_OF_2, "<CoSimulation", "<CoSimulation <", "not XML: error parsing attribute name, line 2, column 15"),
     (_OF_3, '"1 2"', '"1 b"', "variable 'x': start = 'b': must be a finite number"),
+    (_OF_2, '<Real derivative="1"/>', '<Boolean start="yes"/>', "variable 'y': start = 'yes': must be true or false"),
+    (
+        _OF_2,
+        '<Real derivative="1"/>',
+        '<Integer max="-2147483649"/>',
+        "variable 'y': max = '-2147483649': must be a whole number from -2147483648 to 2147483647",
+    ),
+    (
+        _OF_3,
+        'start="2"',
+        'start="-1"',
+        "variable 'n': start = '-1': must be a whole number from 0 to 18446744073709551615",
+    ),
+    (
+        _OF_3,
+        "<Dimension ",
+        '<Dimension start="-1" ',
+        "variable 'x': start = '-1': must be a whole number from 0 to 18446744073709551615",
+    ),
+    (
+        _OF_2,
+        "<CoSimulation ",
+        '<UnitDefinitions><Unit name="U"><BaseUnit kg="1001"/></Unit></UnitDefinitions><CoSimulation ',
+        "BaseUnit: kg = '1001': must be a whole number from -1000 to 1000",
+    ),
+    (
+        _OF_2,
+        'modelName="a"',
+        'modelName="a" numberOfEventIndicators="100001"',
+        "fmiModelDescription: numberOfEventIndicators = '100001': must be a whole number from 0 to 100000",
+    ),
+    (
+        _OF_3,
+        '"1 2">',
+        '"1 2"><Alias name="n"/>',
+        "variable 'x': name = 'n': another variable has this name",
+    ),
     (_OF_3, '"5"', '"128"', "variable 'i': start = '128': must be a whole number from -128 to 127"),
     (_OF_3, 's="9"', 's="8"', "Output: dependencies: 8: must be the value reference of a variable"),
 ]
@@ -157,7 +195,10 @@ WRONG: list[tuple[str, str, str, str]] = [
 
 @pytest.mark.parametrize(("text", "old", "new", "reason"), WRONG, ids=[row[3] for row in WRONG])
 def test_a_wrong_attribute_is_one_line(text: str, old: str, new: str, reason: str, tmp_path: Path) -> None:
-    right, wrong = (_archive(_member("modelDescription.xml", t.encode())) for t in (text, text.replace(old, new)))
+    folder = _member("resources/", mode=(stat.S_IFDIR | 0o755) << 16)
+    right, wrong = (
+        _archive(folder, _member("modelDescription.xml", t.encode())) for t in (text, text.replace(old, new))
+    )
     assert len(unpack_fmu(right, Path("a.fmu"), tmp_path / "right").modelVariables) >= 2
     with pytest.raises(FileError) as error:
         unpack_fmu(wrong, Path("a.fmu"), tmp_path / "wrong")

@@ -195,6 +195,7 @@ def test_the_description_has_the_elements_of_the_interface_and_its_own_guid(fmi:
     for name, kinds in build_options.INTERFACES.items():
         root = etree.fromstring(contents[name].files["modelDescription.xml"])
         assert tuple(one.tag for one in root if one.tag in ("ModelExchange", "CoSimulation")) == kinds
+        assert [file.get("name") for file in root.iter("File")] == ["fmu.c"] * len(kinds) * (fmi == 2)
     assert len({content.guid for content in contents.values()}) == 3
     assert contents["both"] == native_content(vehicle, fmi=fmi)
 

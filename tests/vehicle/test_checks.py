@@ -100,8 +100,20 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"thruster.l.direction.value": [-1.0, 0.0, 0.0]},
         "thruster.l.arm … pushes ahead … position instead",
     ),
+    "an arm of a thruster that pushes down": (
+        {"thruster.l.direction.value": [0.0, 0.0, 1.0]},
+        "thruster.l.arm … pushes ahead … position instead",
+    ),
+    "an arm of no length": (
+        {"arm.R.value": 0.0, "arm.gamma.value": 0.0},
+        "arm.R.value = 0.0: must be more than 0 … the arm R sin γ is 0\narm.gamma.value = 0.0: must be more than 0",
+    ),
     "no place": ({"thruster.1.position": GONE}, "thruster.1.position … or arm … missing … yaw"),
     # numbers
+    "an interval below its value": (
+        {"body.m_rov.interval": [13.0, 13.4]},
+        "body.m_rov.interval = [13.0, 13.4]: must be [low, high] around the value 13.5",
+    ),
     "a direction of no length": (
         {"thruster.5.direction.value": [0, 0, 0]},
         "thruster.5.direction.value = [0, 0, 0] … must have a length",
@@ -117,8 +129,9 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "thrust in reverse of the wrong sign": (
         {"curves.frame.a_t_reverse.value": -100.0},
-        "curves.frame: must give a force above 0 at full command in reverse … a_t_frame_reverse",
+        "curves.frame: must give a force above 0 at full command in reverse … b_t_frame_reverse give -60.0389 N",
     ),
+    "no thrust at full command": ({"curves.boost.a_t.value": -5.0}, "curves.boost: must … b_t_boost give 0 N"),
     # geometry
     "no axes": ({**_NO_BOOST, "axes": {}}, "axes … at least one of surge, sway, heave, roll, pitch, yaw"),
     "an axis that no thruster drives": (
@@ -158,17 +171,17 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"alternatives.other.a_d_u.value": -1.0},
         "alternatives.other.a_d_u.value = -1.0 … 0 ... 1000000 N.s2/m2",
     ),
-    # several mistakes at once, of form and of content
-    "many": (
-        {
-            "validity.command_max": 7.0,
-            "curves.frame.b_t_reverse": GONE,
-            "thruster.5.curve": "T200",
-            "axes.yaw.beta.value": 0.0,
-            "inputs.idle": {"5": 0.0},
-            "alternatives.other.a_d_u.unit": "lb",
-        },
-        "validity.command_max\nthruster.5.curve\ninputs.idle\ncurves.frame.b_t_reverse\naxes.yaw.beta",
+    # other tables
+    "a command beyond full": ({"validity.command_max": 1.01}, "validity.command_max = 1.01: must be … equal to 1"),
+    "a thrust curve that is half reversed": (
+        {"curves.frame.b_t_reverse": GONE},
+        "curves.frame.b_t_reverse: this key is missing, and a_t_reverse is there",
+    ),
+    "no report": ({"provenance.report": "none.html"}, "provenance.report = 'none.html': there is no such file beside"),
+    "no hash": ({"provenance.inputs": {"rov.toml": "abc"}}, "provenance.inputs.rov.toml = 'abc'"),
+    "a battery that nothing needs": (
+        {"battery": {"voltage": quantity(12.0, "V")}},
+        "battery: no thrust depends on the voltage: give a curve V_0 and n_V, or tables; or leave it out",
     ),
     "coupling without sway": (
         {**_NO_BOOST, "body.coupling": True, "axes.sway": GONE},
@@ -216,6 +229,14 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
         {"cross.m_a_qu": quantity(0.1, "kg.m")},
         "cross.m_a_qu: write m_a_uq, which is the same coefficient",
     ),
+    "a lift in the other order": (
+        {"cross.Y_ru": quantity(0.1, "N.s2/(m.rad)")},
+        "cross.Y_ru: write Y_ur, which is the same coefficient",
+    ),
+    "a cross term by its derivative": (
+        {"cross.N_v|v|": quantity(-0.1, "N.m.s2/m2")},
+        "cross.N_v|v| = 'N_v|v|': is not a coefficient of several axes; give its negative as a_d_rv in [cross]",
+    ),
     "a cross term of one axis": (
         {"cross.m_a_uu": quantity(1.0, "kg")},
         "cross.m_a_uu: there is no such key, only m_a_uq, b_d_uq, a_d_uq and Y_ur … drag of one axis is in [axes]",
@@ -228,6 +249,14 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
     "a centre of mass too far away": (
         {"body.z_G.value": 0.3},
         "cross.m_a_uq.value = -0.1: the entry … surge and pitch, with that of the centre of mass … but it is 3.5",
+    ),
+    "a centre of mass too high": (
+        {"cross": {}, "body.z_G.value": 0.3},
+        "body.z_G.value = 0.3: the entry … for surge and pitch … within ±3 for … but it is 3.6",
+    ),
+    "a centre of mass too far ahead": (
+        {"cross": {}, "body.x_G.value": 0.5},
+        "body.x_G.value = 0.5: the entry … for sway and yaw … within ±3.633 for … but it is 6",
     ),
     "entries of the mass matrix of an endless inertia": (
         {"body.coupling": GONE, "axes.heave.beta": quantity(0.0, "1")},
@@ -255,6 +284,13 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
+def check_mistakes(path: Path, wanted: str) -> None:
+    """Check that a file is refused with a line for each line of `wanted`, which has parts of it in their order."""
+    for line, words in zip(refusal(path).splitlines(), wanted.splitlines(), strict=True):
+        assert line.startswith(f"{path}: {words.split(' … ')[0]}")
+        assert all(word in line for word in words.split(" … ")), line
+
+
 CASES = [(TEXT, case) for case in MISTAKES.items()] + [(SIX, case) for case in MISTAKES_OF_SIX.items()]
 
 
@@ -265,9 +301,7 @@ def test_each_mistake_is_one_clear_line(
     changes, wanted = case[1]
     path = tmp_path / "rov.toml"
     path.write_text(changed(changes, text), encoding="utf-8")
-    for line, words in zip(refusal(path).splitlines(), wanted.splitlines(), strict=True):
-        assert line.startswith(f"{path}: {words.split(' … ')[0]}")
-        assert all(word in line for word in words.split(" … ")), line
+    check_mistakes(path, wanted)
 
 
 # ---- Valid vehicles --------------------------------------------------------------------------------------------------
@@ -275,6 +309,10 @@ def test_each_mistake_is_one_clear_line(
 VALID: dict[str, dict[str, Any]] = {
     "as it is": {},
     "an axis that does not accelerate by itself": {"axes.heave.beta": quantity(0.0, "1")},
+    "the least β of a coupled axis, and an interval of no width": {
+        "axes.yaw.beta.value": 0.001,
+        "body.m_rov.interval": [13.5, 13.5],
+    },
     "only heave": {
         **_NO_BOOST,
         "axes.surge": GONE,
@@ -336,6 +374,17 @@ def test_numbers_that_are_probably_wrong_give_a_warning(case: str, tmp_path: Pat
     assert len(caught) == 1
 
 
-def test_a_coefficient_that_makes_the_mass_matrix_indefinite_cannot_be_set() -> None:
-    with pytest.raises(InputError, match=r"cross\.m_a_uq\.value = 3\.0: the entry of the mass matrix"):
-        load_vehicle(SIX_AXES).with_(m_a_uq=3.0)
+@pytest.mark.parametrize(
+    ("source", "values", "message"),
+    [
+        (SIX_AXES, {"m_a_uq": 3.0}, "cross.m_a_uq.value = 3.0: the entry of the mass matrix"),
+        (EVERYTHING, {"R": 0.0}, "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"),
+        (EVERYTHING, {"a_t_boost": -5.0}, "curve boost: must give a force above 0 at full command"),
+        (EVERYTHING, {"mass": 14.0}, "mass: there is no such coefficient of this vehicle; did you mean m_rov?"),
+        (EVERYTHING, {"m_rov": True}, "m_rov = True: must be a finite number"),
+        (EVERYTHING, {"m_rov": float("inf")}, "m_rov = inf: must be a finite number"),
+    ],
+)
+def test_a_coefficient_that_is_impossible_cannot_be_set(source: Path, values: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        load_vehicle(source).with_(**values)

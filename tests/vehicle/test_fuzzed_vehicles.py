@@ -8,14 +8,11 @@ import pytest
 from fmpy.model_description import ModelDescription, read_model_description
 from hypothesis import strategies as st
 
-from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import YAW
 from rov_fmu.fmu.archive import archive, native_content
 from rov_fmu.fmu.osp import osp_model_description
-from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
-from rov_fmu.vehicle.writer import write_tuned, write_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
 from tests.often import often
@@ -95,33 +92,6 @@ def test_any_file_is_a_usable_vehicle_or_one_clear_line(examples: int, path: Pat
     assert usable > examples / 20, "the changes must leave some files as good as they were"
 
 
-@often("examples", 10, 40, 300)
-def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
-    tuned = 0
-
-    def check(data: st.DataObject) -> None:
-        nonlocal tuned
-        path.write_bytes(changed_numbers(data.draw(st.sampled_from(SOURCES)), data))
-        try:
-            vehicle = load_vehicle(path)
-        except VehicleFileError:
-            return
-        if not vehicle.layout.has(YAW):
-            return
-        form = vehicle.layout.kinds["yaw"]
-        force, drag = vehicle.force(YAW, 0.3), [vehicle[form.coefficient(key)] for key in ("a_d", "b_d")]
-        if force > 1e-3 and max(drag) > 1e-3:
-            rov = tune(vehicle, YAW, [Target("V_ss", 0.3, min(1.0, 0.1 * force / sum(drag)))]).vehicle
-            write_tuned(
-                path, path.with_name("tuned.toml"), {name: rov[name] for name in ("alpha_r", "beta_r")}, "Tuned"
-            )
-            assert load_vehicle(path.with_name("tuned.toml"))["beta_r"] == vehicle["beta_r"]
-            tuned += 1
-
-    fuzz(check, examples)
-    assert tuned > examples / 20, "the changes must leave some files as good as they were"
-
-
 @often("examples", 5, 40, 300)
 def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path: Path) -> None:
     written = path.with_name("written.toml")
@@ -142,31 +112,6 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
         assert again.sources == vehicle.sources
         for name, value in vehicle.coefficients.items():
             assert again[name] == float(f"{value:.6g}")
-
-    fuzz(check, examples)
-
-
-@often("examples", 3, 20, 100)
-def test_every_command_prints_the_same_lines_and_writes_nothing(
-    examples: int, path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def check(data: st.DataObject) -> None:
-        path.write_bytes(data.draw(st.sampled_from([changed_toml, changed_bytes]))(SOURCES[0], data))
-        try:
-            load_vehicle(path)
-            return
-        except VehicleFileError as error:
-            expected = "".join(f"rov-fmu: {line}\n" for line in str(error).splitlines())
-        before = sorted(path.parent.iterdir())
-        file, output = str(path), str(path.with_name("out"))
-        for arguments in (
-            ["build", file, "-o", output, "--osp", "--platform", "host"],
-            ["tables", file],
-            ["tune", file, "--axis=yaw", "--command=0.3", "--v-ss=1", "-o", output],
-        ):
-            assert main(arguments) == 2
-            assert capsys.readouterr() == ("", expected)
-        assert sorted(path.parent.iterdir()) == before
 
     fuzz(check, examples)
 

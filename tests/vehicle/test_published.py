@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from math import e, isclose
 from pathlib import Path
@@ -11,12 +11,14 @@ import pytest
 from scipy.optimize import brentq
 
 from rov_fmu.cli import main
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ALONE
 from tests.fmi import OK
 from tests.fmi2 import Fmu
+from tests.vehicles import with_axes
 
 DATA = VIDEORAY.parent / "tables"
 
@@ -131,15 +133,18 @@ def test_trajectory_gives_the_closed_form_and_the_printed_cells(
 
 def test_files_hold_the_printed_cells(tables: Mapping[str, ResponseTable]) -> None:
     assert [(axis, int(row.command)) for axis, table in tables.items() for row in table.rows] == ROWS
-    assert [(t.number, t.axis.name, t.axis.unit) for t in tables.values()] == [
-        (6, "heave", "m/s"),
-        (7, "yaw", "rad/s"),
-        (8, "surge", "m/s"),
+    assert [(t.number, t.steady_number, t.axis.name, t.axis.unit) for t in tables.values()] == [
+        (6, 3, "heave", "m/s"),
+        (7, 5, "yaw", "rad/s"),
+        (8, 4, "surge", "m/s"),
     ]
     for (axis, command), expected in CELLS.items():
         cells = [cell for model in MODELS for cell in cells_of(tables, axis, command, model)]
         assert [str(cell.printed) for cell in cells] == [printed for printed, _ in expected]
         assert [cell.rounds_to_printed for cell in cells] == [band is ROUNDED for _, band in expected]
+    measured = {axis: [row.scaled.V_ss.measured for row in table.rows] for axis, table in tables.items()}
+    assert [*map(str, measured["yaw"])] == ["1.34", "1.51", "2.61", "4.06"]
+    assert measured["surge"] == [*tables["surge"].steady.values()], "its table of responses has no measured V_ss"
 
 
 # ---- rov-fmu tables -------------------------------------------------------------------------------------
@@ -153,6 +158,8 @@ def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert out == ""
     assert len(err.splitlines()) == 1
     assert "vehicle.data" in err
+    with pytest.raises(DataFileError, match="Tables 6-8 are of surge, heave and yaw, it has no heave"):
+        load_tables(replace(with_axes("ur"), data=DATA))
 
 
 HEAVE, YAW, SURGE_STEADY = "table6_heave_response.csv", "table7_yaw_response.csv", "table4_surge_steady.csv"
@@ -161,6 +168,8 @@ BAD_TABLES: dict[str, tuple[str, str, str, str]] = {
     "text for a number": (HEAVE, "1.76", "slow", "line 2 … 'non-linear Tau [s]' … 'slow' … number"),
     "negative velocity": (SURGE_STEADY, "0.31", "-0.31", "line 2 … 'forward [m/s]' … = -0.31 … negative"),
     "command twice": (HEAVE, "\n30,", "\n20.0,", "line 3 … 'command [%]' … = 20.0 … above"),
+    "no command": (HEAVE, "\n30,", "\n0,", "line 3 … 'command [%]' … = 0: must be above 0 and at most 100"),
+    "a command beyond full": (HEAVE, "\n30,", "\n100.1,", "line 3 … = 100.1: must be above 0 and at most 100"),
 }
 
 

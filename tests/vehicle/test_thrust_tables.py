@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.equation.layout import CurrentTable
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.vehicle.test_checks import GONE, changed, quantity
-from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, THRUST_EFFECTS, carried, sources_of
+from tests.vehicle.test_checks import GONE, changed, check_mistakes, quantity
+from tests.vehicles import THRUST_EFFECTS, carried, sources_of
 
 TEXT = THRUST_EFFECTS.read_text(encoding="utf-8")
 _FILES = ("thrust_12_v.csv", "thrust_16_v.csv")
@@ -52,6 +52,12 @@ def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> Non
     assert with_numbers.forces == pytest.approx((-9.0 * 4.4482216152605, 0.0, 11.0 * 4.4482216152605), rel=1e-15)
 
 
+def test_thrust_goes_on_with_its_slope_to_full_command(tmp_path: Path) -> None:
+    found = read_thrust(table(tmp_path, "command [%],thrust [N]\n-95,-190\n-50,-100\n0,0\n50,60\n95,114\n"))
+    assert found.commands == (-1.0, -0.95, -0.5, 0.0, 0.5, 0.95, 1.0)
+    assert found.forces == pytest.approx((-200.0, -190.0, -100.0, 0.0, 60.0, 114.0, 120.0), rel=1e-14)
+
+
 def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_them(tmp_path: Path) -> None:
     found = read_current(table(tmp_path, "pulse [us],current [A]\n1104,24.3\n1500,0\n1896,23\n1896,25\n"))
     commands = (-1.0, -0.99, -0.5, 0.0, 0.25, 0.99, 1.0)
@@ -69,7 +75,19 @@ def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_t
             "must have the sign of its command",
         ),
         "no zero": ("command [1],thrust [N]\n-1,-1\n-0.1,-0.1\n0.1,0\n1,1\n", "must give 0 N at the command 0"),
+        "no force in reverse": ("command [1],thrust [N]\n-1,0\n0,0\n1,1\n", "must give a force in reverse below 0 N"),
+        "no force ahead": ("command [1],thrust [N]\n-1,-1\n0,0\n1,0\n", "and one ahead above 0 N"),
+        "a pulse beyond full thrust": (
+            "pulse [us],thrust [N]\n1099,-1\n1500,0\n1900,1\n",
+            "must be within full thrust",
+        ),
         "one half": ("command [1],thrust [N]\n0,0\n0.5,1\n1,2\n", "must cover the commands from -1 to 1"),
+        "too little ahead": ("command [1],thrust [N]\n-1,-1\n0,0\n0.94,1\n", "side, not only -1 ... 0.94"),
+        "two points": ("command [1],thrust [N]\n-1,-1\n0,0\n", "must have 3 to 2000 different commands, not 2"),
+        "many points": (
+            "command [1],thrust [N]\n" + "".join(f"{n / 1000.5 - 1:.6f},{n - 1000.5}\n" for n in range(2001)),
+            "must have 3 to 2000 different commands, not 2001",
+        ),
     }.values(),
 )
 def test_a_table_that_is_no_thrust_curve_is_refused(text: str, wanted: str, tmp_path: Path) -> None:
@@ -110,6 +128,7 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     assert [sources_of(fin).keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(
         written.layout.fins
     )
+    assert {path.name for path in written.files} == {*_FILES}
     assert written.layout.voltage_source == "a battery of four cells"
     assert {name: tuned[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
         "lift_rudder": 10.0,
@@ -152,9 +171,13 @@ def test_a_voltage_far_above_that_of_the_curves_gives_a_warning(folder: Path) ->
     assert len(caught) == 1
 
 
-def test_thrust_that_does_not_rise_with_the_voltage_gives_a_warning(folder: Path) -> None:
-    """The table at the higher voltage is a copy of the other one."""
-    shutil.copy(folder / _FILES[0], folder / _FILES[1])
+@pytest.mark.parametrize("end", ["100,", "-100,"])
+def test_thrust_that_does_not_rise_with_the_voltage_gives_a_warning(end: str, folder: Path) -> None:
+    """In one direction, full thrust at the higher voltage is that at the other one."""
+    low, high = ((folder / name).read_text(encoding="utf-8").splitlines(keepends=True) for name in _FILES)
+    (kept,) = (line for line in low if line.startswith(end))
+    copied = [kept if line.startswith(end) else line for line in high]
+    (folder / _FILES[1]).write_text("".join(copied), encoding="utf-8")
     path = folder / "rov.toml"
     path.write_text(TEXT, encoding="utf-8")
     expected = (
@@ -173,11 +196,21 @@ _DRAWN = {"voltage": 16.0, "table": "current.csv"}
 MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "currents at several voltages": (
         {f"curves.{n}.electric_current": {**_DRAWN, "voltage": V} for n, V in (("main", 12.0), ("bow", 16.0))},
-        "curves.bow.electric_current.voltage = 16.0: must be 12 V, as for curves.main",
+        "curves.bow.electric_current.voltage = 16.0: must be 12 V, as for curves.main\n"
+        "curves.lift.electric_current: this key is missing, and curves.main has it: the vehicle draws the sum",
     ),
     "thrust for a current": (
         {"curves.bow.electric_current": {**_DRAWN, "table": _FILES[0]}},
         "curves.bow.electric_current.table = 'thrust_12_v.csv'",
+    ),
+    "voltages beside tables": (
+        {"curves.main.V_0": quantity(12.0, "V"), "curves.main.n_V": quantity(1.2, "1")},
+        "curves.main.V_0: must not be given together with tables\n"
+        "curves.main.n_V: must not be given together with tables",
+    ),
+    "a scale without a table": (
+        {"curves.lift.k_t": quantity(1.0, "1")},
+        "curves.lift.k_t: scales a table, and this curve has none: give table, or leave k_t out",
     ),
     "coefficients beside a table": (
         {"curves.bow.a_t": quantity(1.0, "N")},
@@ -191,24 +224,35 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "no exponent": ({"curves.bow.n_V": GONE}, "curves.bow.n_V: this key is missing, and V_0 is there"),
     "falling voltages": (
         {"curves.main.tables": [{"voltage": 16.0, "table": _FILES[1]}, {"voltage": 12.0, "table": _FILES[0]}]},
-        "must be at least two tables with rising voltages",
+        "curves.main.tables = … must be at least two tables with rising voltages",
     ),
+    "no battery": ({"battery": GONE}, "battery: this table with the voltage is missing, and the thrust of a curve"),
+    "a battery below the tables": ({"battery.voltage": quantity(11.9, "V")}, "battery.voltage.value = 11.9: must be"),
     "a battery beyond the tables": (
         {"battery.voltage": quantity(18.0, "V")},
         "battery.voltage.value = 18.0: must be within the 12 ... 16 V of the tables of curves.main",
     ),
     "reversed pulses": ({"commands.pulse": [1900, 1500, 1100]}, f"commands.pulse = [1900, 1500, 1100]: {_PULSES}"),
-    "pulses in quotes": ({"commands.pulse": ["1100", "1500", "1900"]}, _PULSES),
+    "pulses that are too close": ({"commands.pulse": [1490.5, 1500, 1900]}, f"commands.pulse = … {_PULSES}"),
+    "a pulse that is too short": ({"commands.pulse": [499, 1500, 1900]}, f"commands.pulse = … {_PULSES}"),
+    "pulses in quotes": ({"commands.pulse": ["1100", "1500", "1900"]}, f"commands.pulse = … {_PULSES}"),
     "a fin with a thruster's name": (
         {"fin.rudder.name": "top"},
         "fin.top: a thruster or a fin before it has this name",
     ),
-    "a fin without surge": ({"axes.surge": GONE, "body.coupling": False}, "its force depends on the velocity in surge"),
+    "a fin without surge": (
+        {"axes.surge": GONE, "body.coupling": False},
+        "fin.rudder: its force depends on the velocity in surge",
+    ),
     "a fin that does nothing": (
         {"fin.rudder.direction": {"value": [0, 0, 1], "source": "x"}, "axes.heave": GONE, "thruster.top": GONE},
+        "curves.lift: no thruster has this curve\n"
         "fin.rudder: its lift acts on no axis of the vehicle, which are surge, sway, yaw",
     ),
-    "a file outside": ({"curves.bow.table": "../x.csv"}, "must lead to a place inside the folder of this file"),
+    "a file outside": (
+        {"curves.bow.table": "../x.csv"},
+        "curves.bow.table = '../x.csv': must lead to a place inside the folder of this file",
+    ),
 }
 
 
@@ -217,13 +261,17 @@ def test_a_mistake_is_a_clear_line(name: str, folder: Path) -> None:
     changes, wanted = MISTAKES[name]
     path = folder / "rov.toml"
     path.write_text(changed(changes, TEXT), encoding="utf-8")
-    lines = refusal(path).splitlines()
-    assert any(wanted in line for line in lines), lines
-    assert all(line.startswith(f"{path}: ") for line in lines)
+    check_mistakes(path, wanted)
 
 
-def test_a_battery_that_nothing_needs_is_refused(folder: Path) -> None:
+@pytest.mark.parametrize(("voltage", "file"), [(12.0, _FILES[0]), (16.0, _FILES[1])])
+def test_at_the_ends_of_the_voltage_thrust_is_that_of_its_table(voltage: float, file: str, folder: Path) -> None:
+    """The shortest pulses are allowed, too. The main pair has 0.9 times the thrust of its tables."""
     path = folder / "rov.toml"
-    text = EVERYTHING.read_text(encoding="utf-8")
-    path.write_text(text + '\n[battery]\nvoltage = { value = 12.0, unit = "V", source = "x" }\n', encoding="utf-8")
-    assert "battery: no thrust depends on the voltage" in refusal(path)
+    changes = {"battery.voltage": quantity(voltage, "V"), "commands.pulse": [500, 510, 2500]}
+    path.write_text(changed(changes, TEXT), encoding="utf-8")
+    vehicle, table = load_vehicle(path), read_thrust(folder / file)
+    assert vehicle.layout.pulse == (500.0, 510.0, 2500.0)
+    ends = [vehicle.force(SURGE, command) for command in (-1.0, 1.0)]
+    assert ends == pytest.approx([1.8 * table.forces[0], 1.8 * table.forces[-1]])
+    assert vehicle.strongest(SURGE) == pytest.approx(ends[1])

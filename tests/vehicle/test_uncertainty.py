@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import log
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.optimize import lsq_linear
 from scipy.stats import kstest, norm, qmc, spearmanr
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -57,6 +59,14 @@ def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_pa
     assert {*refit.estimates} - {*others} == {"a_d_u"}
     assert others["b_d_u"] == refit.estimates["b_d_u"].model_copy(update={"correlation": {}})
     assert others["beta_w"] == refit.estimates["beta_w"]
+    by_hand = refit.with_(a_d_u=9.0)
+    assert (by_hand.estimates, {*refit.intervals} - {*by_hand.intervals}) == (others, {"a_d_u"})
+    axes = tuple(one for one in refit.layout.axes if one.axis is not HEAVE)
+    flat = refit.in_layout(replace(refit.layout, axes=axes))
+    assert flat.coefficients == {name: x for name, x in refit.coefficients.items() if not name.endswith("_w")}
+    assert flat.sources.keys() == flat.coefficients.keys() > flat.intervals.keys() == flat.estimates.keys()
+    assert flat.estimates["b_d_u"] == refit.estimates["b_d_u"]
+    assert all(row.correlation.keys() <= flat.estimates.keys() for row in flat.estimates.values())
     write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit[name] + 0.1 for name in refit.estimates}, "a test")
     assert "estimates" not in path.read_text(encoding="utf-8")
 
@@ -69,6 +79,10 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
     "with no estimate": (
         lambda text: text.replace("{ a_d_u =", "{ m_rov ="),
         "estimates.b_d_u.correlation.m_rov = -0.883478: there is no such coefficient in this table",
+    ),
+    "with itself": (
+        lambda text: text.replace("{ a_d_u =", "{ b_d_u ="),
+        "estimates.b_d_u.correlation.b_d_u = -0.883478: of a coefficient with itself is 1 and is not given",
     ),
     "above 1": (
         lambda text: text.replace("-0.883478", "-1.5"),
@@ -113,11 +127,13 @@ def test_a_correlation_of_1_is_allowed(tmp_path: Path) -> None:
 def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path) -> None:
     path = tmp_path / "with.toml"
     text = ALONE.replace('6.57, unit = "kg"', '6.57, unit = "kg", interval = [6.374, 6.766]')
+    text = text.replace("value = 0.6324,", "value = 0.6324, interval = [0.0, 1.0244],")  # which ends at a bound
+    text = text.replace("value = 1.1,", "value = 1.1, interval = [1.0, 1.331],")
     path.write_text(text, encoding="utf-8")
     found = load_vehicle(path).uncertainty
-    assert found.names == ("m_rov",)
-    assert found.errors == pytest.approx([0.1], rel=1e-4)
-    drawn = found.drawn(qmc.Sobol(1, scramble=False).random(1024))
+    assert found.names == ("m_rov", "b_d_w", "alpha_u")
+    assert found.errors == pytest.approx([0.1, 0.2, 1.1 * log(1.331) / 3.92], rel=1e-4)
+    drawn = found.drawn(qmc.Sobol(3, scramble=False).random(1024))
     assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002
     assert np.isfinite(drawn).all(), "the first number of Sobol's sequence is 0"
 
@@ -159,6 +175,10 @@ def test_draws_at_a_bound_agree_with_bounded_fits(b: float) -> None:
         (-0.004, (-1.2, 1.2), ("-0.0040", "-1.2", "1.2")),
         (5.8e-12, (-0.35, 0.35), ("0", "-0.35", "0.35")),
         (2.5, None, ("2.500", "", "")),
+        (1234567.0, None, ("1.235e+6", "", "")),
+        (123456.0, None, ("123500", "", "")),
+        (1.23456e-5, None, ("0.00001235", "", "")),
+        (1.23456e-6, None, ("1.235e-6", "", "")),
         (39.99999999999999, (39.99999999999998, 40.00000000000001), ("40.00", "40.00", "40.00")),
     ],
 )

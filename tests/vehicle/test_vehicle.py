@@ -106,6 +106,10 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], str]] = {
         edit(r"^limits = \[", "limits = [3, "),
         "validity.limits = [3,  … entry 1 must be text in quotes",
     ),
+    "a command below 0": (
+        edit(r"^command_min = .*$", "command_min = -0.1"),
+        "validity.command_min = -0.1 … or equal to 0",
+    ),
     "another format": (edit("^format = 2$", "format = 3"), "format = 3 … must be 2"),
     "no range of commands": (
         edit(r"^command_max = .*$", "command_max = 0.2"),

@@ -34,6 +34,7 @@ PRIORS = {
     "thrust_shape": Prior(0.10, "the shape of a curve, relative to its force", "published curves differ so"),
     "thrust_reverse": Prior(0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"),
     "dead_band": Prior(0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
+    "dead_band_astern": Prior(0.02, "the dead band astern minus that ahead", "propellers are made for one direction"),
     "lag": Prior(0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
     "dead_time": Prior(0.05, "the time from a command to its effect, s", "links of one or two control periods"),
     "inertia": Prior(0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
@@ -193,7 +194,8 @@ class Table:
                 found[names[0]] = scale * ratio * (a - moved * (a + b))
                 found[names[1]] = scale * ratio * (b + moved * (a + b))
             if (band := curve.name_of(f"c_0{end}")) in found:
-                found[band] = self.get(z, "dead band", curve.name, default=found[band])
+                more = self.get(z, "dead band astern", curve.name) if end else 0.0
+                found[band] = max(self.get(z, "dead band", curve.name, default=found[band]) + more, 0.0)
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)
@@ -209,14 +211,12 @@ class Table:
 
     def shapes(self, z: Sequence[float]) -> Shapes:
         """Return the deviations of the shapes of the curves."""
-        found, bands = {}, {}
+        found, bands, coefficients = {}, {}, self.coefficients(z)
         for curve in self.layout.curves:
             if (first := self.place("thrust shape", curve.name, "1")) is not None:
                 found[curve.name] = self.shape_deviation * np.array(z[first : first + COUNT])
-                ahead = self.base.get(curve.coefficient("c_0"), 0.0)
-                astern = self.base.get(curve.coefficient(f"c_0{REVERSE}"), ahead)
-                fitted = self.place("dead band", curve.name)
-                bands[curve.name] = (ahead, astern) if fitted is None else (z[fitted], z[fitted])
+                ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
+                bands[curve.name] = (ahead, astern)
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
         return Shapes(found, bands, frozenset(reverse))
 

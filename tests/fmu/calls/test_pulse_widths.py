@@ -1,7 +1,6 @@
 """An FMU whose commands are pulse widths behaves as one with fractions at the converted inputs."""
 
 import random
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -42,26 +41,6 @@ def fractions_of(pulses: dict[str, float]) -> dict[str, float]:
     low, neutral, high = PULSE
     pulses = {name: x or neutral for name, x in pulses.items()}
     return {name: (x - neutral) / (high - neutral if x > neutral else neutral - low) for name, x in pulses.items()}
-
-
-def commands_of(rng: random.Random) -> Iterator[tuple[dict[str, float], dict[str, float]]]:
-    """Yield pulse widths, some of them beyond full thrust, and the fractions that they stand for."""
-    while True:
-        pulses = {name: rng.choice((0.0, PULSE[1], *[rng.uniform(1000.0, 2000.0)] * 6)) for name in COMMANDS}
-        yield pulses, fractions_of(pulses)
-
-
-def test_steps_are_those_of_the_fractions_bit_for_bit(fmus: Pair) -> None:
-    commands = commands_of(random.Random(1))
-    with fmus[0].instance() as rov, fmus[1].instance() as other:
-        rov.start()
-        other.start()
-        for n in range(40):
-            pulses, fractions = next(commands)
-            assert rov.set(pulses) == other.set(fractions)
-            assert rov.step(0.13 * n, 0.13) == other.step(0.13 * n, 0.13)
-            assert rov.get(rov.fmu.outputs) == other.get(other.fmu.outputs)
-        assert max(map(abs, rov.get(STATES))) > 0.1
 
 
 def test_derivatives_in_model_exchange_are_those_of_the_fractions(fmus: Pair) -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -22,6 +23,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.evidence.check import check_evidence
 from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
+from rov_fmu.fmu.evidence.related import origin
 from rov_fmu.fmu.evidence.signature import check_signature
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import reference_results
@@ -47,12 +49,17 @@ def refit() -> Mapping[str, bytes]:
 
 
 def test_a_vehicle_can_be_read_from_its_fmu(tmp_path: Path) -> None:
-    """With its table of thrust, whose path leads into the folder of another vehicle."""
-    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
-    for path, content in reference_results(vehicle).items():
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_bytes(content)
-    assert load_vehicle(tmp_path / FOLDER / "vehicle" / "bluerov2_heavy.toml") == vehicle
+    """Its file is that of the user with its table of thrust, or is written anew if coefficients have changed."""
+    source, name = SHIPPED["bluerov2_heavy"], f"{FOLDER}/vehicle/bluerov2_heavy.toml"
+    for vehicle in (load_vehicle(source), load_vehicle(source).with_(a_d_u=150.0)):
+        files, related = origin(vehicle)
+        assert {f"{FOLDER}/{one.source}" for one in related} == files.keys()
+        for path, content in files.items():
+            (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / path).write_bytes(content)
+        assert load_vehicle(tmp_path / name) == vehicle
+        assert (files[name] == source.read_bytes()) == (vehicle["a_d_u"] != 150.0)
+    assert origin(replace(vehicle, path=None)) == ({}, []), "of a vehicle that was made in Python there is no file"
 
 
 def test_the_covariance_is_that_of_the_vehicle_file(refit: Mapping[str, bytes]) -> None:

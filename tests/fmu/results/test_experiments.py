@@ -28,6 +28,7 @@ def read(
             f"{FOLDER}/a.exp", f'<Experiments><Experiment name="a" {attributes}>{inside}</Experiment></Experiments>'
         )
         archive.writestr(f"{FOLDER}/y.csv", y)
+        archive.writestr(f"{FOLDER}/no.ssv", '<ParameterSet><Parameter name="k"/></ParameterSet>')
         for unit, value in (("m", "2"), ("kg", "2"), ("", "many")):
             text = f'<ParameterSet><Parameter name="k"><Real value="{value}" unit="{unit}"/></Parameter></ParameterSet>'
             archive.writestr(f"{FOLDER}/{unit or 'word'}.ssv", text.replace(' unit=""', ""))
@@ -67,6 +68,12 @@ def test_a_million_steps_are_run_and_one_more_is_not(tmp_path: Path) -> None:
         read(tmp_path, 'stopTime="1000001" stepSize="1"')
 
 
+def test_what_is_no_archive_is_one_line(tmp_path: Path) -> None:
+    for path, reason in ((tmp_path / "none.fmu", "there is no such file"), (Path(__file__), "is not an FMU, or is")):
+        with pytest.raises(FileError, match=f"^{path}: {reason}"):
+            ReferenceResults(path)
+
+
 def test_parameters_and_references_are_read(tmp_path: Path) -> None:
     (one,) = read(tmp_path, inside=f'<!-- a word --><Parameters source="m.ssv"/>{_REFERENCES}<Annotations/>')
     assert (one.name, one.parameters, one.stimuli) == ("a", {"k": "2"}, None)
@@ -84,6 +91,7 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
         ({"attributes": 'tolerance="0"'}, "a.exp: experiment 'a': must go on from its start"),
         ({"inside": f"{_REFERENCES}<Zeal/><Other/>"}, "a.exp: experiment 'a': Other, Zeal cannot be run"),
         ({"inside": '<Parameters source="kg.ssv"/>'}, "kg.ssv: parameter 'k': is in kg, and not in m"),
+        ({"inside": '<Parameters source="no.ssv"/>'}, "no.ssv: parameter 'k': has no value"),
         ({"inside": '<Parameters source="word.ssv"/>'}, "word.ssv: parameter 'k' = 'many': must be a finite number"),
         ({"inside": '<Parameters source="a.exp"/>'}, "a.exp: must begin with <ParameterSet>, and not with <Experim"),
         ({"inside": '<References source="gone.csv"/>'}, "gone.csv: there is no such file in the FMU"),

@@ -56,8 +56,9 @@ _FORM = f"""
 
 @cache
 def _shipped(name: str) -> tuple[Vehicle, Mapping[str, bytes]]:
-    """Return a vehicle that ships, without roll and pitch, or the identified one, and its reference results."""
-    vehicle = load_vehicle(IDENTIFIED) if name == "identified" else four_axes(load_vehicle(SHIPPED[name]))
+    """Return a vehicle that ships, without roll and pitch, or one of two others, and its reference results."""
+    others = {"identified": IDENTIFIED, "tilted": SHIPPED["bluerov2_heavy"]}
+    vehicle = load_vehicle(others[name]) if name in others else four_axes(load_vehicle(SHIPPED[name]))
     return vehicle, reference_results(vehicle)
 
 
@@ -133,11 +134,56 @@ def test_the_tables_of_the_paper_are_experiments() -> None:
                 assert after_tau["time"] == pytest.approx(Tau, rel=5e-3)
                 assert after_tau[v] == pytest.approx((1.0 - 1.0 / e) * V_ss, rel=5e-3)
                 assert last[v] == pytest.approx(V_ss, rel=1e-3)
+                tau = after_tau["time"]
+                assert [row["time"] for row in _rows(files, experiment.find("References").get("source"))] == (
+                    pytest.approx([0.0, tau, 2.0 * tau, 4.0 * tau, 8.0 * tau])
+                )
+                attributes = {key: float(experiment.get(key)) for key in ("startTime", "stopTime", "stepSize")}
+                assert [*attributes.values()] == pytest.approx([0.0, 8.0 * tau, 0.1 * tau])
                 parameters = _parameters(files, experiment.find("Parameters").get("source"))
                 assert parameters == {key: model[key] for key in parameters}
                 assert len(parameters) == 6
     assert printed == 28
     assert list(experiments) == ["manoeuvre"]
+
+
+_PHASES = {
+    "videoray": """
+        0.56 0.56 0.35 0 0 0 0 0
+        0.49 0.07 0 0.5 0.5 0.05 0.05 0.05
+        -0.49 -0.21 -0.28 0.5 0.5 0.05 0.05 0.05
+        0 0 0 0 0 0 0 0""",
+    "tilted": """
+        -0.9 -0.7 0.7 0.9 0.6 0.4 0.6 0.4 0 0 0 0 0 0 0 0 0
+        0 -1 0.6 0.6 -0.2 -0.2 0.2 0.2 0.5 0.5 0.5 0.05 0.05 0.05 0.05 0.05 0.05
+        0.6 0.6 -0.2 -1 -0.5 -0.1 -0.7 -0.3 0.5 0.5 0.5 0.05 0.05 0.05 0.05 0.05 0.05
+        0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0""",
+}
+"""The inputs in each phase of the manoeuvre: commands, forces, torques, current.
+
+The VideoRay has 0.7 times 80 % in surge and 50 % in heave at first, and its torque follows from 40 ± 30 %.
+"""
+_LENGTHS = {"videoray": 2.0, "bluerov2": 0.6, "tilted": 0.4}
+"""The length of a phase: 2 s, or 20 of the shortest times in which something changes."""
+
+
+@pytest.mark.parametrize("name", _LENGTHS)
+def test_the_manoeuvre_drives_all_axes_ahead_and_back_with_loads_and_a_current(name: str) -> None:
+    (_, files), length = _shipped(name), _LENGTHS[name]
+    stimuli = [[*row.values()] for row in _rows(files, "manoeuvre.csv")]
+    assert [row[0] for row in stimuli] == pytest.approx([t * length for n in range(4) for t in (n, n + 1)])
+    if name in _PHASES:
+        phases = [[*map(float, line.split())] for line in _PHASES[name].split("\n")[1:]]
+        assert [row[1:] for row in stimuli] == [phase for phase in phases for _ in range(2)]
+    times = [row["time"] for row in _rows(files, "manoeuvre_expected.csv")]
+    assert times == pytest.approx([0.5 * n * length for n in range(9)])
+    if name == "tilted":
+        assert _parameters(files, "attitude.ssv") == {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0}
+        start, *_ = _rows(files, "manoeuvre_expected.csv")
+        assert (start["phi"], start["theta"], start["psi"]) == pytest.approx((0.6, -0.4, 1.0))
+        of_roll = _experiments(files)["roll_100"]
+        assert of_roll.get("description").endswith("Tau = 0.04227 s, without the lag and righting moments")
+        assert float(of_roll.get("stopTime")) == pytest.approx(8.0 * 0.071)
 
 
 def _check(rov: Vehicle, files: Mapping[str, bytes], name: str) -> None:
