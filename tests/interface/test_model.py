@@ -167,12 +167,15 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
 
 
 def test_a_pulse_of_zero_is_no_signal_and_acts_as_neutral_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
+    pulses = pulsed(videoray, (1000.0, 1500.0, 2000.0))
     expected = "^u_l reaches 0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as"
     with pytest.warns(UserWarning, match=expected) as caught:
-        found = pulses.simulate(TIMES, {"u_l": [1300.0, 0.0, 1900.0]})
+        found = pulses.simulate(TIMES, {"u_l": [1250.0, 0.0, 2000.0]})
     assert len(caught) == 1
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-0.5, 0.0, 1.0]})["u"].tolist()
+    beyond = r"^u_l reaches 900: commands are pulse widths, and saturate at 1000 and 2000 us$"
+    with pytest.warns(UserWarning, match=beyond):
+        pulses.simulate(TIMES, {"u_l": [1500.0, 900.0, 2050.0]})
 
 
 # ---- Mistakes --------------------------------------------------------------------------------------------------------
