@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
 from rov_fmu.equation.alone import RISE
+from rov_fmu.equation.catalogue import cross_of
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -147,14 +148,14 @@ class Gazebo:
         self.squares = np.array([[[terms.get(f"{a}{b}{c}", 0.0) for c in U] for b in U] for a in "xyzkmn"])
         self.sizes = np.array([[[terms.get(f"{a}{b}abs{c}", 0.0) for c in U] for b in U] for a in "xyzkmn"])
         self.explicit = np.array([[terms.get(f"{a}Dot{b}", 0.0) for b in U] for a in "xyzkmn"])
-        self.thrusters, self.largest, self.least = {}, {}, {}
+        self.thrusters, self.places, self.largest, self.least = {}, {}, {}, {}
         for plugin in (p for p in model.iterchildren("plugin") if p.get("name").endswith("Thruster")):
             name = plugin.findtext("joint_name").removeprefix("thruster_").removesuffix("_joint")
             joint = next(j for j in model.iterchildren("joint") if j.get("name") == plugin.findtext("joint_name"))
             link = next(k for k in model.iterchildren("link") if k.get("name") == joint.findtext("child"))
             direction = numbers(joint.findtext("axis/xyz"))
-            moment = np.cross(numbers(link.findtext("pose"))[:3], direction)
-            self.thrusters[name] = np.concatenate([direction, moment])
+            self.places[name] = numbers(link.findtext("pose"))[:3]
+            self.thrusters[name] = np.concatenate([direction, np.cross(self.places[name], direction)])
             self.largest[name] = float(plugin.findtext("max_thrust_cmd"))
             self.least[name] = float(plugin.findtext("min_thrust_cmd"))
 
@@ -226,6 +227,12 @@ def test_an_axis_alone_has_the_steady_velocity_and_the_time_constant_of_the_fmu(
         assert found.t_events[0][0] == pytest.approx(Tau, rel=2e-4), velocity
 
 
+EARTH = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""From north-east-down to east-north-up."""
+HALF_TURN = np.diag([1.0, -1.0, -1.0])
+"""From forward-starboard-down to forward-left-up."""
+
+
 @pytest.mark.parametrize("name", LOADED)
 def test_the_thrust_of_each_propeller_is_listed_and_what_the_vehicle_lacks_is_held(name: str) -> None:
     rov = LOADED[name]
@@ -236,19 +243,19 @@ def test_the_thrust_of_each_propeller_is_listed_and_what_the_vehicle_lacks_is_he
     for n, v in enumerate("uvwpqr"):
         if v not in rov.layout.by_velocity:
             assert 0.0 < -gazebo.rigid[n, n] / gazebo.linear[n, n] < 0.1, "s until it rests"
-            assert n < 3 or gazebo.rigid[n, n] > 100.0 * max(own, default=0.0)
+            typical = max(own, default=rov["m_rov"] * gazebo.volume ** (2.0 / 3.0) / 6.0)
+            assert n < 3 or gazebo.rigid[n, n] == pytest.approx(1000.0 * typical, rel=0.01)
+    if name == "bluerov2_heavy":
+        for t in rov.layout.thrusters:
+            assert gazebo.places[t.name] == pytest.approx(HALF_TURN @ t.place)
+    titles = re.findall(r"<!-- (.*)\n +command", text)
+    assert titles[0] == {"videoray": "left thruster", "bare": "thruster t"}.get(name, titles[0])
     rows = [numbers(row) for row in re.findall(r" (?:command|newtons) +([-\d].*\d)", text)]
     for commands, forces, (thruster, largest) in zip(rows[::2], rows[1::2], gazebo.largest.items(), strict=True):
         assert commands.tolist() == [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0]
         curve = [rov.curve_force(rov.layout.curve_of[thruster], command) for command in commands]
         assert forces == pytest.approx(np.multiply(curve, largest / curve[-1]), rel=1e-3)
         assert gazebo.least[thruster] == pytest.approx(largest * curve[0] / curve[-1])
-
-
-EARTH = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-"""From north-east-down to east-north-up."""
-HALF_TURN = np.diag([1.0, -1.0, -1.0])
-"""From forward-starboard-down to forward-left-up."""
 
 
 def in_gazebo(rov: Vehicle, state: dict[str, float]) -> Array:
@@ -287,12 +294,19 @@ def tuned(name: str, **coefficients: float) -> Vehicle:
     return vehicle.extended(coefficients)
 
 
+def with_cross(vehicle: Vehicle, **coefficients: float) -> Vehicle:
+    """Return a vehicle with more coefficients between two axes."""
+    cross = (*vehicle.layout.cross, *filter(None, map(cross_of, coefficients)))
+    layout = replace(vehicle.layout, cross=cross)
+    return replace(vehicle, layout=layout, coefficients={**vehicle.coefficients, **coefficients})
+
+
 MOVING: dict[str, tuple[Vehicle, dict[str, float]]] = {
     "four axes": (tuned("bluerov2", alpha_u=1.1, alpha_v=0.9, alpha_w=1.05, alpha_r=1.2, beta_v=0.8), {}),
     "six axes": (tuned("bluerov2_heavy", beta_u=0.7, beta_q=0.8, beta_r=1.3), {}),
     "moments that no body has": (tuned("bluerov2_heavy", I_r=0.8), {}),
     "drag by direction and cross terms": (
-        tuned("remus100", a_d_u_reverse=9.0, a_d_v_reverse=700.0, a_d_p_reverse=0.5, b_d_pv=0.3),
+        with_cross(tuned("remus100", a_d_u_reverse=9.0, a_d_v_reverse=700.0, a_d_p_reverse=0.5), b_d_pv=0.3),
         {"u": 1.2, "v": 0.2, "w": -0.1, "p": 0.3, "q": 0.1, "r": -0.2},
     ),
 }

@@ -107,6 +107,29 @@ TYPED: dict[str, tuple[str, str]] = {
         "build --platform host --backend pythonfmu",
         "--platform: the PythonFMU flavour is the same for all platforms",
     ),
+    "a draft that is written elsewhere": (
+        "identify . --draft --force",
+        "identify: --draft writes only a draft of rov.toml: leave -o, --report, --mcap, --force out",
+    ),
+    "an inspection with a report": ("identify . --inspect --report r.html", "identify: --inspect writes only a draft"),
+    "a vehicle that is no FMU yet": (
+        "prove videoray",
+        "videoray: must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name",
+    ),
+    "errors without their recording": (
+        "fly --identified a.mcap",
+        "fly: --identified needs --recording, the log that it is about",
+    ),
+    "workers of a scheduler": (
+        "study plan.toml -o r --workers 1 --scheduler tcp://a:1",
+        "study: leave --workers out, because the scheduler already has its workers",
+    ),
+    "a run without a vehicle": ("study fmu.toml -o r --mcap 0", "fmu.toml: --mcap 0: the plan must have `vehicle`, "),
+    "points and a velocity": (
+        "tune videoray --axis heave --points taus.csv --v-ss 1",
+        "tune: use either --points, or --command, --v-ss and --tau",
+    ),
+    "a command alone": ("tune videoray --axis heave --command 1", "tune: give --command and --v-ss (and --tau), or "),
     "Python and FMI 3.0": ("build --fmi 3 --backend=pythonfmu", "--fmi 3: PythonFMU makes FMI 2.0 alone"),
     "OSP and FMI 3.0": ("build --fmi 3 --osp", "--fmi 3: libcosim and the OSP tools, "),
     "no name for the file": ("build -o ''", ".: cannot be written: is a folder"),
@@ -119,6 +142,7 @@ _PLAN = 'vehicle = "{}"\nstop_time = 1.0\nstep = 0.1\nruns = 2\n[figures]\na = "
 FILES = {
     "mine.toml": ALONE,
     "plan.toml": _PLAN.format("videoray"),
+    "fmu.toml": _PLAN.format("x.fmu").replace("vehicle", "fmu"),
     "rov.toml": (TESTS / "rov.toml").read_text(encoding="utf-8"),
     "log.csv": "time [s],command [%],depth [m]\n0,30,0\n",
     "taus.csv": "command [%],time constant [s]\n20,3\n",

@@ -3,6 +3,7 @@
 import csv
 import re
 import shlex
+import shutil
 import webbrowser
 from pathlib import Path
 
@@ -114,12 +115,13 @@ def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys)
     assert (here / name).read_bytes().startswith(begins)
 
 
-@pytest.mark.parametrize("command", [["simulate", str(BARE), "--plot"], ["fly", str(BARE), "--against", str(BARE)]])
+@pytest.mark.parametrize("command", [["simulate", str(BARE), "--plot"], ["fly", str(BARE), "--against", "bare.toml"]])
 @pytest.mark.parametrize("opens", [True, False])
 def test_what_is_to_be_seen_opens_in_a_browser(
     command: list[str], opens: bool, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     opened: list[str] = []
+    shutil.copy(BARE, here)
 
     def browse(address: str) -> bool:
         opened.append(address)
@@ -131,7 +133,8 @@ def test_what_is_to_be_seen_opens_in_a_browser(
     out, err = capsys.readouterr()
     path = Path(out.splitlines()[0])
     assert opened == [path.as_uri()]
-    assert "Bare" in path.read_text(encoding="utf-8")
+    shown = "Bare: no commands" if command[0] == "simulate" else f"Bare ({BARE}) beside Bare (bare.toml)"
+    assert shown in path.read_text(encoding="utf-8")
     assert err.count("\n") == (not opens)
     assert err.startswith("" if opens else "rov-fmu: no browser could be opened. Open this file in a browser, ")
 
