@@ -179,7 +179,7 @@ def test_a_log_with_a_heading_has_its_pose_and_begins_at_0() -> None:
     """The depth and the roll are those between the samples, and the heading turns on through half a turn."""
     result, time = example(), np.array([5.0, 6.0, 7.0])
     dive = log(
-        commands(time, {"t": np.array([0.5, 0.5, 0.2])}),
+        commands(np.array([4.0, 6.0, 7.0]), {"t": np.array([0.5, 0.5, 0.2])}),
         channel("heading", time, np.array([3.0, -3.0, -2.5])),
         channel("depth", time[::2], np.array([1.0, 3.0])),
         channel("roll angle", time[::2], np.array([0.1, 0.3])),
@@ -187,9 +187,9 @@ def test_a_log_with_a_heading_has_its_pose_and_begins_at_0() -> None:
     )
     content = identification_mcap(replace(result, folder=replace(result.folder, logs=[*result.folder.logs, dive])))
     found = messages(content)
-    assert found["/dive_csv/commands"] == [(0, {"t": 0.5}), (2_000_000_000, {"t": 0.2})]
-    assert found["/dive_csv/depth"] == [(0, {"measured": 1.0}), (2_000_000_000, {"measured": 3.0})]
-    assert [stamp for stamp, _ in found["/dive_csv/pose"]] == [0, 1_000_000_000, 2_000_000_000]
+    assert found["/dive_csv/commands"] == [(0, {"t": 0.5}), (3_000_000_000, {"t": 0.2})]
+    assert found["/dive_csv/depth"] == [(1_000_000_000, {"measured": 1.0}), (3_000_000_000, {"measured": 3.0})]
+    assert [stamp for stamp, _ in found["/dive_csv/pose"]] == [1_000_000_000, 2_000_000_000, 3_000_000_000]
     for (_, of), depth, *angles in zip(
         found["/dive_csv/pose"], (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.0, 0.0, 0.0), (3.0, -3.0, -2.5), strict=True
     ):

@@ -70,10 +70,6 @@ TYPED: dict[str, tuple[str, str]] = {
         "tune videoray --axis surge --command -0.5 --v-ss 0.6",
         "tune: surge: V_ss = 0.6 m/s must be negative, for a command of -0.5 gives a thrust of -12.0805 N",
     ),
-    "points without a velocity": (
-        "tune videoray --axis heave --points taus.csv",
-        "taus.csv: no row has a velocity, and alpha is tuned to velocities",
-    ),
     "a vehicle for the points": (
         "tune videoray --axis heave --points mine.toml",
         "mine.toml, line 1 = '# VideoRay ",
@@ -125,18 +121,10 @@ TYPED: dict[str, tuple[str, str]] = {
         "study: leave --workers out, because the scheduler already has its workers",
     ),
     "a run without a vehicle": ("study fmu.toml -o r --mcap 0", "fmu.toml: --mcap 0: the plan must have `vehicle`, "),
-    "points and a velocity": (
-        "tune videoray --axis heave --points taus.csv --v-ss 1",
-        "tune: use either --points, or --command, --v-ss and --tau",
-    ),
     "a command alone": ("tune videoray --axis heave --command 1", "tune: give --command and --v-ss (and --tau), or "),
     "Python and FMI 3.0": ("build --fmi 3 --backend=pythonfmu", "--fmi 3: PythonFMU makes FMI 2.0 alone"),
     "OSP and FMI 3.0": ("build --fmi 3 --osp", "--fmi 3: libcosim and the OSP tools, "),
     "no name for the file": ("build -o ''", ".: cannot be written: is a folder"),
-    "an axis that the vehicle lacks": (
-        "tune videoray --axis sway --command 1 --v-ss 1",
-        "--axis sway: the vehicle has only surge, heave, yaw",
-    ),
 }
 _PLAN = 'vehicle = "{}"\nstop_time = 1.0\nstep = 0.1\nruns = 2\n[figures]\na = "max(u)"\n'
 FILES = {
@@ -145,7 +133,6 @@ FILES = {
     "fmu.toml": _PLAN.format("x.fmu").replace("vehicle", "fmu"),
     "rov.toml": (TESTS / "rov.toml").read_text(encoding="utf-8"),
     "log.csv": "time [s],command [%],depth [m]\n0,30,0\n",
-    "taus.csv": "command [%],time constant [s]\n20,3\n",
     "x.fmu": "no archive",
 }
 
