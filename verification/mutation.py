@@ -102,6 +102,9 @@ TESTS = {
     "rov_fmu/report/*": "report/test_report.py report",
     "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_samples.py study",
     "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
+    "rov_fmu/interface/sitl_command.py": "bridges/test_sitl.py cli/test_targets.py",
+    "rov_fmu/interface/sdf_command.py": "bridges/test_sdf.py bridges/test_urdf.py cli/test_targets.py",
+    "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",
     "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_edges.py tank/test_tank_tests.py "
@@ -113,6 +116,7 @@ TESTS = {
     "vehicle/test_fuzzed_vehicles.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
+    "rov_fmu/cli.py": "interface/test_inspect_command.py fmu/test_build_failures.py cli study/test_page.py",
     "rov_fmu/*": "cli/test_start.py cli/test_messages.py cli",
 }
 """The default tests of each file, in the folder tests/, besides those that import it. The first pattern counts."""

@@ -186,7 +186,7 @@ def _plot_output(result: Result, path: Path, title: str) -> Output:
 
 def print_final(vehicle: VehicleModel, result: Result, *, has_no_input: bool) -> None:
     """Print the values at the end as a table, and how to set a command if the simulation has no input at all."""
-    ends = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
+    ends = table(f"{vehicle.name} after {result.time[-1]:g} s", "variable", ["value"], ["unit"])
     for name, values in result.items():
         ends.add_row(name, f"{values[-1] + 0.0:.6g}", result.units[name])  # -0 becomes 0
     print_table(ends)

@@ -26,6 +26,8 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
     vehicle = rov_fmu.load(name)
     many, one = RovVectorEnv(vehicle, 3, steps=5), RovEnv(vehicle, steps=5)
     start, _ = many.reset(seed=1)
+    task = [name in ("x", "y", "z", "psi") for name in many.states]
+    assert 1.0 < np.abs(start[:, task]).max() <= 2.0
     one.reset(seed=2)
     assert all(len({*column[:, 0]}) == drawn_values for column in many.coefficients.values())
     one.many.coefficients = {name: column[1:2] for name, column in many.coefficients.items()}
@@ -37,6 +39,7 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
         np.testing.assert_allclose(single, states[1], rtol=SCALE, atol=SCALE)
         assert told == pytest.approx([rewards[1], terminated[1], truncated[1]], rel=SCALE, abs=SCALE)
         assert truncated.all() == (n == 4)
+        assert rewards == pytest.approx(-np.sum(states[:, task] ** 2, axis=1) - 0.1 * np.sum(actions[n] ** 2, axis=1))
     drawn = vehicle.with_(**{name: float(column[1, 0]) for name, column in many.coefficients.items()})
     commands = dict(zip(many.commands, actions[:, 1].T, strict=True))
     begin = dict(zip(many.states, start[1], strict=True))
@@ -46,6 +49,23 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
     assert not rewards.any()
     assert not truncated.any()
     assert not states[:, : many.states.index("x")].any(), "a new episode begins at rest"
+    over = [many.step(actions[n])[3].any() for n in range(5)]
+    assert over == [False] * 4 + [True]
+
+
+def test_an_episode_ends_where_a_state_leaves_its_bound_and_the_others_go_on() -> None:
+    many = RovVectorEnv(rov_fmu.load("videoray_refit"), 3, steps=2, draws=False)
+    many.reset(seed=1)
+    assert not many.coefficients
+    many.state[0] = [0.0, 0.0, 0.0, 999.0, -999.0, 0.0, 0.0]
+    many.state[1] = [50.0, 0.0, 0.0, 999.0, 0.0, 0.0, 0.0]
+    ends = [[ended.tolist() for ended in many.step(np.full((3, 3), 9.0))[2:4]] for _ in range(4)]
+    assert ends == [
+        [[False, True, False], [False, False, False]],
+        [[False, False, False], [True, False, True]],
+        [[False, False, False], [False, False, False]],
+        [[False, False, False], [False, True, False]],
+    ]
 
 
 @pytest.mark.parametrize(

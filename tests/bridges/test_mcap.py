@@ -26,6 +26,7 @@ from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
 from tests.folders import small_folder
 from tests.report.results import example
+from tests.tank.logs import channel, commands, log
 
 
 def recorded(vehicle: VehicleModel, seconds: float, inputs: Mapping[str, Any], **start: float) -> Result:
@@ -39,12 +40,12 @@ def messages(content: bytes) -> dict[str, list[tuple[int, Any]]]:
     """Return the stamps (ns) and the messages of each topic."""
     found: dict[str, list[tuple[int, Any]]] = {}
     reader = make_reader(BytesIO(content), validate_crcs=True, decoder_factories=[DecoderFactory()])
-    for _, channel, message in reader.iter_messages():
-        if channel.message_encoding == "json":
+    for _, of, message in reader.iter_messages():
+        if of.message_encoding == "json":
             decoded = json.loads(message.data)
         else:
-            decoded = DecoderFactory().decoder_for(channel.message_encoding, _)(message.data)  # type: ignore[misc]
-        found.setdefault(channel.topic, []).append((message.log_time, decoded))
+            decoded = DecoderFactory().decoder_for(of.message_encoding, _)(message.data)  # type: ignore[misc]
+        found.setdefault(of.topic, []).append((message.log_time, decoded))
     return found
 
 
@@ -106,6 +107,33 @@ def test_frames(heavy: VehicleModel, angles: tuple[float, float, float]) -> None
     np.testing.assert_allclose(turned(first.pose), by_hand(*angles), atol=1e-12)
 
 
+def test_level_frames_and_the_picture_with_the_jets(heavy: VehicleModel) -> None:
+    """A jet leaves its thruster against the force; the longest one has 1.5 times the length of the hull."""
+    videoray = rov_fmu.load("videoray")
+    (_, first), *_ = messages(videoray.to_mcap(recorded(videoray, 0.1, {}, x=1.0, z=3.0, psi=2.5)))["/pose"]
+    np.testing.assert_allclose(turned(first.pose), by_hand(0.0, 0.0, 2.5), atol=1e-12)
+    found = messages(heavy.to_mcap(recorded(heavy, 0.1, {"u_5": 0.5, "u_1": -0.2}, x=1.0, z=3.0)))
+    ((_, moved),) = found["/tf"][-1:]
+    (tf,) = moved.transforms
+    last = found["/pose"][-1][1].pose
+    assert (tf.parent_frame_id, tf.child_frame_id) == ("map", "base_link")
+    assert f"{tf.translation}{tf.rotation}" == f"{last.position}{last.orientation}"
+    (picture,) = found["/scene"][-1][1].entities
+    (hull,) = picture.cubes
+    size = np.array([hull.size.x, hull.size.y, hull.size.z])
+    places = {t.name: np.array(t.place) for t in heavy.layout.thrusters}
+    assert np.all(2.0 * np.abs([*places.values()]).max(axis=0) <= size)
+    assert size == pytest.approx([0.312, 0.436, 0.17])
+    forces = {name: found["/outputs"][-1][1][f"F_{name}"] for name in ("1", "5")}
+    for jet, name in zip(picture.arrows, forces, strict=True):
+        direction = np.array(next(t.direction.value for t in heavy.layout.thrusters if t.name == name))
+        assert turned(jet.pose)[:, 0] == pytest.approx(-np.sign(forces[name]) * direction * [1.0, -1.0, -1.0])
+        at = jet.pose.position
+        assert [at.x, at.y, at.z] == pytest.approx(places[name] * [1.0, -1.0, -1.0])
+        share = abs(forces[name]) / max(map(abs, forces.values()))
+        assert jet.shaft_length + jet.head_length == pytest.approx(1.5 * size.max() * share)
+
+
 def test_without_the_library(heavy: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where foxglove-sdk is missing, a line says how to install it."""
     monkeypatch.setitem(sys.modules, "foxglove", None)
@@ -131,20 +159,42 @@ def test_identification() -> None:
     unknown = UnknownForce(SURGE, prediction.file, np.array([1.0, 2.5]), np.array([0.5, -1.0]), np.array([0.1, 0.2]))
     content = identification_mcap(replace(result, unknown_forces=(unknown,)))
     found = messages(content)
-    log = "/" + prediction.file.replace(".", "_")
+    topic = "/" + prediction.file.replace(".", "_")
     assert {topic.split("/")[1] for topic in found} == {one.file.replace(".", "_") for one in result.folder.logs}
-    shown = [(stamp, *values.values()) for stamp, values in found[f"{log}/unknown_force/surge"]]
+    shown = [(stamp, *values.values()) for stamp, values in found[f"{topic}/unknown_force/surge"]]
     expected = [(1e9, 0.5, 0.304, 0.696), (2.5e9, -1.0, -1.392, -0.608)]
     np.testing.assert_allclose(shown, expected, rtol=1e-4)
-    written = found[f"{log}/{prediction.quantity.replace(' ', '_')}"]
+    written = found[f"{topic}/{prediction.quantity.replace(' ', '_')}"]
     assert [values["measured"] for _, values in written] == prediction.measured.tolist()
     assert [values["predicted"] for _, values in written] == prediction.predicted.tolist()
     inside = np.array([values["low"] <= values["measured"] <= values["high"] for _, values in written])
     off = np.abs(prediction.measured - prediction.predicted)
     assert inside.mean() == pytest.approx(np.mean(off <= 1.959964 * prediction.deviation))
-    commands = next(one.commands for one in result.folder.logs if one.file == prediction.file)
-    assert commands
-    assert [values["t"] for _, values in found[f"{log}/commands"]] == commands.value.tolist()
+    commanded = next(one.commands for one in result.folder.logs if one.file == prediction.file)
+    assert commanded
+    assert [values["t"] for _, values in found[f"{topic}/commands"]] == commanded.value.tolist()
+
+
+def test_a_log_with_a_heading_has_its_pose_and_begins_at_0() -> None:
+    """The depth and the roll are those between the samples, and the heading turns on through half a turn."""
+    result, time = example(), np.array([5.0, 6.0, 7.0])
+    dive = log(
+        commands(np.array([4.0, 6.0, 7.0]), {"t": np.array([0.5, 0.5, 0.2])}),
+        channel("heading", time, np.array([3.0, -3.0, -2.5])),
+        channel("depth", time[::2], np.array([1.0, 3.0])),
+        channel("roll angle", time[::2], np.array([0.1, 0.3])),
+        file="dive.csv",
+    )
+    content = identification_mcap(replace(result, folder=replace(result.folder, logs=[*result.folder.logs, dive])))
+    found = messages(content)
+    assert found["/dive_csv/commands"] == [(0, {"t": 0.5}), (3_000_000_000, {"t": 0.2})]
+    assert found["/dive_csv/depth"] == [(1_000_000_000, {"measured": 1.0}), (3_000_000_000, {"measured": 3.0})]
+    assert [stamp for stamp, _ in found["/dive_csv/pose"]] == [1_000_000_000, 2_000_000_000, 3_000_000_000]
+    for (_, of), depth, *angles in zip(
+        found["/dive_csv/pose"], (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.0, 0.0, 0.0), (3.0, -3.0, -2.5), strict=True
+    ):
+        assert of.pose.position.z == pytest.approx(-depth)
+        np.testing.assert_allclose(turned(of.pose), by_hand(*angles), atol=1e-12)
 
 
 def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

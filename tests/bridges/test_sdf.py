@@ -23,11 +23,12 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
 from rov_fmu.equation.alone import RISE
+from rov_fmu.equation.catalogue import cross_of
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES
+from tests.vehicles import VEHICLES, pulsed
 
 Array = NDArray[np.float64]
 REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
@@ -147,15 +148,16 @@ class Gazebo:
         self.squares = np.array([[[terms.get(f"{a}{b}{c}", 0.0) for c in U] for b in U] for a in "xyzkmn"])
         self.sizes = np.array([[[terms.get(f"{a}{b}abs{c}", 0.0) for c in U] for b in U] for a in "xyzkmn"])
         self.explicit = np.array([[terms.get(f"{a}Dot{b}", 0.0) for b in U] for a in "xyzkmn"])
-        self.thrusters, self.largest = {}, {}
+        self.thrusters, self.places, self.largest, self.least = {}, {}, {}, {}
         for plugin in (p for p in model.iterchildren("plugin") if p.get("name").endswith("Thruster")):
             name = plugin.findtext("joint_name").removeprefix("thruster_").removesuffix("_joint")
             joint = next(j for j in model.iterchildren("joint") if j.get("name") == plugin.findtext("joint_name"))
             link = next(k for k in model.iterchildren("link") if k.get("name") == joint.findtext("child"))
             direction = numbers(joint.findtext("axis/xyz"))
-            moment = np.cross(numbers(link.findtext("pose"))[:3], direction)
-            self.thrusters[name] = np.concatenate([direction, moment])
+            self.places[name] = numbers(link.findtext("pose"))[:3]
+            self.thrusters[name] = np.concatenate([direction, np.cross(self.places[name], direction)])
             self.largest[name] = float(plugin.findtext("max_thrust_cmd"))
+            self.least[name] = float(plugin.findtext("min_thrust_cmd"))
 
     def thrust(self, newtons: Mapping[str, float]) -> Array:
         """The force and moment of the thrusters."""
@@ -231,6 +233,31 @@ HALF_TURN = np.diag([1.0, -1.0, -1.0])
 """From forward-starboard-down to forward-left-up."""
 
 
+@pytest.mark.parametrize("name", LOADED)
+def test_the_thrust_of_each_propeller_is_listed_and_what_the_vehicle_lacks_is_held(name: str) -> None:
+    rov = LOADED[name]
+    text = gazebo_model(rov, in_world=True).text
+    gazebo = Gazebo(text)
+    assert gazebo.rigid[0, 0] == pytest.approx(rov["m_rov"], rel=1e-9)
+    own = [gazebo.rigid[n, n] for n, v in enumerate("uvwpqr") if n > 2 and v in rov.layout.by_velocity]
+    for n, v in enumerate("uvwpqr"):
+        if v not in rov.layout.by_velocity:
+            assert 0.0 < -gazebo.rigid[n, n] / gazebo.linear[n, n] < 0.1, "s until it rests"
+            typical = max(own, default=rov["m_rov"] * gazebo.volume ** (2.0 / 3.0) / 6.0)
+            assert n < 3 or gazebo.rigid[n, n] == pytest.approx(1000.0 * typical, rel=0.01)
+    if name == "bluerov2_heavy":
+        for t in rov.layout.thrusters:
+            assert gazebo.places[t.name] == pytest.approx(HALF_TURN @ t.place)
+    titles = re.findall(r"<!-- (.*)\n +command", text)
+    assert titles[0] == {"videoray": "left thruster", "bare": "thruster t"}.get(name, titles[0])
+    rows = [numbers(row) for row in re.findall(r" (?:command|newtons) +([-\d].*\d)", text)]
+    for commands, forces, (thruster, largest) in zip(rows[::2], rows[1::2], gazebo.largest.items(), strict=True):
+        assert commands.tolist() == [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0]
+        curve = [rov.curve_force(rov.layout.curve_of[thruster], command) for command in commands]
+        assert forces == pytest.approx(np.multiply(curve, largest / curve[-1]), rel=1e-3)
+        assert gazebo.least[thruster] == pytest.approx(largest * curve[0] / curve[-1])
+
+
 def in_gazebo(rov: Vehicle, state: dict[str, float]) -> Array:
     """Position, rotation matrix and velocities of a state of the FMU, in Gazebo's frames."""
     angles = state | rov.calculated(rov.layout.usual_inputs, state)
@@ -267,18 +294,27 @@ def tuned(name: str, **coefficients: float) -> Vehicle:
     return vehicle.extended(coefficients)
 
 
+def with_cross(vehicle: Vehicle, **coefficients: float) -> Vehicle:
+    """Return a vehicle with more coefficients between two axes."""
+    cross = (*vehicle.layout.cross, *filter(None, map(cross_of, coefficients)))
+    layout = replace(vehicle.layout, cross=cross)
+    return replace(vehicle, layout=layout, coefficients={**vehicle.coefficients, **coefficients})
+
+
 MOVING: dict[str, tuple[Vehicle, dict[str, float]]] = {
     "four axes": (tuned("bluerov2", alpha_u=1.1, alpha_v=0.9, alpha_w=1.05, alpha_r=1.2, beta_v=0.8), {}),
     "six axes": (tuned("bluerov2_heavy", beta_u=0.7, beta_q=0.8, beta_r=1.3), {}),
-    "drag by direction": (tuned("bluerov2_heavy", a_d_u_reverse=60.0, a_d_v_reverse=400.0, a_d_p_reverse=3.0), {}),
     "moments that no body has": (tuned("bluerov2_heavy", I_r=0.8), {}),
-    "cross terms": (LOADED["remus100"], {"u": 1.2, "v": 0.2, "w": -0.1, "p": 0.3, "q": 0.1, "r": -0.2}),
+    "drag by direction and cross terms": (
+        with_cross(tuned("remus100", a_d_u_reverse=9.0, a_d_v_reverse=700.0, a_d_p_reverse=0.5), b_d_pv=0.3),
+        {"u": 1.2, "v": 0.2, "w": -0.1, "p": 0.3, "q": 0.1, "r": -0.2},
+    ),
 }
 """Vehicles, and the velocities with which they start."""
 
 
 @pytest.mark.parametrize(
-    "case", [pytest.param(case, marks=() if case == "drag by direction" else pytest.mark.long) for case in MOVING]
+    "case", [pytest.param(case, marks=() if "cross" in case else pytest.mark.long) for case in MOVING]
 )
 def test_gazebo_moves_as_the_fmu(case: str) -> None:
     vehicle, velocities = MOVING[case]
@@ -329,38 +365,89 @@ def test_the_warning_is_there_where_the_plugin_diverges(case: str) -> None:
 
 # ---- Notes and mistakes ----------------------------------------------------------------------------------------------
 
+PARALLEL = tuned("bluerov2_heavy", F_0_w=2.0, alpha_u=0.8, alpha_v=0.6, alpha_w=0.0)
+LEVEL = "thrusters stand where their force has no moment in roll and pitch"
+SENDER = "the Thruster plugin takes newtons, so these are left to the sender: the thrust curve"
 NOTES = {
-    "alpha": ("videoray", "alpha: the plugins take 1.1 F_l, 1.1 F_r, 1.14 F_t newtons"),
-    "beta": (
-        "videoray",
-        "beta_r = 0.12: the effective inertia in yaw is 0.875 kg.m2, of which <fluid_added_mass> has 0.77",
+    "tuning": (
+        LOADED["videoray"],
+        False,
+        [
+            "alpha: the plugins take 1.1 F_l, 1.1 F_r, 1.14 F_t newtons, and the thrusters' places scale the moments",
+            "beta_w = 0.59: the effective inertia in heave is 11.14 kg, of which <fluid_added_mass> has 4.566 kg",
+            "beta_r = 0.12: the effective inertia in yaw is 0.875 kg.m2, of which <fluid_added_mass> has 0.77 kg.m2",
+            SENDER,
+            "the vehicle file has no sway, roll, pitch: damping holds it there, in rotation with a large inertia",
+            LEVEL,
+            "the vehicle file has no Coriolis and Munk terms, but Gazebo's bodies have them",
+        ],
     ),
-    "lag": ("bluerov2_heavy", "left out: the lag of the thrust (T)"),
-    "fins": ("remus100", "left out: the fins"),
+    "directions": (
+        LOADED["everything"],
+        True,
+        [
+            "beta_r = 0.8: the effective inertia in yaw is 0.7394 kg.m2, of which the Hydrodynamics plugin has "
+            "0.3694 kg.m2",
+            f"{SENDER}, its dead band, its curve in reverse, the inputs that drive several thrusters",
+            "left out: the lag of the thrust (T)",
+            "b_d_w and b_d_w_reverse: linear drag has their mean in both directions",
+            "the constant load F_0_w is in the buoyancy",
+            "the vehicle file has no roll, pitch: damping holds it there, in rotation with a large inertia",
+            LEVEL,
+            "the plugin computes Coriolis and Munk terms of the added mass from its diagonal only",
+        ],
+    ),
+    "six axes": (
+        pulsed(PARALLEL, (1100.0, 1500.0, 1900.0)),
+        False,
+        [
+            "alpha: the plugins take 0.7071 F_1, 0.7071 F_2, 0.7071 F_3, 0.7071 F_4 newtons, and the thrusters' "
+            "places scale the moments",
+            "left out: thrusters whose force alpha makes 0: 5, 6, 7, 8",
+            f"{SENDER}, its dead band, its curve in reverse, the pulse widths",
+            "left out: the lag of the thrust (T)",
+            "left out: the constant load F_0_w",
+            "left out: the moment about its own direction of each of the thrusters 1, 2, 3, 4",
+        ],
+    ),
+    "fins": (LOADED["remus100"], False, [SENDER, "left out: the fins"]),
 }
+"""Vehicles, whether the added mass is in the plugin, and the notes."""
 
 
 @pytest.mark.parametrize("case", NOTES)
 def test_the_notes_say_what_is_otherwise_in_the_file_too(case: str) -> None:
-    name, note = NOTES[case]
-    model = gazebo_model(LOADED[name])
-    assert any(note in one for one in model.notes)
+    vehicle, explicit, notes = NOTES[case]
+    model = gazebo_model(vehicle, explicit=explicit)
+    assert [*model.notes] == notes
     (comment, *_) = root_of(model.text).xpath("/comment()")
-    assert note in comment.text
+    assert all(f"- {note}.\n" in comment.text for note in notes)
+
+
+def renamed(vehicle: Vehicle, old: str, new: str) -> Vehicle:
+    """Return a vehicle with another name of a thruster."""
+    thrusters = (t.model_copy(update={"name": new}) if t.name == old else t for t in vehicle.layout.thrusters)
+    return replace(vehicle, layout=replace(vehicle.layout, thrusters=tuple(thrusters)))
 
 
 @pytest.mark.parametrize(
-    ("name", "changes", "line"),
+    ("vehicle", "line"),
     [
-        ("videoray", {"beta_u": 0.0}, "videoray: beta_u = 0: must be more than 0 for Gazebo"),
-        ("bluerov2", {"F_0_w": 150.0}, "bluerov2: the net weight of 150 N must be less than the weight for Gazebo"),
+        (tuned("videoray", beta_u=0.0), "videoray: beta_u = 0: must be more than 0 for Gazebo, because m/beta_u is a"),
+        (
+            tuned("bluerov2", F_0_w=150.0),
+            "bluerov2: the net weight of 150 N must be less than the weight for Gazebo, because the Buoyancy plugin "
+            "only pushes upwards: 112.7 N",
+        ),
+        (
+            renamed(LOADED["bluerov2"], "2", "1_joint"),
+            "bluerov2: thruster.1_joint: choose another name for Gazebo, where the joint of 1 has this name",
+        ),
     ],
 )
-def test_what_gazebo_cannot_have_is_one_line(name: str, changes: Mapping[str, float], line: str) -> None:
-    with pytest.raises(InputError) as error:
-        gazebo_model(LOADED[name].with_(**changes))
-    assert str(error.value).startswith(line)
-    assert "\n" not in str(error.value)
+def test_what_gazebo_cannot_have_is_one_line(vehicle: Vehicle, line: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(line)}[^\n]*$"):
+        gazebo_model(vehicle)
 
 
 def test_the_command_writes_the_file_and_lists_the_notes(

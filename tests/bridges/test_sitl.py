@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import rov_fmu
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
 from rov_fmu.bridges.sitl_frames import servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, servo_packet
@@ -27,8 +28,10 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import ArduSub, packet, parsed
+from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
+from tests.vehicles import pulsed
 from verification.references.autopilot.ardusub import VECTORED_6DOF
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
@@ -120,6 +123,36 @@ def test_a_repeated_frame_gets_the_same_bytes_without_a_step() -> None:
     assert stamp(connection.answer(packet(1, 11, NEUTRAL), HERE)) < 0.1, "ArduPilot refuses steps of 0.1 s"
 
 
+def test_the_count_goes_on_after_its_largest_value_and_a_jump_is_believed_when_it_is_repeated() -> None:
+    connection = Connection(setup_of())
+    for count, is_answered in (
+        (2**32 - 2, True),
+        (2**32 - 1, True),
+        (0, True),
+        (1, True),
+        (12, False),
+        (12, True),
+        (2, True),
+        (3, True),
+        (13, True),
+    ):
+        assert bool(connection.answer(packet(400, count, NEUTRAL), HERE)) == is_answered, count
+    assert (connection.order.lost, connection.traffic.restarts) == (9, 0)
+
+
+def test_what_an_autopilot_would_send() -> None:
+    for rate, pulse, is_plausible in (
+        (0, 1500, False),
+        (1, 500, True),
+        (20_000, 2500, True),
+        (20_001, 1500, False),
+        (400, 499, False),
+        (400, 2501, False),
+        (400, 0, True),
+    ):
+        assert ServoPacket(rate, 0, (1500, pulse)).is_plausible == is_plausible, (rate, pulse)
+
+
 def test_late_packets_do_not_move_the_vehicle_and_a_restart_begins_again() -> None:
     now = [0.0]
     connection = Connection(setup_of(z=1.0), clock=lambda: now[0])
@@ -181,6 +214,17 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
     assert [hint.partition(",")[0] for hint in hints] == ["packets of other senders", "a run has 20 logs with 1"]
 
 
+def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rov_fmu.bridges.sitl.MOST_ROWS", 5)
+    hints: list[str] = []
+    connection = Connection(replace(setup_of(), log=tmp_path / "dive.csv"), hints.append)
+    for count in range(100):
+        connection.answer(packet(50, count, NEUTRAL), HERE)
+    connection.write_log()
+    assert len((tmp_path / "dive.csv").read_text(encoding="utf-8").splitlines()) == 1 + 5
+    assert [hint.partition(":")[0] for hint in hints] == ["a run has 20 logs with 1,000,000 rows in all at most"]
+
+
 # ---- Motion ----------------------------------------------------------------------------------------------------------
 
 
@@ -212,6 +256,41 @@ def test_the_sensors_agree_with_each_other(name: str) -> None:
         assert now["gyro"] == pytest.approx([turning[2, 1], turning[0, 2], turning[1, 0]], abs=1e-5)
         assert now["rng_1"][0] * R[2, 2] == pytest.approx(20.0 - now["position"][2])
     assert max(map(abs, at[-1]["velocity"])) > 0.05
+
+
+def test_held_and_reversed_inputs_are_those_of_a_simulation_in_a_log_of_all_variables(tmp_path: Path) -> None:
+    rov = rov_fmu.load("videoray")
+    setup = Setup(rov, servos_of(rov.layout, None, {1: "l", 2: "-r"}), {"u_t": 0.2}, log=tmp_path / "dive.mcap")
+    connection = Connection(setup)
+    for count in range(101):
+        connection.answer(packet(100, count, [1700, 1400, *[1900] * 14]), HERE)
+    connection.write_log()
+    assert connection.logs == [tmp_path / "dive.mcap"]
+    found = messages(connection.logs[0].read_bytes())
+    commands = {"u_l": 0.5, "u_r": 0.25, "u_t": 0.2}
+    assert found["/inputs"] == [(10_000_000, pytest.approx(commands))]
+    assert [stamp for stamp, _ in found["/outputs"]] == [10_000_000 + 100_000_000 * n for n in range(10)]
+    expected = rov.simulate([0.0, *(stamp * 1e-9 for stamp, _ in found["/outputs"])], commands)
+    for name, values in expected.items():
+        assert [row[name] for _, row in found["/outputs"]] == pytest.approx(values[1:], rel=1e-9, abs=1e-12)
+
+
+def test_the_pulses_of_the_vehicle_file_count() -> None:
+    rov = load_vehicle(SHIPPED["videoray"])
+    usual = Connection(setup_of(rov)).answer(packet(400, 0, [1700, 1900, *[1500] * 14]), HERE)
+    own = setup_of(pulsed(rov, (1000.0, 1500.0, 2000.0)))
+    assert Connection(own).answer(packet(400, 0, [1750, 2000, 0, *[1500] * 13]), HERE) == usual
+
+
+@pytest.mark.parametrize(
+    ("bottom", "start", "distance"),
+    [(500.0, {}, 100.0), (3.0, {}, 0.0), (20.0, {"phi_0": 3.0}, 100.0), (110.0, {}, 100.0), (90.0, {}, 85.0)],
+)
+def test_the_distance_to_the_bottom_is_that_of_a_sensor_with_a_range_of_100_m(
+    bottom: float, start: dict[str, float], distance: float
+) -> None:
+    connection = Connection(replace(setup_of(HEAVY, z=5.0, **start), bottom=bottom))
+    assert parsed(connection.answer(packet(400, 0, NEUTRAL), HERE))["rng_1"] == pytest.approx([distance], abs=1e-3)
 
 
 @pytest.mark.parametrize("offset", [pytest.param(0.0, marks=pytest.mark.long), 1.05])
@@ -249,6 +328,8 @@ def test_frames_and_tables() -> None:
     assert servos_of(videoray, None, {}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (3, 1.0)}
     assert servos_of(videoray, "simplerov_3", {5: "-t"}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (5, -1.0)}
     assert servos_of(videoray, None, {4: "l"}) == {"u_l": (4, 1.0)}
+    bluerov2 = servos_of(load_vehicle(SHIPPED["bluerov2"]).layout, None, {})
+    assert {name: servo for name, (servo, _) in bluerov2.items()} == {f"u_{n}": n for n in range(1, 7)}
     heavy = servos_of(HEAVY.layout, "vectored", {8: "-7"})
     assert heavy["u_7"] == (8, -1.0)
     assert "u_8" not in heavy
@@ -274,7 +355,9 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
         autopilot.close()
         said = process.stdout.read()
         assert process.wait(30) == 0
-    assert said.startswith("6.000 s of flight; 1200 frames")
+    end = re.match(r"6\.000 s of flight; 1200 frames, (\d+) µs each; 0 repeated, 0 lost, 0 ignored, 0 restarts\n", said)
+    assert end
+    assert 1 < int(end[1]) < 5000
     (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
     (one,) = load_tests(folder).folder.logs
     at = [autopilot.history[n] for n in range(0, 1180, 20)]
@@ -286,12 +369,42 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
     assert np.ptp(commanded(one, "3")) > 0.4
 
 
+def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "dive.csv"
+    options = ["--frame", "simplerov_3", "--servo", "16=-t", "--duration", "0.2", "--port", "0", "--log", str(log)]
+    assert main(["sitl", "videoray", *options]) == 0
+    assert re.sub(r"port \d+", "port 0", capsys.readouterr().out).splitlines() == [
+        "servo 1 drives u_r: right thruster, positive forward",
+        "servo 2 drives u_l: left thruster, positive forward",
+        "servo 16 drives u_t: top thruster, positive down, reversed",
+        "listening on 127.0.0.1, UDP port 0; Ctrl-C ends it",
+        "0.000 s of flight; 0 frames, 0 µs each; 0 repeated, 0 lost, 0 ignored, 0 restarts",
+        "No log was written, because no row was complete.",
+    ]
+    assert not log.exists()
+    log.touch()
+    assert main(["sitl", "videoray", *options]) == 2
+    assert capsys.readouterr().err == (
+        f"rov-fmu: --log {log}: the file exists; choose another name, or replace it with --force\n"
+    )
+    assert main(["sitl", "videoray", *options, "--force"]) == 0
+    waiting = r"rov-fmu: waiting for packets of ArduSub to UDP port \d+: start it with --model JSON\n"
+    assert re.fullmatch(waiting, capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ("videoray --frame vectord", "--frame 'vectord': must be one of vectored,"),
+        (
+            "videoray --frame vectord",
+            "--frame 'vectord': must be one of vectored, vectored_6dof, vectored_6dof_90deg, bluerov1, simplerov_3, "
+            "simplerov_4, simplerov_5; did you mean vectored?",
+        ),
         ("videoray --frame vectored", "--frame vectored: the motors of this frame do not push"),
-        ("videoray --servo 17=t", "--servo 17=t: must be N=NAME with N from 1 to 16"),
+        ("videoray --servo 17=t", "--servo 17=t: must be N=NAME with N from 1 to 16, such as 3=l"),
+        ("videoray --servo 0=t", "--servo 0=t: must be N=NAME"),
         ("videoray --servo 1=x", "--servo 1=x: there is no such input, only l, r, t"),
         ("videoray --servo 1=t --servo 2=-t", "--servo 2=-t: another servo drives this input"),
         ("videoray --servo 1=t --servo 1=l", "--servo 1=l: servo 1 is given before"),

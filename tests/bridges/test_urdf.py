@@ -16,9 +16,12 @@ from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE
+from tests.commands import BARE, ROOT
+from tests.vehicles import EVERYTHING
 
-LOADED = {name: load_vehicle(path) for name, path in {**SHIPPED, "bare": BARE}.items()}
+REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
+FILES = {**SHIPPED, "bare": BARE, "everything": EVERYTHING, "remus100": REMUS}
+LOADED = {name: load_vehicle(path) for name, path in FILES.items()}
 SIX = ("Xu", "Yv", "Zw", "Kp", "Mq", "Nr")
 
 
@@ -45,6 +48,7 @@ def test_each_axis_accelerates_as_the_vehicle_does(name: str) -> None:
     M = rigid - six(element, "added_mass", "{0}d{1}")
     linear, quadratic = (six(element, f"{n}_damping", f) for n, f in (("linear", "{0}{1}"), ("quadratic", "{0}{1}{1}")))
     level = rov.layout.at_rest
+    weight, buoyancy = (float(element.find(tag).text) for tag in ("weight", "buoyancy"))
     for form in rov.layout.axes:
         v = form.axis.velocity
         n = "uvwpqr".index(v)
@@ -54,6 +58,7 @@ def test_each_axis_accelerates_as_the_vehicle_does(name: str) -> None:
 
         if not rov.layout.cross and not any(rov.coefficients.get(f"{axis}_G") for axis in "xyz"):
             assert rate(3.0, 0.0) - rate(0.0, 0.0) == pytest.approx(3.0 / M[n], rel=1e-9)
+            assert rate(0.0, 0.0) == pytest.approx((weight - buoyancy) / M[n] if v == "w" else 0.0, rel=1e-9)
             drag = (linear[n] + quadratic[n] * 0.7) * 0.7
             assert 0.5 * (rate(3.0, 0.7) - rate(3.0, -0.7)) == pytest.approx(drag / M[n], rel=1e-9)
 
@@ -66,6 +71,23 @@ def test_the_plugin_has_the_numbers_of_the_model_for_gazebo(name: str) -> None:
     numbers = [{child.tag: child.text for child in one if child.tag[:1] in "xyzkmn"} for one in (wanted, found)]
     assert numbers[0] == numbers[1]
     assert "xU" in numbers[0]
+
+
+NOTES = {
+    "everything": [
+        "beta: the added mass is that of the effective inertia, (m + m_a) / beta less the mass",
+        "the vehicle file has no roll, pitch: no added mass and no drag there",
+        "drag has the mean of both directions",
+    ],
+    "bluerov2_heavy": [],
+    "remus100": ["left out: terms between two axes"],
+}
+
+
+@pytest.mark.parametrize("name", NOTES)
+def test_the_notes_say_what_is_otherwise(name: str) -> None:
+    thrusters = "the tags have no thrusters: their curves, places, lags and alpha are left to the controller"
+    assert [*urdf_model(LOADED[name]).notes] == [thrusters, *NOTES[name]]
 
 
 def test_the_command_writes_it_by_the_name_of_the_file(

@@ -70,10 +70,6 @@ TYPED: dict[str, tuple[str, str]] = {
         "tune videoray --axis surge --command -0.5 --v-ss 0.6",
         "tune: surge: V_ss = 0.6 m/s must be negative, for a command of -0.5 gives a thrust of -12.0805 N",
     ),
-    "points without a velocity": (
-        "tune videoray --axis heave --points taus.csv",
-        "taus.csv: no row has a velocity, and alpha is tuned to velocities",
-    ),
     "a vehicle for the points": (
         "tune videoray --axis heave --points mine.toml",
         "mine.toml, line 1 = '# VideoRay ",
@@ -107,21 +103,36 @@ TYPED: dict[str, tuple[str, str]] = {
         "build --platform host --backend pythonfmu",
         "--platform: the PythonFMU flavour is the same for all platforms",
     ),
+    "a draft that is written elsewhere": (
+        "identify . --draft --force",
+        "identify: --draft writes only a draft of rov.toml: leave -o, --report, --mcap, --force out",
+    ),
+    "an inspection with a report": ("identify . --inspect --report r.html", "identify: --inspect writes only a draft"),
+    "a vehicle that is no FMU yet": (
+        "prove videoray",
+        "videoray: must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name",
+    ),
+    "errors without their recording": (
+        "fly --identified a.mcap",
+        "fly: --identified needs --recording, the log that it is about",
+    ),
+    "workers of a scheduler": (
+        "study plan.toml -o r --workers 1 --scheduler tcp://a:1",
+        "study: leave --workers out, because the scheduler already has its workers",
+    ),
+    "a run without a vehicle": ("study fmu.toml -o r --mcap 0", "fmu.toml: --mcap 0: the plan must have `vehicle`, "),
+    "a command alone": ("tune videoray --axis heave --command 1", "tune: give --command and --v-ss (and --tau), or "),
     "Python and FMI 3.0": ("build --fmi 3 --backend=pythonfmu", "--fmi 3: PythonFMU makes FMI 2.0 alone"),
     "OSP and FMI 3.0": ("build --fmi 3 --osp", "--fmi 3: libcosim and the OSP tools, "),
     "no name for the file": ("build -o ''", ".: cannot be written: is a folder"),
-    "an axis that the vehicle lacks": (
-        "tune videoray --axis sway --command 1 --v-ss 1",
-        "--axis sway: the vehicle has only surge, heave, yaw",
-    ),
 }
 _PLAN = 'vehicle = "{}"\nstop_time = 1.0\nstep = 0.1\nruns = 2\n[figures]\na = "max(u)"\n'
 FILES = {
     "mine.toml": ALONE,
     "plan.toml": _PLAN.format("videoray"),
+    "fmu.toml": _PLAN.format("x.fmu").replace("vehicle", "fmu"),
     "rov.toml": (TESTS / "rov.toml").read_text(encoding="utf-8"),
     "log.csv": "time [s],command [%],depth [m]\n0,30,0\n",
-    "taus.csv": "command [%],time constant [s]\n20,3\n",
     "x.fmu": "no archive",
 }
 

@@ -3,16 +3,20 @@
 import csv
 import re
 import shlex
+import shutil
 import webbrowser
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.interface.command_files import read_inputs
+from rov_fmu.io.messages import FileError
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE
-from tests.vehicles import VIDEORAY
+from tests.vehicles import EVERYTHING, THRUST_EFFECTS, VIDEORAY
 
 Capsys = pytest.CaptureFixture[str]
 COMMANDS = "time,u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
@@ -39,9 +43,22 @@ def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
     ]
 
 
-def test_a_table_of_commands_gives_a_table_of_results(here: Path) -> None:
+def test_a_vehicle_that_nothing_moves_is_said_to_need_a_command(capsys: Capsys) -> None:
+    assert main(["simulate", "--set", "m_rov=7"]) == 0
+    out, err = capsys.readouterr()
+    assert (out.splitlines()[-1], err) == ("No command is set: try --set u_l=0.3", "")
+
+
+def test_a_table_of_commands_gives_a_table_of_results(here: Path, capsys: Capsys) -> None:
     """Up to its last time; a command holds from its own time, also between two results."""
-    assert main(["simulate", "--input", "commands.csv", "--step", "0.5", "-o", "result.csv"]) == 0
+    arguments = ["simulate", "--input", "commands.csv", "--step", "0.5"]
+    assert main(arguments) == 0
+    assert "No command" not in capsys.readouterr().out
+    assert main([*arguments, "-o", "result.parquet"]) == 0
+    assert main([*arguments, "-o", "result.csv"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        f"Wrote result.{suffix}. Next: add --plot to see the curves" for suffix in ("parquet", "csv")
+    ]
     rows = list(csv.reader((here / "result.csv").read_text(encoding="utf-8").splitlines()))
     result = rov_fmu.load("videoray").simulate(
         [0.5 * n for n in range(11)], {"time": [0, 2.25, 5], "u_l": [0.3, 0.5, 0], "u_r": [0.3, 0.2, 0]}
@@ -49,6 +66,8 @@ def test_a_table_of_commands_gives_a_table_of_results(here: Path) -> None:
     assert rows[0] == ["time", *result.names]
     found = [[float(cell) for cell in row] for row in rows[1:]]
     assert found == [list(row) for row in zip(result.time, *result.values(), strict=True)]
+    parquet = pd.read_parquet("result.parquet")
+    assert [[*parquet], *parquet.to_numpy().tolist()] == [rows[0], *found]
 
 
 LOGS = {
@@ -71,10 +90,22 @@ def test_the_commands_of_a_log_are_read_as_identify_reads_them(name: str, here: 
     if name in COLUMNS:
         (here / "rov.toml").write_text(f"[vehicle]\n[columns]\n{COLUMNS[name]}", encoding="utf-8")
     found = read_inputs(here / name, VIDEORAY.layout)
-    assert (found["time"] - found["time"][0]).tolist() == pytest.approx([0.0, 2.25, 5.0])
+    assert found["time"].tolist() == pytest.approx([0.0, 2.25, 5.0]), "a log begins at 0 s"
     left, right = (0.35, 0.35) if name == "log_surge_1.csv" else (0.5, 0.2)
     assert found["u_l"].tolist() == pytest.approx([0.3, left, 0.0])
     assert found["u_r"].tolist() == pytest.approx([0.3, right, 0.0])
+
+
+def test_a_log_has_the_voltage_and_no_commands_of_mixed_thrusters(here: Path) -> None:
+    rov, mixed = load_vehicle(THRUST_EFFECTS).layout, load_vehicle(EVERYTHING).layout
+    titles = ",".join(f"{name} [%]" for name in rov.commands)
+    rows = "".join(f"{t},{','.join(['20'] * len(rov.commands))},{volts}\n" for t, volts in ((1, 15), (2, ""), (3, 14)))
+    (here / "dive.csv").write_text(f"time [s],{titles},voltage [V]\n{rows}", encoding="utf-8")
+    found = read_inputs(here / "dive.csv", rov)
+    assert found["voltage"].tolist() == [15.0, 15.0, 14.0]
+    (here / "dive.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(FileError, match=rf"commands of thrusters, but those of .* are {', '.join(mixed.commands)}$"):
+        read_inputs(here / "dive.mcap", mixed)
 
 
 @pytest.mark.parametrize(("name", "begins"), [("plot.png", b"\x89PNG"), ("plot.svg", b"<?xml"), ("plot.pdf", b"%PDF")])
@@ -84,12 +115,13 @@ def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys)
     assert (here / name).read_bytes().startswith(begins)
 
 
-@pytest.mark.parametrize("command", [["simulate", str(BARE), "--plot"], ["fly", str(BARE), "--against", str(BARE)]])
+@pytest.mark.parametrize("command", [["simulate", str(BARE), "--plot"], ["fly", str(BARE), "--against", "bare.toml"]])
 @pytest.mark.parametrize("opens", [True, False])
 def test_what_is_to_be_seen_opens_in_a_browser(
     command: list[str], opens: bool, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     opened: list[str] = []
+    shutil.copy(BARE, here)
 
     def browse(address: str) -> bool:
         opened.append(address)
@@ -101,7 +133,8 @@ def test_what_is_to_be_seen_opens_in_a_browser(
     out, err = capsys.readouterr()
     path = Path(out.splitlines()[0])
     assert opened == [path.as_uri()]
-    assert "Bare" in path.read_text(encoding="utf-8")
+    shown = "Bare: no commands" if command[0] == "simulate" else f"Bare ({BARE}) beside Bare (bare.toml)"
+    assert shown in path.read_text(encoding="utf-8")
     assert err.count("\n") == (not opens)
     assert err.startswith("" if opens else "rov-fmu: no browser could be opened. Open this file in a browser, ")
 
@@ -115,6 +148,10 @@ WRONG = {
     "percent": ("--set u_l=30%", "--set u_l=30%: '30%' must be a finite number: 30 % is 0.3\n"),
     "no value": ("--set u_l", "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
     "NaN": ("--set u_l=nan", "--set u_l=nan: 'nan' must be a finite number"),
+    "percent of no fraction": ("--set m_rov=5%", "--set m_rov=5%: '5%' must be a finite number\n"),
+    "percent along an axis": ("--set surge=30%", "'30%' must be a finite number: 30 % is 0.3\n"),
+    "percent in words": ("--set u_l=x%", "--set u_l=x%: 'x%' must be a finite number\n"),
+    "a table and an option": ("--input commands.csv --set u_l=1", "--set u_l: commands.csv has this input, too\n"),
     "twice": ("--set u_l=1 --set u_l=2", "--set u_l=2: u_l is set twice"),
     "out of bounds": ("--set a_d_u=-1", "a_d_u = -1.0: must be within 0 ... 1000000 N.s2/m2"),
     "no table": ("--input none.csv", "none.csv: there is no such file\n"),
@@ -129,7 +166,11 @@ WRONG = {
     "no time": ("--input short.csv", "short.csv: the last time is 0 s, and must be at least 1e-06"),
     "no duration": ("--stop 0", "'--stop': '0' must be a number of at least 1e-6 s\n"),
     "too many results": ("--step 1e-6", "--step 1e-06: gives more than 1000000 results up to 10 s"),
-    "a late end": ("--stop 1e9", "--stop 1e+09 needs a longer --step than 0.01 s: at least 1000 s\n"),
+    "a late end": ("--stop 1.23456e9", "--stop 1.23456e+09 needs a longer --step than 0.01 s: at least 1240 s\n"),
+    "a late table": (
+        "--input late.csv",
+        "late.csv, up to 1e+09 s, needs a longer --step than 0.01 s: at least 1000 s\n",
+    ),
     "a time that goes back": ("--input back.csv", "back.csv, line 5: the time goes back\n"),
     "another table": ("-o result.txt", "--output result.txt: the name must end with .csv, .parquet or .mcap"),
     "another picture": ("--plot a.gif", "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
@@ -140,7 +181,7 @@ WRONG = {
     ),
     "a log without commands": ("--input motion.csv", "motion.csv: no commands of u_l, u_r, u_t were found"),
     "its own input": ("--input commands.csv -o commands.csv", "commands.csv: cannot be written: would"),
-    "too fast": ("-o a.csv --plot a.png --set r=1e300 --set u=1", "the motion cannot be"),
+    "too fast": ("-o a.csv --plot a.png --set u=1e200", "the motion cannot be"),
 }
 
 
@@ -151,6 +192,7 @@ TABLES = {
     "load.csv": "time [s],u_l [%],X_ext [N]\n0,30,1\n1,30,1\n",
     "motion.csv": "time [s],depth [m]\n0,1\n1,1\n",
     "short.csv": "time,u_l\n0,1\n",
+    "late.csv": "time,u_l\n0,1\n1e9,1\n",
 }
 
 

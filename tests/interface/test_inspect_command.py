@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -99,6 +100,8 @@ def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, insp
     (log,) = tests.folder.logs
     assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
     assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
+    if name == ".ulg":
+        assert [line for line in draft.splitlines() if "cpuload" in line] == ['# "cpuload.load" = "?"   # always 0.5']
     if name == "three files":
         assert "aligned clock" in {finding.kind for finding in log.findings}
         assert measured(log, "voltage") == pytest.approx(motion.VOLTAGE, abs=1e-6)
@@ -359,11 +362,30 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
 def test_files_of_several_dives_are_paired_by_their_times(tmp_path: Path, inspect: Inspect) -> None:
     for n in (1, 2):
         table(tmp_path / f"out_{n}.csv", "time [s],u_1 [%],u_2 [%]", TIME + 99 * n, 9 * TIME, -9 * TIME)
-        table(tmp_path / f"in_{n}.csv", "time [s],depth [m]", TIME + 99 * n + 2.0, DEPTH)
+        table(tmp_path / f"in_{n}.csv", "time [s],depth [m]", TIME + 99 * n + 9.5, DEPTH)
     table(tmp_path / "other_clock.csv", "time [s],heading [deg]", TIME + 9e5, TIME)
     _, draft = inspect()
     paired = {f"dive_{n}": {"files": [f"out_{n}.csv", f"in_{n}.csv"]} for n in (1, 2)}
     assert parsed(draft)["dives"] == paired | {"dive_3": {"files": ["?", "other_clock.csv"]}}
+
+
+def test_outputs_that_never_change_may_be_those_of_lights(tmp_path: Path, inspect: Inspect) -> None:
+    """With its seven outputs, the vehicle would be no vehicle that ships."""
+    lights = np.full((len(TIME), 1), 1100)
+    LOGS[".tlog"](tmp_path, replace(DIVE, pulses=np.column_stack([DIVE.pulses, lights])))
+    out, draft = inspect()
+    assert "thruster 7" in out
+    assert parsed(draft)["base"] == "bluerov2"
+
+
+def test_forces_are_turned_with_a_position_that_points_up(tmp_path: Path, inspect: Inspect) -> None:
+    table(tmp_path / "log.csv", "time [s],force_x,force_z,torque_y,pos_z", TIME, TIME, TIME, TIME, -DEPTH)
+    assert parsed(inspect()[1])["columns"] == {
+        "force_x": "X_ext [N]",
+        "force_z": "-Z_ext [N]",
+        "torque_y": "-M_ext [N.m]",
+        "pos_z": "-depth [m]",
+    }
 
 
 def test_a_vehicle_with_an_arm_asks_for_it(tmp_path: Path, inspect: Inspect) -> None:
@@ -376,6 +398,10 @@ def test_a_vehicle_with_an_arm_asks_for_it(tmp_path: Path, inspect: Inspect) -> 
         ('R = { value = "?", unit = "m", source = "Measured" }', " 0.22 in the base"),
         ('gamma = { value = "?", unit = "rad", source = "Measured" }', " 0.423 in the base"),
     ]
+    assert parsed(draft)["base"] == "videoray"
+    (tmp_path / "rov.toml").unlink()
+    (tmp_path / "thrust_other.csv").write_bytes(b"command [%],force [N]\n50,9\n")
+    assert "base" not in parsed(inspect()[1]), "it has no such curve"
 
 
 def test_logs_without_commands_are_not_said_to_be_identifiable(

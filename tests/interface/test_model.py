@@ -87,7 +87,9 @@ def test_a_data_frame_has_a_column_for_each_variable(videoray: VehicleModel, mon
         many.to_dataframe()
 
 
-def test_a_plot_has_words_degrees_and_the_commands_and_nothing_that_stays_0(six: VehicleModel) -> None:
+def test_a_plot_has_words_degrees_and_the_commands_and_nothing_that_stays_0(
+    six: VehicleModel, videoray: VehicleModel
+) -> None:
     command = next(iter(six.layout.commands))
     result = six.simulate(np.linspace(0.0, 2.0, 5), {"N_ext": 1.0, command: 0.2})
     drawn = result.plot(figure=Figure())
@@ -98,6 +100,11 @@ def test_a_plot_has_words_degrees_and_the_commands_and_nothing_that_stays_0(six:
     assert labels[command].max() == 20.0
     assert not {*QUATERNION} & {*labels}
     assert all(map(np.any, labels.values()))
+    both = videoray.simulate(TIMES, AHEAD).plot(["F_l", "F_r", "F_t"], Figure()).axes[0]
+    assert [line.get_linestyle() for line in both.lines] == ["-", "--", "-"], "the second one lies on the first one"
+    assert [axes.get_title(loc="left") for axes in videoray.simulate(TIMES).plot(figure=Figure()).axes] == [
+        "Velocity (m/s)"
+    ]
     many = six.simulate_many([0.0, 1.0], coefficients={"a_d_u": [8.0, 10.0]}, start={"u": 1.0})
     panels = many.plot(["u", "x", "u"], Figure()).axes
     assert [(axes.get_title(loc="left"), len(axes.lines)) for axes in panels] == [
@@ -113,6 +120,10 @@ def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:
     many = videoray.simulate_many(TIMES, inputs, **how)
     assert many["u"].shape == (2, 3)
     assert repr(many).startswith("<Result: 2 vehicles, 3 times from 0 to 2 s; u, ")
+    assert videoray.simulate_many(TIMES, workers=1)["u"].shape == (1, 3)
+    failed = videoray.simulate_many(TIMES, start={"u": [0.0, 1e200]})
+    assert (failed.failed.tolist(), np.isnan(failed["u"]).tolist()) == ([1], [[False] * 3, [False, True, True]])
+    assert repr(failed).startswith("<Result: 2 vehicles, 3 times from 0 to 2 s, 1 failed; u, ")
     lanes = videoray.simulate_many(TIMES, inputs, **how, lanes=True)
     for n, (drag, u) in enumerate(((6.0, 0.0), (10.0, -0.4))):
         own = inputs | {"u_l": commands[n], "u_t": (0.1, 0.2)[n]}
@@ -145,10 +156,12 @@ def test_a_vehicle_that_rolls_starts_at_its_angles_or_at_its_quaternion(six: Veh
 def test_inputs_have_times_of_their_own(videoray: VehicleModel, make: Callable[[Any], Any]) -> None:
     """They change between the output times, and are 0 before the first of their own; the last of equal times counts."""
     table = make({"time": [0.5, 1.25, 1.25, 9.0], "u_l": [0.3, 7.0, 0.5, 1.0], "u_r": [0.3, 0.3, 0.2, 1.0]})
-    found = videoray.simulate(TIMES, table, record=["u", "psi", "u_l"])
-    every = videoray.simulate([0.0, 0.5, 1.0, 1.25, 2.0], {"u_l": [0, 0.3, 0.3, 0.5, 0], "u_r": [0, 0.3, 0.3, 0.2, 0]})
-    assert found["u"].tolist() == every["u"][[0, 2, 4]].tolist()
-    assert found["psi"].tolist() == every["psi"][[0, 2, 4]].tolist()
+    table["heave"], table["V_E"] = np.array([0.3, 0.0, -0.4, 0.0]), 0.0
+    found = videoray.simulate(TIMES, table, record=["u", "w", "psi", "u_l"])
+    held = {"u_l": [0, 0.3, 0.3, 0.5, 0], "u_r": [0, 0.3, 0.3, 0.2, 0], "u_t": [0, 0.3, 0.3, -0.4, 0]}
+    every = videoray.simulate([0.0, 0.5, 1.0, 1.25, 2.0], held)
+    for name in ("u", "w", "psi"):
+        assert found[name].tolist() == every[name][[0, 2, 4]].tolist()
     assert found["u_l"].tolist() == [0.0, 0.3, 0.5]
 
 
@@ -163,16 +176,22 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
     with pytest.warns(UserWarning, match=r"^u_l reaches -1\.5, which acts as -1: commands saturate at ±1$") as caught:
         found = videoray.simulate(TIMES, {"u_l": [-1.5, 0.0, 1.2]})
     assert caught[0].filename == __file__
+    percent = r"^u_t reaches 30, which acts as 1: commands saturate at ±1 \(30 % is 0\.3\)$"
+    with pytest.warns(UserWarning, match=percent):
+        videoray.simulate(TIMES, {"heave": 30.0})
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
 
 
 def test_a_pulse_of_zero_is_no_signal_and_acts_as_neutral_with_a_warning(videoray: VehicleModel) -> None:
-    pulses = pulsed(videoray, (1100.0, 1500.0, 1900.0))
+    pulses = pulsed(videoray, (1000.0, 1500.0, 2000.0))
     expected = "^u_l reaches 0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as"
     with pytest.warns(UserWarning, match=expected) as caught:
-        found = pulses.simulate(TIMES, {"u_l": [1300.0, 0.0, 1900.0]})
+        found = pulses.simulate(TIMES, {"u_l": [1250.0, 0.0, 2000.0]})
     assert len(caught) == 1
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-0.5, 0.0, 1.0]})["u"].tolist()
+    beyond = r"^u_l reaches 900: commands are pulse widths, and saturate at 1000 and 2000 us$"
+    with pytest.warns(UserWarning, match=beyond):
+        pulses.simulate(TIMES, {"u_l": [1500.0, 900.0, 2050.0]})
 
 
 # ---- Mistakes --------------------------------------------------------------------------------------------------------
@@ -192,6 +211,46 @@ WRONG: dict[str, tuple[Call, str]] = {
     "out of bounds": (lambda v: v.with_(a_d_u=-1), r"a_d_u = -1\.0: must be within 0 \.\.\. 1000000 N\.s2/m2"),
     "no thrust": (lambda v: v.with_(a_t_rear=-100), "curve rear: must give a force above 0 at full command, "),
     "time stands": (lambda v: v.simulate([0, 1, 1]), r"time\[2\] = 1: must be greater than the time before it, 1"),
+    "one time": (lambda v: v.simulate([1]), r"time: must be a sequence of 2 or more times \(s\), .* the shape \(1,\)$"),
+    "rows of times": (lambda v: v.simulate([[0, 1], [1, 2]]), r"time: must be a sequence of 2 or more .* \(2, 2\)$"),
+    "no names": (
+        lambda v: v.simulate(TIMES, 5),  # type: ignore[arg-type]
+        "inputs = 5: must be a mapping from names to values, or a data frame$",
+    ),
+    "too few values": (
+        lambda v: v.simulate(TIMES, {"u_l": [0, 1]}),
+        r"inputs\['u_l'\]: must be a number, or .* of the shape \(3,\), one value for each time, and has .* \(2,\)$",
+    ),
+    "one input for many vehicles": (
+        lambda v: v.simulate(TIMES, {"u_l": [[0, 1, 0]]}),
+        r"inputs\['u_l'\]: must be a number, or .* and has the shape \(1, 3\)$",
+    ),
+    "two starts of an attitude": (
+        lambda _: rov_fmu.load("bluerov2_heavy").simulate(TIMES, start={"eta": 1, "phi_0": 1, "psi_0": 1}),
+        r"start\['phi_0'\]: the attitude is also given as a quaternion\. Give only one of the two$",
+    ),
+    "no attitude": (
+        lambda _: rov_fmu.load("bluerov2_heavy").simulate(TIMES, start=dict.fromkeys(QUATERNION, 0)),
+        "start: the quaternion eta, epsilon_1, epsilon_2, epsilon_3 is 0 and has no direction$",
+    ),
+    "one of many out of bounds": (
+        lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": [0, -1, 2e6]}),
+        r"coefficients\['a_d_u'\] = -1: must be within 0 \.\.\. 1000000 N\.s2/m2$",
+    ),
+    "coefficients in rows": (
+        lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": [[1, 2]]}),
+        r"coefficients\['a_d_u'\]: must be a number, or a sequence of one .* and has the shape \(1, 2\)$",
+    ),
+    "no vehicles": (
+        lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": []}),
+        "a_d_u: has values for 0 vehicles",
+    ),
+    "a step of no length": (lambda v: v.step({}, {}, 0.0), r"h = 0\.0: must be a time above 0, s$"),
+    "a step from an unknown state": (lambda v: v.step({}, {"U": 1}, 1.0), r"state\['U'\]: .* no such state, only u, w"),
+    "many in one file": (
+        lambda v: v.to_mcap(v.simulate_many(TIMES, coefficients={"a_d_u": [1, 2]})),
+        "result: must be the simulation of one vehicle$",
+    ),
     "times in words": (lambda v: v.simulate(["a"]), r"time = \['a'\]: must be a number, or an array of numbers"),
     "unknown input": (
         lambda v: v.simulate(TIMES, {"ul": 1}),
@@ -219,8 +278,8 @@ WRONG: dict[str, tuple[Call, str]] = {
         "record: the vehicle has no variable 'U', only u_l, u_r, u_t, X_ext, .*, 6 more; did you mean u",
     ),
     "too fast": (
-        lambda v: v.simulate(TIMES, start={"u": 1e200}),
-        r"the motion cannot be computed up to time\[1\] = 1 s: it overflows, or never settles and needs shorter steps",
+        lambda v: v.simulate([1, 2, 3], start={"u": 1e200}),
+        r"the motion cannot be .* to time\[1\] = 2 s: it overflows, or .* and needs shorter steps than 1 s$",
     ),
     "unequal numbers": (
         lambda v: v.simulate_many(TIMES, {"u_l": [[1], [0.5]]}, coefficients={"a_d_u": [1, 2, 3]}),
@@ -305,6 +364,8 @@ def test_a_duration_gives_a_result_every_hundredth_of_a_second(videoray: Vehicle
     assert np.array_equal(result.time, np.round(0.01 * np.arange(201), 12))
     at_once = videoray.simulate([0.0, 2.0], {"surge": 0.3})["u"][-1]
     assert result["u"][-1] == pytest.approx(at_once, rel=1e-14)
+    assert videoray.simulate(0.01).time.tolist() == [0.0, 0.01]
+    assert videoray.simulate(0.025).time.tolist() == [0.0, 0.01, 0.02, 0.025]
     for wrong in (0.0, -1.0, 1e9):
         with pytest.raises(InputError, match=r"^time = .*: a duration must be within 0\.01 \.\.\. 10000 s"):
             videoray.simulate(wrong)
