@@ -286,6 +286,9 @@ def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviati
                 more[curve.name_of(f"{key}{REVERSE}")] = values[curve.coefficient(key)]
             if logged or curve.name in tests.tested.thrust:
                 more[curve.coefficient("c_0")] = 0.0
+            _, was_measured_astern = tests.tested.thrust.get(curve.name, ("", False))
+            if was_measured_astern:
+                more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
         if logged:
             more[curve.coefficient("T")] = LEAST_LAG
     more = {name: base.get(name, value) for name, value in more.items()}

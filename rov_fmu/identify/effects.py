@@ -23,7 +23,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             continue
         posterior = fit.posterior.without([m for m in gone if m != n])
         value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
-        if p.kind == "dead band":
+        if p.kind in ("dead band", "dead band astern"):
             error = max(error, EXACT_BAND / QUANTILE)
         if p.kind == "load":
             full = fit.known.full[p.of]
@@ -38,6 +38,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
 _WORDS = {
     "reverse thrust": "thrust astern relative to thrust ahead",
     "dead band": "dead band",
+    "dead band astern": "dead band astern minus dead band ahead",
     "lag": "time constant of the thrusters",
     "dead time": "dead time of the commands",
     "drag astern": "drag astern relative to drag ahead",

@@ -160,8 +160,8 @@ def _quadratics(fit: Fit, z: Array) -> Iterator[Quadratic]:
     shapes, vehicle = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
     for curve in fit.known.curves:
         if curve.name in shapes.of:
-            c_0 = coefficients.get(curve.coefficient("c_0"), 0.0)
-            yield from nearest(curve, partial(shapes.forces, vehicle, curve), c_0, low, high)
+            bands = shapes.dead_bands[curve.name]
+            yield from nearest(curve, partial(shapes.forces, vehicle, curve), bands, low, high)
 
 
 def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
@@ -213,11 +213,13 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         name = part.coefficient(key)
         if key not in part.keys or name in own:
             return key in part.keys
-        if key in ("V_0", "n_V"):
-            return with_voltage
-        if key in ("F_0", "T", *_DEAD_BAND):
-            value = coefficients[name]
-            return {"F_0": value != 0.0, "T": value > LEAST_LAG * 1.0001}.get(key, value > 0.0)
+        value = coefficients[name]
+        by_value = {"V_0": with_voltage, "n_V": with_voltage, "F_0": value != 0.0, "T": value != LEAST_LAG}
+        if key in by_value:
+            return by_value[key]
+        if isinstance(part, Curve) and key in _DEAD_BAND:
+            has_own_astern = name in base or ("dead band astern", part.name) in present
+            return has_own_astern or (key == "c_0" and value > 0.0)
         if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
             return name in base or ("drag astern", part.axis.name) in present
         if isinstance(part, Curve) and key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):

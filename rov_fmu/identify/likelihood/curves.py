@@ -119,16 +119,18 @@ class Quadratic:
         return np.asarray(variance / len(self.coefficients) * np.linalg.inv(mean_squares))
 
 
-def nearest(curve: Curve, forces: Callable[[Array], Array], c_0: float, low: float, high: float) -> Iterator[Quadratic]:
+def nearest(
+    curve: Curve, forces: Callable[[Array], Array], dead_bands: tuple[float, float], low: float, high: float
+) -> Iterator[Quadratic]:
     """Yield the quadratic curves that are nearest to a curve ahead and astern.
 
     `forces` gives the thrust for some commands (N); the relative errors have equal weights over low to high.
     """
-    low = max(low, c_0 + 0.05)
-    commands = np.linspace(low, max(high, low + 0.1), 40)
-    for end, sign in (("", 1.0), (REVERSE, -1.0)):
+    for end, sign, c_0 in (("", 1.0, dead_bands[0]), (REVERSE, -1.0, dead_bands[1])):
         if f"a_t{end}" not in curve.keys:
             continue
+        least = max(low, c_0 + 0.05)
+        commands = np.linspace(least, max(high, least + 0.1), 40)
         F = sign * forces(sign * commands)
         beyond = commands - c_0
         terms, one = np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F))

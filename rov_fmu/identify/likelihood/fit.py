@@ -1,6 +1,6 @@
 """The fit: two starts on few samples, the better one to the end on all, and the posterior there."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import Minimum, minimise
+from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
@@ -85,7 +85,7 @@ def fit_all(
 
         start = quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
         try:
-            ends.append(minimise(quick, start, on_step=show, enough=_QUICK, last=False))
+            ends.append(_least(quick, start, show, _QUICK))
         except DivergedError:
             continue
     if not ends:
@@ -95,9 +95,7 @@ def fit_all(
     def show_full(step: int) -> None:
         on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
 
-    near = minimise(full, _scaled(full, ends[0].z), on_step=show_full, last=False)
-    if known.measured_curves:
-        near = min(near, minimise(full, _with_dead_bands(full, near.z), last=False), key=lambda end: end.value)
+    near = _least(full, _scaled(full, ends[0].z), show_full, ENOUGH)
     for curve in known.measured_curves:
         other = replace(known, bent=known.bent | {curve})
         objective = Objective(table_of(other, logs, noises), logs, rows)
@@ -116,19 +114,23 @@ def fit_all(
     return Fit(known, full, best, posterior, averaged, kept, float(difference))
 
 
-def _with_dead_bands(objective: Objective, z: Array) -> Array:
-    """Return another start for the measured curves, with a dead band that is larger by the deviation of its prior.
+def _least(objective: Objective, start: Array, on_step: Callable[[int], None], enough: float) -> Minimum:
+    """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
 
-    The forces of full commands hardly change, because a linear share of 2 d makes up for a dead band d: a (c - d)^2 is
-    almost a c^2 - 2 a d c. Between both, J has a kink wherever the dead band passes a command of the tests.
+    For a measured curve, a linear share of 2 d almost makes up for a dead band d, as a (c - d)^2 is almost
+    a c^2 - 2 a d c. In the valley between both, J has a kink wherever the dead band passes a command of the tests.
     """
-    found = z.copy()
+    end = minimise(objective, start, on_step=on_step, enough=enough, last=False)
+    larger = end.z.copy()
     for n, p in enumerate(objective.table.parameters):
         band = objective.table.place("dead band", p.of)
         if p.kind == "linear thrust" and band is not None:
-            found[n] += 2.0 * objective.deviation[band]
-            found[band] = z[band] + objective.deviation[band]
-    return found
+            d = objective.deviation[band]
+            larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
+    if np.array_equal(larger, end.z):
+        return end
+    other = minimise(objective, larger, on_step=on_step, enough=enough, last=False)
+    return min(end, other, key=lambda found: found.value)
 
 
 def _evidence(objective: Objective, best: Minimum) -> float:

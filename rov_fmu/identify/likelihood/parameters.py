@@ -298,7 +298,7 @@ def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[
 def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
     def prior(key: str) -> float:
         """Return a deviation. Where the thrust is exact, so is its shape."""
-        is_exact = (key.startswith("thrust_") or key == "dead_band") and prior("thrust") == 0.0
+        is_exact = key.startswith(("thrust_", "dead_band")) and prior("thrust") == 0.0
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
     found = [*_of_curves(known, prior), *_of_axes(known, prior)]
@@ -346,6 +346,10 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
             mean = known.coefficients[curve.coefficient("c_0")]
             width = prior("dead_band")
             yield Parameter("dead band", name, mean=mean, deviation=width, low=0.0, high=0.5, null=0.0)
+            astern = curve.coefficient(f"c_0{REVERSE}")
+            if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
+                mean, width = known.coefficients[astern] - mean, prior("dead_band_astern")
+                yield Parameter("dead band astern", name, mean=mean, deviation=width, null=0.0)
 
 
 def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:
