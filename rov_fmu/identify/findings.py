@@ -373,7 +373,7 @@ def driven_aside(identification: Identification) -> list[str]:
         if others:
             lines.append(
                 f"{axis.name}: its thrusters also drive the vehicle {listed(others)}. "
-                "These numbers are reached only if something prevents that."
+                "These numbers hold only if something prevents that."
             )
     return lines
 

@@ -290,10 +290,11 @@ def driven_by(names: Sequence[str]) -> Identification:
 
 @pytest.mark.usefixtures("without_plots")
 def test_an_axis_whose_thrusters_drive_others_is_told_so_beside_its_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One of two rear thrusters turns the vehicle, too. Both together do not, as those of the vehicles that ship."""
+    """One of two rear thrusters turns the vehicle, too. Both together do not, as those of the vehicles that ship, and
+    push it forward in a turn only if they are much weaker astern."""
     turned = driven_by(["l", "t"])
     lines = driven_aside(turned)
-    end = "These numbers are reached only if something prevents that."
+    end = "These numbers hold only if something prevents that."
     assert lines == [
         f"surge: its thrusters also drive the vehicle bow to starboard (yaw). {end}",
         f"yaw: its thrusters also drive the vehicle forward (surge). {end}",
@@ -303,6 +304,11 @@ def test_an_axis_whose_thrusters_drive_others_is_told_so_beside_its_speeds(monke
     assert after_table.split("\n")[1:3] == [f"- {line}" for line in lines]
     first_screen = unfolded(report_page(turned)).partition("What you can expect")[2].partition("What to measure")[0]
     assert all(line[1:] in first_screen for line in lines)
+    symmetric = example().vehicle
+    astern = [{f"{name}_reverse": share * symmetric[name] for name in ("a_t_rear", "b_t_rear")} for share in (0.7, 0.5)]
+    weaker, weak = (replace(example(), vehicle=symmetric.extended(values)) for values in astern)
+    assert not driven_aside(weaker)
+    assert driven_aside(weak) == lines[1:]
     for path in SHIPPED.values():
         vehicle = load_vehicle(path)
         axes = tuple(replace(example().axes[0], axis=form.axis) for form in vehicle.layout.axes)
