@@ -743,13 +743,12 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
     for line in inspected.warnings:
         _warn(line)
     command = shell_words("rov-fmu", "identify", draft.parent)
-    missing = [] if inspected.has_commands else ["add the commands, or name their columns"]
     if draft.exists():
         paragraph(console(), f"There is a {draft} already, so no draft was written.")
-        print_end([], ", then ".join([*missing, command]))
+        print_end([], ", then ".join([*inspected.missing, command]))
     elif inspects or drafts:
         write_draft(draft, inspected.text)
-        print_end([draft], ", then ".join(["edit this draft", *missing, command]))
+        print_end([draft], ", then ".join(["edit this draft", *inspected.missing, command]))
     else:
         paragraph(console(), f"There is no {draft}, which gives the vehicle's name and everything that no test tells.")
         print_end([], f"{command} --draft writes a draft of it")

@@ -56,6 +56,9 @@ STOPPING = (
     "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop is "
     "that without thrust, from the steady speed to a tenth of it."
 )
+_ASIDE = 0.2
+"""A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
+which gives it almost half of its full speed. A symmetric pair leaves less, if its thrust astern is above 60 %."""
 _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""
 _ODD = 3.0
@@ -353,6 +356,26 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     for file, forces_of in pushed.items():
         acting = f"An unknown slow force acts in this log: {listed(forces_of)}."
         yield file, f"{acting} Check the thrusters and the tether of that dive."
+
+
+def driven_aside(identification: Identification) -> list[str]:
+    """Return a sentence for each axis whose full command drives other axes, too, which the answers leave out.
+
+    Roll and pitch are left out, because the weight rights the vehicle.
+    """
+    vehicle, lines = identification.vehicle, []
+    for axis in (result.axis for result in identification.axes):
+        others = [
+            f"{other.positive if push > 0.0 else other.negative} ({other.name})"
+            for other, push in vehicle.side_effects(axis, 1.0)
+            if abs(push) > _ASIDE * vehicle.strongest(other) and not {axis, other} & {ROLL, PITCH}
+        ]
+        if others:
+            lines.append(
+                f"{axis.name}: its thrusters also drive the vehicle {listed(others)}. "
+                "These numbers hold only if something prevents that."
+            )
+    return lines
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:

@@ -42,9 +42,12 @@ class Inspected:
     """The draft of rov.toml."""
 
     @property
-    def has_commands(self) -> bool:
-        """True if a log or a table has commands, without which nothing can be identified."""
-        return any(one.commands or any(row.name == COMMAND for row in one.channels) for one in self.logs)
+    def missing(self) -> list[str]:
+        """What to do before anything can be identified, besides editing the draft."""
+        has_commands = any(one.commands or any(row.name == COMMAND for row in one.channels) for one in self.logs)
+        has_names = all(finding.kind != "unnamed table" for one in self.logs for finding in one.findings)
+        steps = {"add the commands, or name their columns": has_commands, "rename the tables": has_names}
+        return [step for step, is_done in steps.items() if not is_done]
 
 
 def lacks_description(folder: Path) -> bool:

@@ -13,6 +13,11 @@ from rov_fmu.tank.inspection.inspection import Inspection, Row
 _MOST_GAPS = 3
 """The largest number of gaps of a signal that are listed."""
 
+_NOT_ENOUGH = (
+    "Not enough is recognised: a log needs times with commands or measurements, and a table needs commands with what "
+    "was measured."
+)
+
 
 def print_inspection(inspection: Inspection) -> None:
     """Print the commands and channels of a log, what is not recognised, and what was left out."""
@@ -21,7 +26,7 @@ def print_inspection(inspection: Inspection) -> None:
         print_table(_rows(inspection))
     else:
         paragraph(out, str(inspection.path))
-        paragraph(out, "No command and no measurement with a time is recognised.")
+        paragraph(out, _NOT_ENOUGH)
     for heading, lines in {
         "Not recognised": [f"{name}{': ' if what else ''}{what}" for name, what in inspection.unread.items()],
         "Notes": [

@@ -9,6 +9,7 @@ from rov_fmu.identify.findings import (
     STOPPING,
     answer_at,
     by_heading,
+    driven_aside,
     name_of,
     next_tests,
     repairs,
@@ -34,10 +35,13 @@ def print_identification(identification: Identification) -> None:
         paragraph(out, f"First: {words}")
     for result in identification.axes:
         paragraph(out, f"- {verdict_in_words(result)}")
-    for found in (_answers(identification.axes), _errors(identification.axes)):
+    asides = driven_aside(identification)
+    for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:
             out.print()
             print_table(found, out)
+        for line in lines:
+            paragraph(out, f"- {line}")
     out.print()
     for line in _conclusions(identification):
         paragraph(out, line)

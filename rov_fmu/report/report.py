@@ -69,6 +69,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         picture=_picture(results, shown, partial(plot, "Main prediction", "overview")) if shown else None,
         script=inline_script("plots.js"),
         card=card(results.vehicle),
+        asides=findings.driven_aside(results),
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,

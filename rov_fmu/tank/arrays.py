@@ -8,12 +8,15 @@ Flags = NDArray[np.bool_]
 
 
 def range_in_words(values: Array) -> str:
-    """Return the range of the finite values, such as `-0.2 to 1.5`."""
+    """Return the range of the finite values, such as `-0.2 to 1.5`. Its ends have so many digits that they differ."""
     there = values[np.isfinite(values)]
     if not len(there):
         return "empty"
-    low, high = (f"{end:g}" for end in (there.min(), there.max()))
-    return f"{low} to {high}" if low != high else f"always {low}"
+    ends = there.min(), there.max()
+    if ends[0] == ends[1]:
+        return f"always {ends[0]:g}"
+    texts = ([f"{end:.{digits}g}" for end in ends] for digits in (6, 10, 17))
+    return " to ".join(next(pair for pair in texts if pair[0] != pair[1]))
 
 
 def spread(values: Array) -> float:

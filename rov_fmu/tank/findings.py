@@ -92,6 +92,7 @@ class _Range:
 SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
+    "unnamed table": "{files}: a table with the {measured} at each command: name it {name}",
     # Rows of a log
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",

@@ -317,6 +317,17 @@ class Vehicle:
         """Return the thrust (N) or torque (N.m) along an axis of thrusters with some forces, N."""
         return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
 
+    def side_effects(self, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
+        """Yield the other axes that a command of an axis pushes, with the force (N) or torque (N.m) along them.
+
+        Symmetric thrusters cancel along the other axes, unless their thrust in reverse is weaker.
+        """
+        F = self.commanded(self.held_inputs(axis, command))
+        for other in (form.axis for form in self.layout.axes if form.axis is not axis):
+            pushes = [self.effect(t, other) * F[t.name] for t in self.layout.drivers(other)]
+            if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
+                yield other, sum(pushes)
+
     def strongest(self, axis: Axis) -> float:
         """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
         return max(abs(self.force(axis, c)) for c in (1.0, -1.0))

@@ -171,6 +171,57 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     assert [*load_tests(tmp_path).given.vehicle.layout.kinds] == ["heave"]
 
 
+def test_a_log_in_another_language_lacks_only_what_units_do_not_tell(tmp_path: Path, inspect: Inspect) -> None:
+    """The column that only rises is the time, although its numbers of ten digits differ little."""
+    start = 1732712345.25
+    tables: dict[str, list[Array]] = {
+        "dive.csv": [TIME + start, 100.0 * THRUSTERS[0], 100.0 * THRUSTERS[1], TIME + start, DEPTH],
+        "short.csv": [TIME[:9], TIME[:9], TIME[:9], TIME[:9] + start, DEPTH[:9]],
+    }
+    for name, columns in tables.items():
+        table(tmp_path / name, "Stempel,Bug %,Heck (%),Zweite Uhr,Tiefe (m)", *columns)
+    out, draft = inspect(tmp_path / "dive.csv")
+    assert "- Zweite Uhr: 1732712345 to 1732712355" in out
+    assert "always" not in out
+    assert parsed(draft)["columns"] == {"Bug %": "u_Bug [%]", "Heck (%)": "u_Heck [%]", "Stempel": "time [s]"}
+    assert 'name = "Bug"' in draft
+    assert "Stempel" not in out.partition("Notes:")[0], "what is taken as the time is recognised"
+    (tmp_path / "rov.toml").unlink()
+    assert "Stempel is taken" not in inspect(tmp_path / "short.csv")[0], "commands may rise in so short a table"
+
+
+BOLLARD = "Befehl (%),Zug (kgf)\n-50,-1\n50,2\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "columns"),
+    [
+        (BOLLARD, "thrust_<curve>", {"Befehl (%)": "command [%]", "Zug (kgf)": "force [kgf]"}),
+        (
+            BOLLARD.replace("kgf", "deg/s"),
+            "steady_<axis>",
+            {"Befehl (%)": "command [%]", "Zug (deg/s)": "velocity [deg/s]"},
+        ),
+        ("command [%],Tau (ms)\n50,900\n", "time_constant_<axis>", {"Tau (ms)": "time constant [ms]"}),
+        (BOLLARD.replace("-1", "1"), "", None),
+        ("Befehl (%),Zug (kgf),Druck (N)\n50,1,2\n", "", None),
+    ],
+)
+def test_a_table_of_any_name_is_recognised_by_its_units_and_told_its_name(
+    text: str, name: str, columns: Mapping[str, str] | None, tmp_path: Path, inspect: Inspect
+) -> None:
+    """With its draft, too. Not if it has two columns of forces, or a force against its command."""
+    (tmp_path / "pool.csv").write_text(text, encoding="utf-8")
+    for _ in range(2):
+        out, draft = inspect()
+        assert (f": name it {name}.csv" in out) == bool(name)
+        assert bool(re.search("(then|Next:) rename the tables, then rov-fmu", out)) == bool(name)
+        assert ("Not enough is recognised" in out) == (not name)
+        assert "Not recognised" not in out or not name
+    if columns:
+        assert parsed(draft)["columns"] == columns
+
+
 @pytest.mark.parametrize(
     ("titles", "base"),
     [

@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import date
 from functools import partial
@@ -18,7 +18,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify import assess
-from rov_fmu.identify.findings import STOPPING, next_tests, told
+from rov_fmu.identify.findings import STOPPING, driven_aside, next_tests, told
 from rov_fmu.identify.result import AxisResult, Identification, Slip
 from rov_fmu.io.output import write_whole
 from rov_fmu.report import report
@@ -26,7 +26,7 @@ from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.templates import number, readable, with_interval
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
 from tests.conftest import Made
@@ -299,6 +299,41 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
     shown = unfolded(page).casefold()
     for sentence_ in (STOPPING, *made.warnings, *next_tests(example()), *example().axes[2].verdict.reasons):
         assert readable(sentence_).casefold() in shown
+
+
+def driven_by(names: Sequence[str]) -> Identification:
+    """The example with some of the thrusters of its vehicle."""
+    vehicle = without_findings().vehicle
+    layout = vehicle.layout
+    kept = replace(layout, thrusters=tuple(t for t in layout.thrusters if t.name in names))
+    return told(replace(without_findings(), vehicle=vehicle.in_layout(kept)))
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_an_axis_whose_thrusters_drive_others_is_told_so_beside_its_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of two rear thrusters turns the vehicle, too. Both together do not, as those of the vehicles that ship, and
+    push it forward in a turn only if they are much weaker astern."""
+    turned = driven_by(["l", "t"])
+    lines = driven_aside(turned)
+    end = "These numbers hold only if something prevents that."
+    assert lines == [
+        f"surge: its thrusters also drive the vehicle bow to starboard (yaw). {end}",
+        f"yaw: its thrusters also drive the vehicle forward (surge). {end}",
+    ]
+    text = "\n".join(printed(turned, monkeypatch, 200))
+    after_table = text.partition(STOPPING[-20:])[2].partition("Unseen data")[0]
+    assert after_table.split("\n")[1:3] == [f"- {line}" for line in lines]
+    first_screen = unfolded(report_page(turned)).partition("What you can expect")[2].partition("What to measure")[0]
+    assert all(line[1:] in first_screen for line in lines)
+    symmetric = example().vehicle
+    astern = [{f"{name}_reverse": share * symmetric[name] for name in ("a_t_rear", "b_t_rear")} for share in (0.7, 0.5)]
+    weaker, weak = (replace(example(), vehicle=symmetric.extended(values)) for values in astern)
+    assert not driven_aside(weaker)
+    assert driven_aside(weak) == lines[1:]
+    for path in SHIPPED.values():
+        vehicle = load_vehicle(path)
+        axes = tuple(replace(example().axes[0], axis=form.axis) for form in vehicle.layout.axes)
+        assert not driven_aside(replace(example(), vehicle=vehicle, axes=axes))
 
 
 # ---- The file, and the FMU -------------------------------------------------------------------------------------------

@@ -157,16 +157,7 @@ def _motions(vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Itera
         signs = {name: sign * one for name, one in vehicle.layout.signs(axis).items()}
         fractions = [sign * float(c) / 100.0 for c in commands]
         responses = [vehicle.response(axis, fraction) for fraction in fractions]
-        yield Motion(axis, words, signs, responses, list(_side_effects(vehicle, axis, fractions[-1])))
-
-
-def _side_effects(vehicle: Vehicle, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
-    """Yield the other axes that a command of an axis pushes, for example because thrust in reverse is weaker."""
-    F = vehicle.commanded(vehicle.held_inputs(axis, command))
-    for other in (form.axis for form in vehicle.layout.axes if form.axis is not axis):
-        pushes = [vehicle.effect(t, other) * F[t.name] for t in vehicle.layout.drivers(other)]
-        if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
-            yield other, sum(pushes)
+        yield Motion(axis, words, signs, responses, list(vehicle.side_effects(axis, fractions[-1])))
 
 
 def differs_by_direction(vehicle: Vehicle, axis: Axis) -> bool:

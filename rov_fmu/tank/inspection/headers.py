@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import groupby, takewhile
+from itertools import groupby, islice, takewhile
 from math import inf, pi
 from pathlib import Path
 
@@ -15,13 +15,16 @@ from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleA
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns, read_header
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import COMMANDS, FORCE, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES, TORQUE
-from rov_fmu.tank.columns import columns_of, columns_of_log, known_columns
+from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_columns
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>[^\])]*)[\])]\s*")
+_PERCENT = re.compile(r"(?P<name>.*\S)\s+(?P<unit>%)")
 _MOST_THRUSTERS = 32
 """The largest number of columns of a CSV file that are taken as the commands of thrusters; no vehicle has more."""
+_FEWEST_ROWS = 50
+"""The least number of rows of a log whose clock is guessed. In a shorter table, commands may rise."""
 _USUAL_PULSES = 1000.0, 2000.0
 _REST = 20.0
 """The largest distance of the usual pulse of a thruster from the neutral one, µs."""
@@ -47,11 +50,11 @@ class TableHeaders:
 
 
 def header_parts(title: str) -> tuple[str, str]:
-    """Return the name and the unit in a header with brackets of any kind.
+    """Return the name and the unit in a header with brackets of any kind, or with a percent sign at its end.
 
     A number in round brackets right behind the name is that of a column of a matrix, such as `pwm(1)`.
     """
-    match = _HEADER.fullmatch(title)
+    match = _HEADER.fullmatch(title) or _PERCENT.fullmatch(title)
     has_unit = match and not re.fullmatch(r".*\S\(\d+\)", title)
     return (match["name"].rstrip(), match["unit"]) if match and has_unit else (title, "")
 
@@ -90,6 +93,8 @@ def guessed(
     """
     rotations = {words[:-1] for words in map(_words, titles) if words.endswith(" w")}
     meant = {title: _meant(title, numbers[title], rotations) for title in titles}
+    if "time" not in meant.values():
+        meant |= dict.fromkeys(_clock(meant, numbers), "time")
     commanding = _commanding(meant, numbers)
     names = _names(commanding)
     forces = {title: force for title in commanding if (force := _force(title))}
@@ -112,6 +117,21 @@ def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[
     """Return the headers of the commands of thrusters, or else those of forces that are applied."""
     commanding = [title for title, name in meant.items() if _is_command(title, numbers[title], name)]
     return commanding[:_MOST_THRUSTERS] or [t for t in meant if _force(t) and len(numbers[t])]
+
+
+def _clock(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
+    """Return the header of the first column that rises from row to row and may be a time, or nothing."""
+    rows = max(map(len, numbers.values()), default=0)
+    rising = (
+        title
+        for title, name in meant.items()
+        if not name
+        and header_parts(title)[1] in ("", *TIMES)
+        and len(numbers[title]) == rows >= _FEWEST_ROWS
+        and (np.diff(numbers[title]) > 0.0).all()
+        and not _is_command(title, numbers[title], name)
+    )
+    return [*islice(rising, 1)]
 
 
 def _is_up(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> bool:
@@ -244,15 +264,29 @@ def headers_of_tables(folder: Path) -> TableHeaders:
 
 
 def guessed_of_table(kind: str, axis: Axis | None, titles: Iterable[str]) -> dict[str, str]:
-    """Return what the headers of a table that are not known seem to mean; an empty text for those that mean nothing."""
-    of_table, columns = columns_of(kind, axis), {}
+    """Return what the headers of a table that are not known seem to mean; an empty text for those that mean nothing.
+
+    If no header has a word for a column, the only one with its unit seems to mean it.
+    """
+    of_table, known, columns = columns_of(kind, axis), [], {}
     is_column = KnownColumns(of_table).has
     for title in titles:
-        if not is_column(title):
-            unit = header_parts(title)[1].replace(" ", "")
-            meant = (f"{name} [{unit}]" for name in _candidates(title, of_table))
-            columns[title] = next((header for header in meant if is_column(header)), "")
+        if is_column(title):
+            known.append(title)
+        else:
+            meant = (_with_unit(name, title) for name in _candidates(title, of_table))
+            columns[title] = next(filter(is_column, meant), "")
+    for name, column in of_table.items():
+        if not has_column([*known, *columns.values()], {name: column}):
+            by_unit = [title for title, meant in columns.items() if not meant and is_column(_with_unit(name, title))]
+            if len(by_unit) == 1:
+                columns[by_unit[0]] = _with_unit(name, by_unit[0])
     return columns
+
+
+def _with_unit(name: str, title: str) -> str:
+    """Return the header of a column with the unit that another header has."""
+    return f"{name} [{header_parts(title)[1].replace(' ', '')}]"
 
 
 def _curves(tested: Iterable[str]) -> Iterator[str]:

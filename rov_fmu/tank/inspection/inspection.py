@@ -2,7 +2,8 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 from types import MappingProxyType
@@ -15,9 +16,9 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, read_columns, read_header
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.columns import COMMAND, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
+from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import kind_of_table, test_files
 from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
 from rov_fmu.tank.log import Log
@@ -81,7 +82,7 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
             raise DataFileError(
                 f"{path}, line 1 = {shown(', '.join(titles))}: no column below these headers has numbers"
             )
-        columns = {title: tables.columns[title] for title in titles if title in tables.columns}
+        columns = renamed = {title: tables.columns[title] for title in titles if title in tables.columns}
         if kind := kind_of_table(path, columns):
             return [_of_table(path, kind, columns, ranges)]
         if not description:
@@ -90,8 +91,11 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
         is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {title: ranges[title] for title in titles if not is_column(meant[title])}
-        if len(unread) > len(titles) - 2 or not has_column(meant.values(), {"time": TIME}):
-            return [Inspection(path, path.name, (), (), ranges, (), columns)]
+        has_time = has_column(meant.values(), {"time": TIME})
+        if not has_time and (table := _of_unnamed_table(path, renamed, ranges)):
+            return [table]
+        if len(unread) > len(titles) - 2 or not has_time:
+            return [Inspection(path, path.name, (), (), unread, (), columns)]
     else:
         names, _ = names_of(layout if description else None, tables)
         axis = None
@@ -121,7 +125,7 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
     is_column = KnownColumns(of_table).has
     unread = {title: what for title, what in ranges.items() if not is_column(columns.get(title, title))}
     if len(ranges) - len(unread) < len(of_table):
-        return Inspection(path, path.name, (), (), ranges, (), columns)
+        return Inspection(path, path.name, (), (), unread, (), columns)
     rows, _ = read_rows(path, kind, axis, columns)
     numbers = zip(*((row.command, row.value) for row in rows), strict=True)
     no_times = np.full(len(rows), nan)
@@ -130,6 +134,16 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
         for (name, column), own in zip(of_table.items(), numbers, strict=True)
     )
     return Inspection(path, path.name, (), tuple(channels), unread, (), columns)
+
+
+def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection | None:
+    """Return what a table contains whose name does not tell its kind, if its headers tell it, with the right name."""
+    for kind, measured in TABLES.items():
+        with suppress(DataFileError):
+            if (found := _of_table(path, kind, renamed, ranges)).channels:
+                name = f"{kind}_<{'curve' if kind == 'thrust' else 'axis'}>{path.suffix}"
+                return replace(found, findings=(about(path.name, "unnamed table", measured=measured, name=name),))
+    return None
 
 
 def logs_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> list[Path]:
