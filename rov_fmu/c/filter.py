@@ -304,8 +304,10 @@ class Filter:
 
 
 def _inputs(record: Record, parameters: Parameters) -> Array:
-    """Return the rows of inputs."""
-    return np.ascontiguousarray(record.inputs if parameters.inputs is None else parameters.inputs, np.float64)
+    """Return the rows of inputs. The C code reads as many as the record has."""
+    found = np.ascontiguousarray(record.inputs if parameters.inputs is None else parameters.inputs, np.float64)
+    assert found.shape == record.inputs.shape
+    return found
 
 
 def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:

@@ -23,13 +23,13 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             continue
         posterior = fit.posterior.without([m for m in gone if m != n])
         value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
-        if p.kind in ("dead band", "dead band astern"):
+        if p.kind == "dead band":
             error = max(error, EXACT_BAND / QUANTILE)
         if p.kind == "load":
             full = fit.known.full[p.of]
             value, error, unit = (value - p.null) * full, error * full, AXES[p.of].load
         low, high = around(value, error)
-        if p.kind in ("reverse thrust", "drag astern"):
+        if p.kind in ("reverse thrust", "dead band astern", "drag astern"):
             value, low, high = np.exp([value, low, high]).tolist()
         name = _WORDS[p.kind] + (f" to the {p.part}" if p.part else "")
         yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n))
@@ -38,7 +38,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
 _WORDS = {
     "reverse thrust": "thrust astern relative to thrust ahead",
     "dead band": "dead band",
-    "dead band astern": "dead band astern minus dead band ahead",
+    "dead band astern": "dead band astern relative to dead band ahead",
     "lag": "time constant of the thrusters",
     "dead time": "dead time of the commands",
     "drag astern": "drag astern relative to drag ahead",

@@ -218,8 +218,8 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         if key in by_value:
             return by_value[key]
         if isinstance(part, Curve) and key in _DEAD_BAND:
-            has_own_astern = name in base or ("dead band astern", part.name) in present
-            return has_own_astern or (key == "c_0" and value > 0.0)
+            is_kept = key == "c_0" or name in base or ("dead band astern", part.name) in present
+            return is_kept and value > 0.0
         if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
             return name in base or ("drag astern", part.axis.name) in present
         if isinstance(part, Curve) and key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):

@@ -57,6 +57,8 @@ def next_test(
     rest = np.array([max(shown.get(c, 0.0) ** 2 - one**2, 0.0) for c, one in zip(COMMANDS, known, strict=True)])
     now = np.sqrt(known**2 + rest)
     worst = int(np.argmax(now))
+    values, vectors = np.linalg.eigh(posterior.covariance / np.outer(posterior.errors, posterior.errors))
+    root = posterior.errors[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     found = []
     for strength in _STRENGTHS:
         hold = _hold([motion(posterior.z, c) for c in (0.0, strength, -strength)], axis, limits)
@@ -66,7 +68,7 @@ def next_test(
             more = _information(objective, number, posterior.z, axis, strength, hold)
         except DivergedError:
             continue
-        covariance = np.asarray(np.linalg.inv(np.linalg.inv(posterior.covariance) + 0.5 * more), np.float64)
+        covariance = root @ np.linalg.solve(np.eye(len(root)) + 0.5 * root.T @ more @ root, root.T)
         words = f"hold {strength:.0%} of {axis.name} for {hold:.0f} s, rest, then -{strength:.0%} for {hold:.0f} s"
         then = np.sqrt(_widths(slopes, covariance) ** 2 + rest)
         target = f"the speed at {COMMANDS[worst]:.0%}"
@@ -143,4 +145,5 @@ class _Proposed(Objective):
 
     def __init__(self, objective: Objective, number: int, record: Record) -> None:
         self.__dict__.update(objective.__dict__)
+        self.logs = [replace(one, record=record) if n == number else one for n, one in enumerate(objective.logs)]
         self.records = [record if n == number else other for n, other in enumerate(objective.records)]

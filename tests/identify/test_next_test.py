@@ -70,7 +70,7 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
     _, information = total(objective, z, objective.data(z, objective.runs(z)))
     after = next_test(objective, Posterior.of(objective.table, z, information), HEAVE, TankLimits(), ())
     assert after
-    assert after.now == pytest.approx(test.then, rel=0.2)
+    assert after.now == pytest.approx(test.then, rel=0.3)
     assert after.now < 0.8 * test.now
 
 

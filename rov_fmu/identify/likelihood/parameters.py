@@ -34,7 +34,7 @@ PRIORS = {
     "thrust_shape": Prior(0.10, "the shape of a curve, relative to its force", "published curves differ so"),
     "thrust_reverse": Prior(0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"),
     "dead_band": Prior(0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
-    "dead_band_astern": Prior(0.02, "the dead band astern minus that ahead", "propellers are made for one direction"),
+    "dead_band_astern": Prior(0.3, "ln of the dead band astern to that ahead", "propellers are made for one direction"),
     "lag": Prior(0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
     "dead_time": Prior(0.05, "the time from a command to its effect, s", "links of one or two control periods"),
     "inertia": Prior(0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
@@ -193,9 +193,12 @@ class Table:
                 a, b = (self.base[name] for name in names)
                 found[names[0]] = scale * ratio * (a - moved * (a + b))
                 found[names[1]] = scale * ratio * (b + moved * (a + b))
-            if (band := curve.name_of(f"c_0{end}")) in found:
-                more = self.get(z, "dead band astern", curve.name) if end else 0.0
-                found[band] = max(self.get(z, "dead band", curve.name, default=found[band]) + more, 0.0)
+        if "c_0" in curve.keys:
+            ahead, astern = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
+            found[ahead] = self.get(z, "dead band", curve.name, default=found[ahead])
+            if astern != ahead:
+                ratio = self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
+                found[astern] = found[ahead] * ratio * exp(self.get(z, "dead band astern", curve.name))
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)
@@ -348,8 +351,7 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
             yield Parameter("dead band", name, mean=mean, deviation=width, low=0.0, high=0.5, null=0.0)
             astern = curve.coefficient(f"c_0{REVERSE}")
             if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
-                mean, width = known.coefficients[astern] - mean, prior("dead_band_astern")
-                yield Parameter("dead band astern", name, mean=mean, deviation=width, null=0.0)
+                yield Parameter("dead band astern", name, deviation=prior("dead_band_astern"), null=0.0)
 
 
 def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:

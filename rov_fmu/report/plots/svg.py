@@ -107,11 +107,11 @@ def add_knots(ax: Axes, along: Literal["x", "y"], gap: float = 0.0) -> None:
     axis.set_major_locator(MaxNLocator(5))
 
 
-def add_legend(figure: Figure) -> None:
+def add_legend(figure: Figure, columns: int = 2) -> None:
     """Add one legend for all panels below them, where it hides nothing, if a line or an area has a name."""
     named = {label: look for ax in figure.axes for look, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if named:
-        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2, columnspacing=1.0)
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=columns, columnspacing=1.0)
 
 
 def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = "1") -> None:
@@ -131,13 +131,13 @@ def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = 
     ax.locator_params("y", nbins=4)
 
 
-def with_even_text(draw: Draw) -> Draw:
-    """Return a function that draws the same figure with all text in one size."""
+def with_even_text(draw: Draw, size: float = STYLE["font.size"]) -> Draw:
+    """Return a function that draws the same figure with all text in one size, in points."""
 
     def drawn(figure: Figure) -> None:
         draw(figure)
         for text in figure.findobj(Text):
-            text.set_fontsize(STYLE["font.size"])
+            text.set_fontsize(size)
 
     return drawn
 

@@ -48,7 +48,7 @@ def test_a_shape_is_fitted_where_it_was_tested() -> None:
     """No other quadratic curve has smaller relative errors over the tested commands, (6)."""
     shape = Shapes({"rear": 0.1 * np.random.default_rng(5).standard_normal(COUNT)})
     commands = np.linspace(0.2, 0.7, 40)
-    (curve,) = nearest(REAR, lambda c: shape.forces(VIDEORAY, REAR, c), 0.0, 0.2, 0.7)
+    (curve,) = nearest(REAR, lambda c: shape.forces(VIDEORAY, REAR, c), (0.0, 0.0), 0.2, 0.7)
     found = dict(curve.coefficients)
 
     def error(coefficients: dict[str, float]) -> float:

@@ -46,6 +46,7 @@ linear thrust top: 0 ± 0.3, -0.25 to inf
 linear thrust top astern: 0 ± 0.3, -0.25 to inf
 reverse thrust top: 0 ± 0.5, -inf to inf
 dead band top: 0 ± 0.05, 0 to 0.5, absent at 0
+dead band astern top: 0 ± 0.3, -inf to inf, absent at 0
 inertia surge: ln 1 ± 0.5, 0 to inf
 quadratic drag surge: ln 3.16 ± 1, 0 to inf
 linear drag surge: ln 9.38 ± 1.5, 0 to inf
@@ -110,6 +111,8 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
             of("lag"),
             of("voltage"),
         ]
+    assert c["c_0_top_reverse"] == pytest.approx(of("dead band", "top") * exp(of("dead band astern", "top")))
+    assert "c_0_rear_reverse" not in c, "no force of it was measured astern"
     for axis, v in ((SURGE.name, "u"), (HEAVE.name, "w")):
         for kind, name in (("quadratic drag", f"a_d_{v}"), ("linear drag", f"b_d_{v}")):
             ratio = exp(of("drag astern", axis))
