@@ -61,9 +61,10 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
 
 def curve_formulas(curve: Curve) -> Formulas:
     """Return formulas from the command u_one of a thruster to its steady thrust, which is the last."""
-    names = Names(["u_one", "voltage", *(curve.coefficient(key) for key in curve.keys)])
+    names = Names(curve.coefficient(key) for key in curve.keys)
     command = {names("command", "one").identifier: saturated(Name("u_one"))}
-    return {**_battery(names), **command, **_steady_thrust("one", curve, names)}
+    battery = _battery(names) if "V_0" in curve.keys or len(curve.tables) > 1 else {}
+    return {**battery, **command, **_steady_thrust("one", curve, names)}
 
 
 def steady_name(thruster: str, curve: Curve, names: Names) -> Name:

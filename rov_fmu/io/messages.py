@@ -5,7 +5,7 @@ import reprlib
 import shutil
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from textwrap import wrap
 
@@ -130,11 +130,19 @@ def listed(words: Iterable[str], before_last: str = "and") -> str:
 
 
 def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
-    """Return the names that are most similar to an unknown one, without regard to case; the most similar is first."""
+    """Return the names that are most similar to an unknown one, without regard to case; the most similar is first.
+
+    Of equally similar names, one with which the unknown name begins is first: for u_left, this is u_l, and not u_t.
+    """
     by_folded: dict[str, list[str]] = {}
     for known in names:
         by_folded.setdefault(known.casefold(), []).append(known)
-    close = get_close_matches(name.casefold(), by_folded, most)
+    unknown = name.casefold()
+
+    def closeness(known: str) -> tuple[float, bool]:
+        return SequenceMatcher(None, known, unknown).ratio(), unknown.startswith(known)
+
+    close = sorted(get_close_matches(unknown, by_folded, len(by_folded) or 1), key=closeness, reverse=True)
     return [known for folded in close for known in by_folded[folded]][:most]
 
 

@@ -199,7 +199,7 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     equation: Name = ""
     """Where the curve is published. A bare number, (9), is an equation of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
-    """Number of thrusters that gave the measured force together."""
+    """Number of thrusters whose force together the curve describes, with a_t and b_t."""
     table: _Thrust | None = None
     """A CSV file with the columns `command [1]`, `[%]` or `[us]`, and `thrust [N]`, `[kgf]` or `[lbf]`. It replaces
     a_t, b_t and c_0."""

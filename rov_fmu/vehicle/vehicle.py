@@ -217,9 +217,9 @@ class Vehicle:
     # ---- Thrust ----
 
     def curve_force(self, curve: Curve, command: float) -> float:
-        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage."""
-        values = {"u_one": command, "voltage": self.layout.voltage or 0.0}
-        *_, force = _thrust_of(curve)({**self.coefficients, **values}).values()
+        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual inputs."""
+        values = {**self.coefficients, **self.layout.usual_inputs, "u_one": command}
+        *_, force = _thrust_of(curve)(values).values()
         return float(force)
 
     def commanded(self, inputs: Values) -> dict[str, float]:

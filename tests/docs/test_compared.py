@@ -1,11 +1,15 @@
 """The page that compares the vehicles with their publications: its tables against numbers computed here or printed."""
 
 import re
+from functools import partial
 
 import pytest
 
 from docs import reference
 from docs.compared import Table, tables
+from rov_fmu.equation.catalogue import SURGE
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
 
 
@@ -36,6 +40,13 @@ def test_videoray_is_as_far_from_the_tables_as_the_design_says(computed: dict[st
     assert numbers(yaw) == [0.2, 4.0, -4.7, 3.4]
     assert not numbers(surge), "Table 8 is lost"
     assert [numbers(row)[0] for row in computed["videoray_measured"][2:]] == [-13.5, -21.8, 21.8]
+
+
+def test_the_videoray_is_as_fast_as_the_page_says() -> None:
+    vehicle, page = load_vehicle(SHIPPED["videoray"]), (ROOT / "docs" / "vehicles.md").read_text("utf-8")
+    (low, high), speed = vehicle.command_range, partial(vehicle.response, SURGE)
+    holds = f"holds from {low:.0%} to {high:.0%} of the full command, that is up to {speed(high)[0]:.2f} m/s ahead"
+    assert f"{holds}; its {speed(1.0)[0]:.2f} m/s at full command".replace("%", " %") in page
 
 
 def test_thrust_is_as_far_from_the_makers_points_as_the_design_says(computed: dict[str, Table]) -> None:

@@ -256,6 +256,10 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda v: v.simulate(TIMES, {"ul": 1}),
         r"inputs\['ul'\]: .* no such input, .*; did you mean u_l?",
     ),
+    "an input as similar to two others": (
+        lambda v: v.simulate(TIMES, {"u_left": 1}),
+        r"inputs\['u_left'\]: .* no such input, .*; did you mean u_l\?",
+    ),
     "a value is missing": (
         lambda v: v.simulate(TIMES, {"u_l": [0, None, 1]}),
         r"inputs\['u_l'\]\[1\] = nan: must be a finite",

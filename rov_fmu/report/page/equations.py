@@ -3,7 +3,7 @@
 A formula is shown as a sum of products. The page leaves out only the saturation of commands, which its text mentions.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from markupsafe import escape
@@ -16,7 +16,6 @@ from rov_fmu.equation.expression import (
     Name,
     Number,
     Operation,
-    beyond_dead_band,
     call,
     collected,
     product,
@@ -28,7 +27,7 @@ from rov_fmu.equation.expression import (
 from rov_fmu.equation.forces import COUPLING, forces_of
 from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.equation.terms import Equation, equation_of, mass_matrix
-from rov_fmu.equation.thrust import by_direction, steady_name
+from rov_fmu.equation.thrust import steady_name
 from rov_fmu.report.templates import number
 
 
@@ -126,7 +125,7 @@ def equations_of(layout: Layout) -> Equations:
         thrusters = [t for t in layout.thrusters if t.curve == curve.name]
         first = thrusters[0].name
         steady, force = steady_name(first, curve, names), Name(f"F_{first}")
-        shown = [line(steady, _steady(first, curve, equation), curve.equation)]
+        shown = [line(steady, _with_sign(replaced(equation.thrust[steady.identifier], formulas)), curve.equation)]
         shown += thrust(names("beyond", first)) if "c_0" in curve.keys else []
         lag = [line(Name(curve.coefficient("T")) * _rate(force.identifier), steady - force)] if curve.has_lag else []
         by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
@@ -157,21 +156,33 @@ def _entry(a: str, b: str) -> Name:
     return Name(f"M_{a}" if a == b else f"m_{a}{b}")
 
 
-def _steady(thruster: str, curve: Curve, equation: Equation) -> Expression:
-    """Return the steady thrust of a thruster as one writes it: with |c| c in place of a choice by the sign of c."""
-    names = equation.names
-    c, m = names("command", thruster), names("beyond", thruster)
-    a_t, b_t, c_0 = (by_direction(c, curve, key) for key in ("a_t", "b_t", "c_0"))
-    if curve.tables:
-        force: Expression = Name(curve.coefficient("k_t")) * names("table", thruster)
-    elif "c_0" in curve.keys:
-        force = beyond_dead_band(m, c_0, call("sgn", c) * (a_t * m * m + b_t * m))
-    else:
-        force = a_t * call("abs", c) * c + b_t * c
-    if "V_0" in curve.keys:
-        by_voltage = names("battery") / Name(curve.coefficient("V_0"))
-        force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
-    return scaled(1.0 / curve.together, force)
+def _with_sign(x: Expression) -> Expression:
+    """Write sgn(c) F, in which sgn(c) |c| is c, in place of the choice between F and -F by the sign of c."""
+    match x:
+        case Operation("directed", (c, size, Operation("neg", (opposite,)))) if size == opposite:
+            return total(product(*_times_sign(c, factors)) for factors in _multiplied_out(size))
+        case Operation(op, args):
+            return Operation(op, tuple(map(_with_sign, args)))
+    return x
+
+
+def _times_sign(c: Expression, factors: Sequence[Expression]) -> list[Expression]:
+    """Return the factors of a product times sgn(c): the last |c| becomes c, if there is one."""
+    size = call("abs", c)
+    if size not in factors:
+        return [call("sgn", c), *factors]
+    last = max(place for place, factor in enumerate(factors) if factor == size)
+    return [*factors[:last], c, *factors[last + 1 :]]
+
+
+def _multiplied_out(x: Expression) -> list[tuple[Expression, ...]]:
+    """Return the products of which an expression is the sum, each with its factors: (a + b) m gives a m and b m."""
+    match x:
+        case Operation("+", (left, right)):
+            return _multiplied_out(left) + _multiplied_out(right)
+        case Operation("*", (left, right)):
+            return [(*one, *other) for one in _multiplied_out(left) for other in _multiplied_out(right)]
+    return [(x,)]
 
 
 def coupled(layout: Layout) -> list[str]:
@@ -190,8 +201,10 @@ def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
 def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     """Return the formulas that replace their names, because the page has no equation of these names."""
     names = equation.names
-    kinds = ("saturated", "command", "net_weight", "righting", "arm", "constant")
+    kinds = ("saturated", "command", "magnitude", "net_weight", "righting", "arm", "constant")
     inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
+    full = {t.name for t in layout.thrusters if "c_0" not in layout.curve_of[t.name].keys}  # without a dead band
+    inlined |= {name.identifier for name in names.of_kind("beyond") if full.issuperset(name.owners)}
     mixed = [name for name in names.of_kind("mixed") if name.identifier in equation.thrust]
     inlined -= {names("command", *name.owners).identifier for name in mixed}
     found = {name: _unsaturated(formula) for name, formula in equation.program.items() if name in inlined}
