@@ -194,11 +194,11 @@ class Table:
                 found[names[0]] = scale * ratio * (a - moved * (a + b))
                 found[names[1]] = scale * ratio * (b + moved * (a + b))
         if "c_0" in curve.keys:
-            ahead, astern = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
-            found[ahead] = self.get(z, "dead band", curve.name, default=found[ahead])
-            if astern != ahead:
-                ratio = self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
-                found[astern] = found[ahead] * ratio * exp(self.get(z, "dead band astern", curve.name))
+            band, other = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
+            found[band] = self.get(z, "dead band", curve.name, default=found[band])
+            if other != band:
+                ratio = self.base[other] / self.base[band] if self.base[band] else 1.0
+                found[other] = found[band] * ratio * exp(self.get(z, "dead band astern", curve.name))
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)

@@ -60,8 +60,10 @@ class Spent:
     failed: int = 0
     turned: int = 0
     """The number of these runs in which the vehicle turned over."""
+    started: float = 0.0
+    """The seconds until the workers had started."""
     elapsed: float = 0.0
-    """The seconds from the start of the workers until the last run was done."""
+    """The seconds from then until the last run was done."""
 
 
 def execute(
@@ -73,7 +75,7 @@ def execute(
     on_progress: Callable[[Progress], None],
 ) -> Spent:
     """Do the runs that are missing in the store. Raises FileError, StudyError, WriteError, and KeyboardInterrupt."""
-    spent = Spent()
+    spent, begin = Spent(), perf_counter()
     missing = deque(store.missing(design.runs))
     if not missing:
         return spent
@@ -83,7 +85,8 @@ def execute(
         except Exception as error:  # whatever a worker may raise
             needs = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
             raise StudyError(f"{needs}: {brief(str(error))}") from error
-        begin = perf_counter()
+        spent.started = perf_counter() - begin
+        begin += spent.started
         try:
             _Runs(client, job, design, store, missing, spent, on_progress).do()
         except (FileError, StudyError, WriteError):
@@ -120,7 +123,7 @@ class _Runs:
         """Do all missing runs."""
         self.done_before = self.design.runs - sum(end - first for first, end in self.missing)
         self._report()
-        coming = as_completed(loop=self.client.loop)
+        coming = as_completed(loop=self.client.loop, raise_errors=False)
         try:
             self._submit_tasks(coming)
             for future in coming:
