@@ -129,7 +129,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, on_step=on_step, enough=enough, last=False)
+    other = minimise(objective, larger, enough=enough, last=False)
     return min(end, other, key=lambda found: found.value)
 
 
