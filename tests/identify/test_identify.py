@@ -22,7 +22,7 @@ from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
 from tests.folders import ARM, DOWN, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read, responses
 from tests.identify.conftest import Identified
-from tests.recordings import PLANS, Measured, run, write_log
+from tests.recordings import PLANS, Measured, run, with_more, write_log
 from tests.vehicles import VIDEORAY
 
 TRUTH = VIDEORAY.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta_u": 0.8})
@@ -203,6 +203,37 @@ def test_intervals_of_a_measured_curve_with_a_dead_band_cover_the_truth(tmp_path
         low, high = found.intervals["c_0_t200"]
         assert high - low < 0.06, "an interval is not just wide"
     assert min(map(sum, covered.values())) >= binom.ppf(0.001, 8, 0.95), covered
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("astern", [0.08, 0.05])
+def test_dead_bands_are_found_from_forces_and_dives(astern: float, tmp_path: Path) -> None:
+    """The pool simulates two dives of 80 s with commands of whole per cent, at which J has kinks, for each vehicle."""
+    random, covered = np.random.default_rng(0), dict[str, list[bool]]()
+    numbers = {"a_t_top": 20.0, "b_t_top": 3.0, "a_t_top_reverse": 15.0, "b_t_top_reverse": 2.0, "c_0_top": 0.08}
+    true = with_more(TRUTH, **numbers, c_0_top_reverse=astern, T_top=0.12)
+
+    def force(c: float) -> float:
+        a, b, band = (20.0, 3.0, 0.08) if c > 0.0 else (-15.0, -2.0, astern)
+        beyond = max(abs(c) - band, 0.0)
+        return (a * beyond + b) * beyond
+
+    for n in range(4):
+        rows = (
+            f"{c:.1f},{force(c) + 0.3 * random.standard_normal():.3f}\n" for c in np.repeat(np.arange(-10, 11), 2) / 10
+        )
+        path = folder_of(tmp_path / str(n), KNOWN, {"thrust_top.csv": f"{FORCE}\n" + "".join(rows)})
+        for dive in range(2):
+            commands = random.choice([-1.0, 0.0, 1.0], 20) * random.uniform(0.05, 0.9, 20).round(2)
+            plan = ((0.0, 2.0), *((c, 4.0) for c in commands.tolist()))
+            write_log(path, str(dive), run(true, HEAVE, plan, 10.0).noisy(random, noise=0.01))
+        found = identify(load_tests(path)).vehicle
+        assert found.uncertainty
+        for name, value in (numbers | {"c_0_top_reverse": astern}).items():
+            low, high = found.intervals.get(name, found.intervals["c_0_top"])
+            covered.setdefault(name, []).append(low <= value <= high)
+            assert name[:2] == "a_" or high - low < 3.0, "an interval is not just wide"
+    assert min(map(sum, covered.values())) >= binom.ppf(0.001, 4, 0.95), covered
 
 
 @pytest.mark.long
