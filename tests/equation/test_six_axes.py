@@ -112,6 +112,8 @@ def test_the_heading_counts_turns_while_the_nose_is_not_up_or_down() -> None:
     for step in (50, 500, 6000):
         coarse = simulate(SIX, times[::step], {**inputs, **start}, ["psi"]).values[0, 0]
         assert coarse == pytest.approx(psi[::step], abs=1e-11)
+    there = dict(zip(QUATERNION, (1.0, 0.0, 0.0, 0.0), strict=True))
+    assert SIX.calculated(inputs, SIX.layout.at_rest | there | {"psi": 12.0})["psi"] == pytest.approx(4.0 * pi)
 
 
 def test_a_long_step_of_a_motion_that_never_settles_is_many_short_ones() -> None:

@@ -84,6 +84,10 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         lambda text: text.replace("{ a_d_u =", "{ b_d_u ="),
         "estimates.b_d_u.correlation.b_d_u = -0.883478: of a coefficient with itself is 1 and is not given",
     ),
+    "given twice": (
+        lambda text: text.replace("2.00458 }", "2.00458, correlation = { b_d_u = -0.883478 } }"),
+        "estimates.b_d_u.correlation.a_d_u = -0.883478: estimates.a_d_u gives it already",
+    ),
     "above 1": (
         lambda text: text.replace("-0.883478", "-1.5"),
         "estimates.b_d_u.correlation.a_d_u = -1.5: must be greater than or equal to -1",
