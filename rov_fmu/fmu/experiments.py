@@ -14,6 +14,7 @@ from lxml import etree
 
 from rov_fmu.io.csv_table import Series, finite, read_series
 from rov_fmu.io.messages import NO_FILE, FileError, shown
+from rov_fmu.io.reading import root_of_xml
 
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
@@ -189,9 +190,7 @@ class ReferenceResults:
     def _xml(self, member: _Member, root: str) -> Any:
         """Return the root element of an XML file, which must have the name `root`."""
         try:
-            element = etree.fromstring(
-                self._text(member).encode(), etree.XMLParser(resolve_entities=False, no_network=True)
-            )
+            element = root_of_xml(self._text(member).encode())
         except etree.XMLSyntaxError as error:
             raise member.error(f"not XML: {error}") from error
         if (name := etree.QName(element).localname) != root:

@@ -8,7 +8,7 @@ from lxml import etree
 from PIL import Image, UnidentifiedImageError
 
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.reading import read_bytes
+from rov_fmu.io.reading import read_bytes, root_of_xml
 
 _LARGEST = 20_000_000
 """The largest picture that is read, in bytes."""
@@ -36,7 +36,7 @@ def read_svg(path: Path) -> bytes:
     """
     content = read_bytes(path, most=_LARGEST)
     try:
-        root = etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
+        root = root_of_xml(content)
     except etree.XMLSyntaxError as error:
         raise FileError(f"{path}: not an SVG picture: {error.msg}") from error
     if root.tag != "{http://www.w3.org/2000/svg}svg":

@@ -4,7 +4,9 @@ import hashlib
 from collections.abc import Callable
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
-from typing import IO, TextIO
+from typing import IO, Any, TextIO
+
+from lxml import etree
 
 from rov_fmu.io.messages import NO_FILE, FileError
 
@@ -48,3 +50,11 @@ def read_lines(path: Path, kind: type[FileError] = FileError, *, most: int | Non
     except UnicodeDecodeError as error:
         raise kind(f"{path}: not UTF-8 text, at byte {error.start}") from error
     return lambda: TextIOWrapper(BytesIO(content), "utf-8-sig")
+
+
+def root_of_xml(content: bytes) -> Any:
+    """Return the root element of XML that may come from a stranger. Raises `lxml.etree.XMLSyntaxError`.
+
+    An entity could stand for another file or for gigabytes of text, so that none is replaced and nothing is fetched.
+    """
+    return etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))

@@ -1,4 +1,4 @@
-"""Texts of any length in messages, and a temporary folder that has gone."""
+"""Texts of any length in messages, XML of a stranger, and a temporary folder that has gone."""
 
 import shutil
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import brief, first_of, lines_on, only, shown
+from rov_fmu.io.reading import root_of_xml
 from rov_fmu.io.toml_file import join_names
 
 
@@ -23,6 +24,14 @@ def test_long_texts_and_lists_are_cut() -> None:
     assert join_names(names[:11]) == ", ".join(names[:10]) + ", ..."
     assert lines_on(Path("a"), ["b", "c", "b", ""]) == ["a: b", "a: c", "a: 1 more mistake"]
     assert lines_on(Path("a"), names)[9:] == ["a: n9", "a: 12 more mistakes"]
+
+
+def test_xml_of_a_stranger_contains_no_other_file(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("a password", encoding="utf-8")
+    xml = f'<!DOCTYPE a [<!ENTITY b SYSTEM "{secret.as_uri()}">]><a c="d">e&b;</a>'
+    root = root_of_xml(xml.encode())
+    assert (root.get("c"), root.text, "password" in "".join(map(str, root.itertext()))) == ("d", "e", False)
 
 
 def test_a_temporary_folder_is_removed_at_the_second_attempt_and_may_be_gone_already(

@@ -13,7 +13,7 @@ from rov_fmu.fmu.evidence.signature import check_signature
 from rov_fmu.fmu.unpacking import refusal
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.messages import NO_FILE, FileError, ProofError, brief, shown
-from rov_fmu.io.reading import hash_of
+from rov_fmu.io.reading import hash_of, root_of_xml
 
 _MOST_BYTES = 20_000_000
 """The largest size of the meta-data."""
@@ -66,7 +66,7 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
     if (size := archive.getinfo(META_DATA).file_size) > _MOST_BYTES:
         raise FileError(f"{where}: has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
     try:
-        root = etree.fromstring(archive.read(META_DATA), etree.XMLParser(resolve_entities=False, no_network=True))
+        root = root_of_xml(archive.read(META_DATA))
     except (etree.XMLSyntaxError, zipfile.BadZipFile) as error:
         raise FileError(f"{where}: is damaged: {brief(str(error))}") from error
     entries = {
