@@ -6,8 +6,6 @@ from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import IO, Any, TextIO
 
-from lxml import etree
-
 from rov_fmu.io.messages import NO_FILE, FileError
 
 _PIECE = 2**20
@@ -57,4 +55,6 @@ def root_of_xml(content: bytes) -> Any:
 
     An entity could stand for another file or for gigabytes of text, so that none is replaced and nothing is fetched.
     """
+    from lxml import etree  # most commands read no XML
+
     return etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
