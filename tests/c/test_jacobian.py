@@ -46,8 +46,8 @@ def _variational(rov: Vehicle, inputs: dict[str, float], state: dict[str, float]
     return end[:n], derivatives
 
 
-_SOME = ("Heavy", "six_coupled", "a very short lag")
-"""The vehicles of the default tests: with coupling and lag, with six axes, and with a stiff lag."""
+_SOME = ("Heavy", "a very short lag")
+"""The vehicles of the default tests: with coupling, six axes and lag, and with a stiff lag."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in _SOME else pytest.mark.long) for name in ALL])
