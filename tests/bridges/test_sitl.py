@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import atan2, pi
 from pathlib import Path
+from shlex import quote, split
 from socket import AF_INET, SOCK_DGRAM, socket
 from threading import Thread
 
@@ -413,10 +414,10 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
         ("videoray --log a.txt", "--log a.txt: the name must end with .csv or .mcap"),
         ("videoray --host 192.0.2.1", "--host 192.0.2.1, --port 9002: cannot listen there"),
         ("videoray --bottom x", "Invalid value for '--bottom': 'x' must be a number"),
-        (f"{ROOT / 'verification' / 'fuzzing' / 'bare.toml'}", "VEHICLE: none of ArduSub's frames"),
+        (quote(f"{ROOT / 'verification' / 'fuzzing' / 'bare.toml'}"), "VEHICLE: none of ArduSub's frames"),
     ],
 )
 def test_bad_options_are_one_line(options: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sitl", *options.split()]) == 2
+    assert main(["sitl", *split(options)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"rov-fmu: {said}")
