@@ -205,12 +205,12 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
     given = tests.given
     deviations = given.description.tables.priors
-    vehicle = _extended(given.vehicle, given.base, tests, deviations)
+    measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
+    vehicle = _extended(given.vehicle, measured, tests)
     logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in vehicle.layout.drivers(axis)}
     given_thrust = {name for name, quantity in given.description.known.items() if not quantity.interval}
-    measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
     driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
     curves = [
         curve
@@ -262,8 +262,12 @@ def _is_fitted(axis: Axis, tests: Tests) -> bool:
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
-def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviations: Mapping[str, float]) -> Vehicle:
-    """Return the vehicle with every coefficient that a parameter may change, where each effect is absent."""
+def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests) -> Vehicle:
+    """Return the vehicle with every coefficient that a parameter may change, where each effect is absent.
+
+    `measured` has the curves whose forces were measured, and whether astern, too.
+    """
+    base, deviations = tests.given.base, tests.given.description.tables.priors
     values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
     vehicle = Vehicle(
         replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
@@ -286,8 +290,7 @@ def _extended(vehicle: Vehicle, base: Mapping[str, float], tests: Tests, deviati
                 more[curve.name_of(f"{key}{REVERSE}")] = values[curve.coefficient(key)]
             if logged or curve.name in tests.tested.thrust:
                 more[curve.coefficient("c_0")] = 0.0
-            _, was_measured_astern = tests.tested.thrust.get(curve.name, ("", False))
-            if was_measured_astern:
+            if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
         if logged:
             more[curve.coefficient("T")] = LEAST_LAG

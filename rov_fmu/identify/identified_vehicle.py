@@ -223,7 +223,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
             return name in base or ("drag astern", part.axis.name) in present
         if isinstance(part, Curve) and key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
-            is_measured = name in tests.given.known or _has_backward_rows(tests, part)
+            is_measured = name in tests.given.known or fit.known.measured_curves.get(part.name, False)
             return name in base or is_measured or ("reverse thrust", part.name) in present
         return True
 
@@ -237,10 +237,6 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         pulse=tests.given.vehicle.layout.pulse,
         has_dead_time=tests.given.vehicle.layout.has_dead_time,
     )
-
-
-def _has_backward_rows(tests: Tests, curve: Curve) -> bool:
-    return any(name == curve.name and any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust"))
 
 
 def _data(fit: Fit) -> str:

@@ -53,7 +53,7 @@ def read_lines(path: Path, kind: type[FileError] = FileError, *, most: int | Non
 def root_of_xml(content: bytes) -> Any:
     """Return the root element of XML that may come from a stranger. Raises `lxml.etree.XMLSyntaxError`.
 
-    An entity could stand for another file or for gigabytes of text, so that none is replaced and nothing is fetched.
+    An entity could stand for another file or for gigabytes of text, so none is replaced, and nothing is fetched.
     """
     from lxml import etree  # most commands read no XML
 
