@@ -11,7 +11,7 @@ value and its derivatives. A reversal does not interrupt the derivatives: every 
 the direction of a velocity is 0 where this velocity is 0, so the rates are continuous there.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf
@@ -108,16 +108,13 @@ class _Variational:
         self.sums = np.repeat(np.eye(len(states)), [len(row) for row in equation.rows.values()], axis=1)
         """The matrix that adds the terms of each state."""
         self.coefficients = [f"coefficient_of_term_{n}" for n in range(len(terms))]
-        functions: dict[str, Callable[..., float]] = {
-            "pow": lambda base, exponent: base**exponent if base > 0.0 or exponent >= 0.0 else 0.0
-        }
-        functions |= equation.measured | {slope_name(name): table.slope for name, table in equation.tables.items()}
+        slopes = {slope_name(name): table.slope for name, table in equation.tables.items()}
         given = [*layout.inputs, *layout.state, *layout.delayed, *layout.coefficients]
         own = dict(zip(self.coefficients, (term.coefficient for term in terms), strict=True))
         before, changes = tangents({**equation.program, **equation.forces, **own}, given)
         ends = {f"next_{force}": end for force, (_, end) in equation.lagging.items()}
         after, _ = tangents({**ends, **equation.ends}, [*changes, *states])
-        self._before, self._after = compiled(before, functions), compiled(after, functions)
+        self._before, self._after = compiled(before, equation.measured | slopes), compiled(after)
 
     def after(self, values: Mapping[str, Any], h: float, width: int) -> Array:
         """Return the states of the vehicle after h seconds, each with its derivatives; NaN if the motion overflows.

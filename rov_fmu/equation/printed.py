@@ -149,7 +149,7 @@ def _states(equation: Equation, states: list[str], indent: str) -> str:
     """Print assignments of the states. The progress of a lag follows from the time alone."""
     lines = [f"{', '.join(states)}, = _state"]
     for progress in equation.lags:
-        rate = written(equation.rows[progress][0].coefficient, PYTHON, least=6)
+        rate = written(equation.rows[progress][0].coefficient, PYTHON)
         lines.append(f"{progress} = -expm1(-{rate} * _time)")
     return "\n".join(indent + line for line in lines)
 
@@ -157,7 +157,7 @@ def _states(equation: Equation, states: list[str], indent: str) -> str:
 def _lagging(equation: Equation) -> Iterable[str]:
     """Print the entries of a dictionary of the forces that lag."""
     for progress, forces in equation.lags.items():
-        rate = written(equation.rows[progress][0].coefficient, PYTHON, _value, least=6)
+        rate = written(equation.rows[progress][0].coefficient, PYTHON, _value)
         for force, steady in forces.items():
             before, after = _value(Name(force)), _value(Name(steady))
             yield f'"{force}": {before} - ({after} - {before}) * expm1(-{rate} * _time)'

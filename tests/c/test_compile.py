@@ -71,6 +71,7 @@ def _write(script: Path, text: str) -> None:
         ("kill -XFSZ $$", "it ended with SIGXFSZ; perhaps because the shell limits the size of files .ulimit -f.$"),
         ("exit 3", "it ended with exit code 3; perhaps because the shell limits the size of files .ulimit -f.$"),
         ("echo warning; echo IO: No space left on device; exit 1", "could not be written completely, because the disk"),
+        ("echo a.c:1: error; kill -9 $$", "it ended with SIGKILL; perhaps because the shell limits the size of files "),
     ],
 )
 def test_why_a_compiler_failed(compiled_by: Path, script: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,3 +85,15 @@ def test_why_a_compiler_failed(compiled_by: Path, script: str, said: str, monkey
     with pytest.raises(module.BuildError, match="^the compiler failed for the page's module: .*" + said) as error:
         module.compile_module({})
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_the_messages_of_a_compiler_are_told_but_not_all(compiled_by: Path) -> None:
+    """The engine is compiled while a simulation begins, which has room for one line."""
+    _write(compiled_by, 'echo "warning(cache): slow"; echo; for n in $(seq 30); do echo "a.c:$n: error"; done; exit 1')
+    for compile_c, what, lines in (
+        (module.compile_module, "the compiler failed for the page's module", 20),
+        (module.compile_engine, "the C compiler failed for the engine", 1),
+    ):
+        with pytest.warns(UserWarning, match="^/proc/x/zig: .* A temporary"), pytest.raises(module.BuildError) as error:
+            compile_c({"engine.c": ""})
+        assert str(error.value) == f"{what}: " + "\n".join(f"a.c:{n}: error" for n in range(1, lines + 1))

@@ -1,6 +1,7 @@
 """The mathematics of rov_fmu/vehicle/vehicle.py: thrust, signs, rates."""
 
 import random
+from dataclasses import replace
 from math import copysign
 
 import pytest
@@ -16,6 +17,7 @@ from tests.vehicles import (
     State,
     Values,
     at_rest,
+    numbered,
     random_case,
     random_vehicle,
     still,
@@ -110,6 +112,16 @@ def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
         expected = rov.derivatives(inputs, before)
         assert list(expected) == list(before)
         assert found == pytest.approx(list(expected.values()), rel=3e-7, abs=3e-7)
+
+
+def test_at_rest_only_a_net_weight_and_the_place_of_the_mass_matter_and_not_the_coupling() -> None:
+    """The mass matrix has the centre of mass with the coupling and without it. A level vehicle sinks by W - B."""
+    apart = Vehicle(replace(SIX.layout, coupled=False), SIX.coefficients)
+    inputs = held(SIX, X_ext=8.0, Z_ext=-3.0, K_ext=0.6, N_ext=-2.0)
+    assert apart.derivatives(inputs, at_rest(SIX)) == pytest.approx(SIX.derivatives(inputs, at_rest(SIX)), rel=1e-12)
+    level = numbered(replace(VEHICLES["heave only"].layout, restoring=("W", "B")), W=132.6, B=130.1, m_rov=10.0)
+    assert level.derivatives(still(level), at_rest(level))["w"] == pytest.approx(0.25, rel=1e-12)
+    assert pytest.approx(0.25, rel=1e-12) == level.alone(HEAVE, still(level)).C
 
 
 # ---- One axis alone ----

@@ -15,7 +15,7 @@ from rov_fmu.equation.step import Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_engine
-from tests.vehicles import SIX, THRUST_EFFECTS, at_rest, fin, numbered, random_inputs, random_state
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, at_rest, fin, numbered, random_inputs, random_state
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces
 from verification.references.rigid_vehicle import compared, places
@@ -96,8 +96,13 @@ def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> N
 
 
 def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_balance() -> None:
-    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
-    for rov, axis, command in ((NOW, SURGE, 0.6), (heavy, HEAVE, -0.3)):
+    heavy, by_direction = load_vehicle(SHIPPED["bluerov2_heavy"]), load_vehicle(EVERYTHING)
+    for rov, axis, command in (
+        (NOW, SURGE, 0.6),
+        (heavy, HEAVE, -0.3),
+        (by_direction, HEAVE, 0.4),
+        (by_direction, HEAVE, -0.4),
+    ):
         V_ss, _ = rov.response(axis, command)
         moved = rov.step(rov.held_inputs(axis, command), at_rest(rov), 100.0)
         assert moved[axis.velocity] == pytest.approx(V_ss, rel=1e-9)

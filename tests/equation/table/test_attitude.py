@@ -15,6 +15,8 @@ from rov_fmu.equation.attitude import (
 from rov_fmu.equation.expression import compiled
 
 ENTRIES = [f"R_{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
+TURNS = [(0.0, 0.0, 0.0), (pi, 0.0, 0.0), (0.0, 0.0, pi), (pi, 0.0, pi)]
+"""No turn, and half a turn about each axis. The small parts of the quaternion beside it are known to few digits."""
 ATTITUDES = {
     "level, to the north": (0.0, 0.0, 0.0),
     "tilted and turned": (0.4, -0.3, 1.1),
@@ -22,6 +24,10 @@ ATTITUDES = {
     "nose over": (0.1, 1.4, 3.0),
     "to the south": (0.2, -0.1, 3.1),
     "past a vertical nose": (0.3, 2.0, -0.5),
+    **{
+        f"a little beside {turn}": tuple(a + b for a, b in zip(turn, (1e-7, 2e-7, -3e-7), strict=True))
+        for turn in TURNS
+    },
 }
 
 
