@@ -1,34 +1,16 @@
-"""The bounds, nominal values and units in modelDescription.xml equal a second list of them."""
+"""The bounds, nominal values and units in modelDescription.xml."""
 
-from math import pi
+from math import inf, pi
 from pathlib import Path
 
 import pytest
 from lxml import etree
 
 from rov_fmu.fmu.variables import variables
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmu.test_versions import described
 from tests.vehicles import THRUST_EFFECTS, VEHICLES, pulsed
 
-DRAG, CURVES, TUNING = (
-    " ".join(f"{kind}_{which}" for kind in kinds.split() for which in whiches.split())
-    for kinds, whiches in (("a_d b_d", "u w r"), ("a_t b_t", "rear top"), ("alpha beta", "u w r"))
-)
-# Minimum, maximum, nominal value.
-NUMBERS = {
-    "u_l u_r u_t": (-1.0, 1.0, 1.0),
-    "X_ext Z_ext x y z": (None, None, 10.0),
-    "N_ext V_N V_E u w r psi": (None, None, 1.0),
-    "der(u) der(w) der(r) der(x) der(y) der(z) der(psi) F_l F_r F_t tau_rear": (None, None, None),
-    "m_rov": (1e-3, 1e6, None),
-    "I_r": (1e-6, 1e6, None),
-    "R": (0.0, 100.0, None),
-    "gamma": (0.0, 1.5708, None),
-    CURVES: (-1e6, 1e6, None),
-    DRAG: (0.0, 1e6, None),
-    TUNING: (0.0, 1e3, None),
-}
 # Exponents of kg, m, s, rad, A; then what is displayed, and how often it is contained in the unit.
 UNITS: dict[str, tuple[object, ...]] = {
     "1": (0, 0, 0, 0, 0, "%", 100.0),
@@ -63,13 +45,16 @@ def description(videoray_dir: Path) -> etree._ElementTree:
     return etree.parse(str(videoray_dir / "modelDescription.xml"))
 
 
-def test_bounds_and_nominal_values(description: etree._ElementTree) -> None:
-    expected = {name: numbers for names, numbers in NUMBERS.items() for name in names.split()}
-    found = {}
+def test_bounds_and_nominal_values(description: etree._ElementTree, vehicle: Vehicle) -> None:
+    """They are those of the catalogue, which tests/equation/table/test_layout.py and tests/docs/test_docs.py check."""
+    layout = vehicle.layout
+    declared = layout.inputs | layout.state | layout.calculated | layout.coefficients
     for variable in description.iter("ScalarVariable"):
-        values = (variable[0].get(key) for key in ("min", "max", "nominal"))
-        found[variable.get("name")] = tuple(None if value is None else float(value) for value in values)
-    assert found == expected
+        low, high, nominal = (variable[0].get(key) for key in ("min", "max", "nominal"))
+        one, is_moved = declared.get(variable.get("name")), variable.get("name") in layout.inputs | layout.state
+        bounds = (one.minimum, one.maximum) if one else (-inf, inf)
+        assert (float(low or -inf), float(high or inf)) == bounds, variable.get("name")
+        assert nominal == (f"{one.nominal}" if one and is_moved else None), variable.get("name")
 
 
 def units(description: etree._ElementTree) -> dict[str, tuple[object, ...]]:

@@ -7,12 +7,13 @@ import zipfile
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.evidence.meta_data import META_DATA
-from rov_fmu.fmu.unpacking import unpack_fmu
+from rov_fmu.fmu.unpacking import refusal, unpack_fmu
 from rov_fmu.io.messages import FileError
 
 _LINK = (stat.S_IFLNK | 0o777) << 16
@@ -55,42 +56,53 @@ BAD: dict[str, tuple[Callable[..., None], str]] = {
 }
 
 
-@pytest.fixture
-def bad(request: pytest.FixtureRequest, videoray_fmu: Path, tmp_path: Path) -> tuple[Path, str]:
-    """Return an FMU without hashes but with a member that it must not have, and the error message about it."""
-    add, message = BAD[request.param]
-    path = tmp_path / "bad.fmu"
-    with zipfile.ZipFile(videoray_fmu) as good, zipfile.ZipFile(path, "w") as archive:
-        for name in {*good.namelist()} - {META_DATA}:
-            archive.writestr(name, good.read(name))
-        add(archive)
-    return path, message
-
-
-def _check(path: Path, message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith(f"rov-fmu: {path}: {message}")
-    assert err.count("\n") == 1
-    assert {file.name for file in path.parent.iterdir()} <= {"bad.fmu", "plan.toml"}
-
-
-@pytest.mark.parametrize("bad", BAD, indirect=True)
-def test_prove_and_study_refuse_it_in_one_line(bad: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
-    path, message = bad
-    assert main(["prove", str(path)]) == 2
-    _check(path, message, capsys)
-    (path.parent / "plan.toml").write_text(_STUDY)
-    assert main(["study", str(path.parent / "plan.toml"), "-o", str(path.parent / "results")]) == 2
-    _check(path, message, capsys)
-
-
 def _archive(*members: Callable[..., None]) -> BytesIO:
     content = BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
         for add in members:
             add(archive)
     return content
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_archive_is_refused_in_one_line(case: str, tmp_path: Path) -> None:
+    add, message = BAD[case]
+    with pytest.raises(FileError) as error:
+        unpack_fmu(_archive(_member("modelDescription.xml", _OF_2.encode()), add), Path("a.fmu"), tmp_path / "unpacked")
+    assert str(error.value).startswith(f"a.fmu: {message}")
+    assert "\n" not in str(error.value)
+    assert {file.name for file in tmp_path.iterdir()} <= {"unpacked"}
+
+
+def test_prove_and_study_refuse_it_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    add, message = BAD["a path upwards"]
+    (tmp_path / "bad.fmu").write_bytes(_archive(add).getvalue())
+    (tmp_path / "plan.toml").write_text(_STUDY)
+    for command in (["prove", "bad.fmu", "--report", "a.html"], ["study", "plan.toml", "-o", "results"]):
+        assert main([command[0], *(str(tmp_path / one) if "." in one else one for one in command[1:])]) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        assert err.startswith(f"rov-fmu: {tmp_path / 'bad.fmu'}: {message}")
+
+
+GB, MB = 10**9, 10**6
+
+
+@pytest.mark.parametrize(
+    ("most", "packed", "said"),
+    [
+        (2 * GB, GB, "would take 2 GB unpacked; at most 2 GB are allowed"),
+        (100 * MB, 1, "would take 100 MB unpacked, 100000001 times the size of the archive; above 100 MB at most 100 "),
+        (200 * MB, 2 * MB, "would take 200 MB unpacked, 100 times the size of the archive; above 100 MB at most 100 "),
+    ],
+)
+def test_an_archive_may_unpack_to_so_many_bytes(most: int, packed: int, said: str) -> None:
+    for size in (most, most + 1):
+        member = zipfile.ZipInfo("a")
+        member.file_size = size
+        archive: Any = SimpleNamespace(infolist=lambda member=member: [member], start_dir=packed)
+        reason = refusal(archive)
+        assert reason[: len(said)] == (said if size > most else "")
 
 
 def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:

@@ -1,8 +1,10 @@
 """Derivatives are the slopes of the values. Their dependencies are tested in tests/fmu/test_dependencies.py."""
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +12,7 @@ from mpmath import mp
 
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi3
+from tests.conftest import Made, unzipped
 from tests.fmi import (
     CO_SIMULATION,
     INITIALIZATION,
@@ -23,9 +26,10 @@ from tests.fmi import (
     room,
 )
 from tests.fmu.calls.conftest import WRAPPERS, modes_of
+from tests.fmu.results.test_outside import OUTSIDE, TILTED, excess
 from tests.often import often
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, State, Values, at_rest
-from verification.references.rigid_vehicle import calculated
+from verification.references import rigid_vehicle
 
 ROVS = {
     "videoray_dir": VIDEORAY,
@@ -34,12 +38,17 @@ ROVS = {
     "heavy3_dir": HEAVY,
     "everything_dir": load_vehicle(EVERYTHING),
     "six_dir": SIX,
-    "six3_dir": SIX,
+    "outside3_dir": OUTSIDE,
 }
 
 
-_SOME = ("videoray_dir", "heavy3_dir", "everything_dir", "six3_dir")
+_SOME = ("videoray_dir", "heavy3_dir", "everything_dir", "outside3_dir")
 """The FMUs of the default tests: each vehicle once, and both versions of FMI."""
+
+
+@pytest.fixture(scope="module")
+def outside3_dir(made_once: Made) -> Path:
+    return made_once("outside", partial(unzipped, OUTSIDE, fmi=3))
 
 
 @pytest.fixture(
@@ -53,7 +62,7 @@ def fmu(request: pytest.FixtureRequest) -> Fmu:
 @pytest.fixture
 def rov(fmu: Fmu) -> Vehicle:
     """Return the vehicle of the FMU."""
-    return next(rov for rov in ROVS.values() if set(rov.layout.inputs) == set(fmu.inputs))
+    return next(rov for rov in ROVS.values() if {*rov.layout.state, *rov.layout.calculated} == {*fmu.outputs})
 
 
 def given(fmu: Fmu) -> list[str]:
@@ -89,6 +98,12 @@ def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> AnyInst
 
 
 # ---- Directional derivatives ----
+
+
+def calculated(rov: Vehicle, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return every output and every derivative of a vehicle, with how far it is outside of its identified ranges."""
+    found = rigid_vehicle.calculated(rov, values)
+    return found | ({"outside": excess({**values, **found}, TILTED)} if rov.layout.outside else {})
 
 
 _SLOPES: dict[tuple[Any, ...], dict[str, float]] = {}
@@ -139,10 +154,15 @@ def kinks(rov: Vehicle, point: Values) -> Iterator[tuple[State, str, int]]:
                 yield edge, dead_band, 1
     for velocity in layout.velocities:
         yield {**point, velocity: 0.0}, velocity, 1
+    for name, low, high in layout.identified:
+        if name in layout.velocities:
+            calm = {**still, **dict.fromkeys((*layout.velocities, *layout.initial), 0.0)}
+            yield {**calm, name: low}, name, 1
+            yield {**calm, name: high}, name, -1
 
 
 def test_at_a_kink_the_derivative_is_one_sided(fmu: Fmu, rov: Vehicle) -> None:
-    """The side is a command within ±1, a wider dead band, and a positive velocity."""
+    """The side is a command within ±1, a wider dead band, a positive velocity, or within an identified range."""
     for kink, known, inside in kinks(rov, *points(fmu, 1, seed=9)):
         with at_point(fmu, CO_SIMULATION, INITIALIZATION, kink) as instance:
             check_slopes(rov, instance, kink, known, inside)

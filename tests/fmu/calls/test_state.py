@@ -2,15 +2,11 @@
 
 import ctypes
 import struct
-import subprocess
-import sys
 from ctypes import c_void_p
-from pathlib import Path
 
 import pytest
 
 from tests import fmi3
-from tests.commands import ROOT
 from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
@@ -79,42 +75,6 @@ def test_a_state_restored_in_its_own_run_or_in_another_instance_repeats_the_run(
             assert one.save() == saved
             assert run(one, 10, 20) == rest
             one.step(1.0, 0.6, ERROR)  # past its stop time
-
-
-_ELSEWHERE = """
-import sys; from pathlib import Path; from tests import fmi3; from tests.fmu.calls.test_state import run
-with fmi3.Fmu(Path(sys.argv[1])).instance(name='elsewhere') as rov:
-    rov.load(Path(sys.argv[2]).read_bytes())
-    sys.stdout.write(run(rov, 10, 20).hex())
-"""
-
-
-def test_a_run_continues_in_another_process(fmu3: fmi3.Fmu, tmp_path: Path) -> None:
-    saved = tmp_path / "state"
-    with fmu3.instance() as rov:
-        saved.write_bytes(midway(rov))
-        rest = run(rov, 10, 20)
-    command = [sys.executable, "-c", _ELSEWHERE, str(fmu3.folder), str(saved)]
-    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    assert bytes.fromhex(result.stdout) == rest
-
-
-def test_instances_that_step_in_turns_give_the_same_bits_as_alone(fmu: Fmu) -> None:
-    alone = []
-    for start in (disturbed(fmu), {}):
-        with fmu.instance(name="alone") as rov:
-            rov.start(start)
-            alone.append(run(rov, 0, 20))
-    with fmu.instance(name="a") as a, fmu.instance(name="b") as b, fmu.instance(MODEL_EXCHANGE, name="c") as c:
-        a.start(disturbed(fmu))
-        b.start()
-        c.start({"u": -3.0})
-        together = [b"", b""]
-        for i in range(20):
-            together[0] += run(a, i, i + 1)
-            c.set(inputs(fmu, i))
-            together[1] += run(b, i, i + 1)
-    assert together == alone
 
 
 # ---- The content of a state ----

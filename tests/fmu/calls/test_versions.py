@@ -5,7 +5,7 @@ import random
 import pytest
 
 from tests import fmi2, fmi3
-from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, AnyInstance, reals
+from tests.fmi import AnyInstance, reals
 
 _FOLDERS = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
 """The fixtures with the FMUs of two vehicles in both versions."""
@@ -45,20 +45,3 @@ def test_co_simulation_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu], step
             runs.append(run(rov, steps))
     assert runs[0] == runs[1]
     assert len(set(runs[0])) == steps
-
-
-def test_model_exchange_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu]) -> None:
-    assert both[0].states == both[1].states
-    n, seen = len(both[0].states), []
-    for fmu in both:
-        rng = random.Random(8)
-        with fmu.instance(MODEL_EXCHANGE) as rov:
-            rov.reach(CONTINUOUS)
-            for _ in range(300):
-                rov.set(inputs(rov, rng))
-                rov.expect("SetContinuousStates", reals(*(rng.uniform(-2.0, 2.0) for _ in range(n))), n)
-                rates = reals(*[0.0] * n)
-                rov.expect("GetContinuousStateDerivatives", rates, n)
-                seen.append(bytes(rates))
-    assert seen[:300] == seen[300:]
-    assert len(set(seen)) == 300

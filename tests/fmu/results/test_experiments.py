@@ -32,7 +32,7 @@ def read(
         for unit, value in (("m", "2"), ("kg", "2"), ("", "many")):
             text = f'<ParameterSet><Parameter name="k"><Real value="{value}" unit="{unit}"/></Parameter></ParameterSet>'
             archive.writestr(f"{FOLDER}/{unit or 'word'}.ssv", text.replace(' unit=""', ""))
-    kinds = {"y": "Real", "k": "Real", "vector": "Real"}
+    kinds = {"y": "Real", "k": "Real", "vector": "Real", "word": "String"}
     variables = [
         SimpleNamespace(name=name, type=kind, unit="m", dimensions=[3] if name == "vector" else [])
         for name, kind in kinds.items()
@@ -89,6 +89,9 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
             "a.exp: experiment 'a': must go on from its start, in steps, with a tolerance",
         ),
         ({"attributes": 'tolerance="0"'}, "a.exp: experiment 'a': must go on from its start"),
+        ({"attributes": 'stepSize="-1"'}, "a.exp: experiment 'a': must go on from its start"),
+        ({"y": bytes(20_000_001)}, "y.csv: has 20 MB; at most 20 MB are read"),
+        ({"y": b"time,word\n0,1\n"}, "y.csv, line 1, column 'word': the variable is not a single number"),
         ({"inside": f"{_REFERENCES}<Zeal/><Other/>"}, "a.exp: experiment 'a': Other, Zeal cannot be run"),
         ({"inside": '<Parameters source="kg.ssv"/>'}, "kg.ssv: parameter 'k': is in kg, and not in m"),
         ({"inside": '<Parameters source="no.ssv"/>'}, "no.ssv: parameter 'k': has no value"),
