@@ -16,6 +16,7 @@ from rov_fmu.fmu.claims import measures
 from rov_fmu.fmu.claims.runs import Answer, Plan, RunError
 from rov_fmu.fmu.claims.subject import Subject
 from rov_fmu.fmu.experiments import Experiment
+from rov_fmu.fmu.proof import Finding
 from rov_fmu.io.csv_table import Series
 
 _VARIABLES = {"X_ext": "input", "u": "output", "der(u)": "local", **dict.fromkeys(("a_d_u", "F_0_u"), "parameter")}
@@ -63,6 +64,9 @@ def test_the_experiment_with_the_most_held_inputs_is_run() -> None:
     found = subject(_unasked, still, ramp, _TWO_PIECES)
     assert found.plan == Plan(0.0, ((1.0, {"X_ext": 1.0}), (2.0, {"X_ext": -1.0})), {"k": "2"}, ["u"])
     assert (found.allowed, found.words) == (1e-3, "the experiment held (2 s)")
+    two = Series(time=array("d", (0.0, 1.0, 1.0)), X_ext=array("d", (0.0, 0.0, 1.0)), u=array("d", (0.0, 0.0, 1.0)))
+    more = replace(_TWO_PIECES, name="more", stimuli=two, stop=1.0)
+    assert subject(_unasked, _TWO_PIECES, more, _TWO_PIECES).words == "the experiment more (1 s)"
     late = replace(_TWO_PIECES, start=0.5, stop=0.75)
     assert subject(_unasked, late).plan.pieces == ((0.75, {"X_ext": 1.0}),)
 
@@ -97,6 +101,24 @@ def test_why_an_fmu_cannot_be_run_is_told(given: Mapping[str, Any], reason: str)
     for measure in (measures.step_size, measures.repeatability, measures.cost, measures.conservation, measures.limits):
         found = measure(subject(_unasked, **given))
         assert (found.result, found.sentence) == ("does not apply", reason)
+
+
+@pytest.mark.parametrize(("count", "off", "rows"), [(12, 1e-9, 12), (13, 1e-9, 0), (13, 2e-9, 13)])
+def test_of_each_experiment_the_worst_variable_is_told(
+    count: int, off: float, rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    near = {"x": 2e-10, "y": 5e-10, "z": 1e-10}
+    found = [Finding(f"e{n}", name, near[name], 1e-9) for n in range(count) for name in near]
+    found[1] = replace(found[1], deviation=off)
+    monkeypatch.setattr(measures, "compare", lambda _: found)
+    evidence = measures.expected(subject(_unasked, _TWO_PIECES))
+    is_wrong = off > 1e-9
+    words = f"{len(found) - is_wrong} of {len(found)} results of {count} experiments are as expected, within 1e-09 of "
+    words += "the largest value of each variable."
+    assert evidence.sentence == words + " Experiment e0: y deviates by 2.0e-09." * is_wrong
+    assert (evidence.result, evidence.figure) == ("fails" if is_wrong else "holds", f"{off:.1e}")
+    assert [*evidence.rows] == [(f"e{n}", "y", f"{5e-10 if n else off:.1e}", "1e-09") for n in range(rows)]
+    assert evidence.curve == {"deviations": [off, *[5e-10] * (count - 1)], "tolerance": [1e-9] * count}
 
 
 # ---- Runs ------------------------------------------------------------------------------------------------------------

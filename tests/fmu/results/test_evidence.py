@@ -231,6 +231,8 @@ def test_files_that_were_added_or_taken_away_are_named(
     with zipfile.ZipFile(fmu, "a") as twice, pytest.warns(UserWarning, match="Duplicate name"):
         twice.writestr("a", b"2")
     assert refused(fmu) == "'a' is 2 times in the archive\n"
+    said = refused(_write(fmu, {META_DATA: bytes(20_000_001)}), code=2)
+    assert said == f"{META_DATA}: has 20 MB; at most 20 MB are read\n"
 
 
 def test_a_byte_changed_in_the_archive_itself_names_the_file(

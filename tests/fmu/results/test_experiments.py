@@ -89,7 +89,7 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
             "a.exp: experiment 'a': must go on from its start, in steps, with a tolerance",
         ),
         ({"attributes": 'tolerance="0"'}, "a.exp: experiment 'a': must go on from its start"),
-        ({"attributes": 'stepSize="-1"'}, "a.exp: experiment 'a': must go on from its start"),
+        ({"attributes": 'stopTime="-2" stepSize="-1"'}, "a.exp: experiment 'a': must go on from its start"),
         ({"y": bytes(20_000_001)}, "y.csv: has 20 MB; at most 20 MB are read"),
         ({"y": b"time,word\n0,1\n"}, "y.csv, line 1, column 'word': the variable is not a single number"),
         ({"inside": f"{_REFERENCES}<Zeal/><Other/>"}, "a.exp: experiment 'a': Other, Zeal cannot be run"),
