@@ -149,6 +149,15 @@ def test_a_long_step_of_a_steady_turn_is_many_short_ones(rov: Vehicle) -> None:
         assert once == pytest.approx(often, rel=1e-11, abs=1e-11), end
 
 
+def test_a_long_step_of_a_vehicle_that_does_not_turn_goes_straight_on() -> None:
+    """The Heavy sinks by its net weight."""
+    begin, end = in_c(HEAVY, still(HEAVY), at_rest(HEAVY), [0.0, 300.0, 600.0]).T[1:]
+    w, z = (HEAVY.layout.places[name] - HEAVY.layout.places["u"] for name in "wz")
+    assert end[z] - begin[z] == pytest.approx(300.0 * begin[w], rel=1e-12)
+    assert [*np.delete(end, z)] == pytest.approx([*np.delete(begin, z)], abs=1e-14)
+    assert begin[w] > 0.01
+
+
 def test_psi_and_the_sign_of_the_quaternion_do_not_depend_on_the_steps() -> None:
     """Some vehicles begin beyond a pitch of 90 degrees, and some pitch through the vertical without another motion."""
     rng = random.Random(8)

@@ -15,7 +15,7 @@ import rov_fmu
 from rov_fmu.c import compile as build_options
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
-from rov_fmu.fmu.model_description import build_description, model_description
+from rov_fmu.fmu.model_description import DEAD_TIME_NOTE, PYTHON_NOTE, build_description, model_description
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
@@ -181,6 +181,19 @@ def test_an_fmu_declares_its_capabilities(fmi: int) -> None:
         declared = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
         assert declared == {"modelIdentifier": "an_rov"} | both | more
     assert root.find("ScheduledExecution") is None
+
+
+def test_the_description_says_what_an_importer_must_do() -> None:
+    rov, one = a_vehicle(ROVS["dead time"]), a_vehicle(ROVS["Heavy"])
+    for of, interface, is_native, notes in (
+        *((rov, interface, True, [DEAD_TIME_NOTE]) for interface in ("me", "both")),
+        (rov, "cs", True, []),
+        (one, "both", True, []),
+        (one, "cs", False, [PYTHON_NOTE]),
+    ):
+        offered = build_options.INTERFACES[interface]
+        xml = model_description(of, variables(of), guid="", interfaces=offered, native=is_native)
+        assert etree.fromstring(xml).get("description") == ". ".join([of.summary, *notes])
 
 
 # ---- rov-fmu build --interface ----

@@ -87,6 +87,8 @@ def test_every_kind_of_variable_is_declared_as_people_read_it() -> None:
     axes = {name for rov in rovs for name in rov.layout.tuning}
     assert {name for name, of in declared if of.tunable} == {*TUNABLE.split(), *axes}
     assert {of.start for name, of in in_pulses.layout.commands.items()} == {1500.0}
+    voltage = replace(VIDEORAY.layout, voltage=14.8).inputs["voltage"]
+    assert (said("voltage", voltage), voltage.start) == ("voltage [V] 0 … inf, 10: Voltage of the battery", 14.8)
 
 
 def test_a_coefficient_of_several_axes_has_the_unit_of_its_axes() -> None:

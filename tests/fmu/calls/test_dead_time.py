@@ -15,7 +15,6 @@ from lxml import etree
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.step import MOST_WAITING
-from rov_fmu.fmu.model_description import DEAD_TIME_NOTE
 from tests import fmi3
 from tests.equation.test_thrust_effects import ROV
 from tests.fmi import CONTINUOUS, ERROR, EVENT, MODEL_EXCHANGE, WARNING, WITH_EVENTS, AnyInstance, Fmu, reals
@@ -48,7 +47,6 @@ def updated(rov: AnyInstance) -> float | None:
 
 
 def test_commands_change_only_in_events_and_no_rate_depends_on_them(fmu: Fmu) -> None:
-    assert fmu.description.description.endswith(DEAD_TIME_NOTE)
     for name in ROV.layout.commands:
         command, acting = fmu.variables[name], fmu.variables[f"delayed_{name}"]
         assert (command.causality, command.variability) == ("input", "discrete")
