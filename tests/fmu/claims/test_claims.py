@@ -1,5 +1,6 @@
 """`rov-fmu prove --report`: every claim holds for the VideoRay, and fails for an FMU that breaks it."""
 
+import hashlib
 import re
 import zipfile
 from collections.abc import Callable, Mapping
@@ -135,7 +136,10 @@ def test_the_page_answers_ten_questions(proof: Proof, identified: Path, tmp_path
     with pytest.MonkeyPatch.context() as patched:  # the alteration is a matter of the hashes alone
         patched.setattr(claims, "CLAIMS", [one for one in CLAIMS if one.measure is measures.integrity])
         of_altered = prove_claims(path)
-    found = prove_claims(identified)
+    progress: list[tuple[str, float]] = []
+    found = prove_claims(identified, on_progress=lambda *told: progress.append(told))
+    assert progress == [(claim.name.lower(), n / len(CLAIMS)) for n, claim in enumerate(CLAIMS)]
+    assert found.digest == hashlib.sha256(identified.read_bytes()).hexdigest()
     results = [one.result for _, one in found.evidence]
     assert results == [*["holds"] * 4, "measured", "holds", "holds", "measured"]
     assert found.evidence[-1][1].figure == "do not use yaw"

@@ -32,6 +32,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.conftest import Made, without_page
 from tests.often import often
+from tests.vehicles import THRUST_EFFECTS
 
 Capsys = pytest.CaptureFixture[str]
 _REFIT = SHIPPED["videoray_refit"]
@@ -60,6 +61,32 @@ def test_a_vehicle_can_be_read_from_its_fmu(tmp_path: Path) -> None:
         assert load_vehicle(tmp_path / name) == vehicle
         assert (files[name] == source.read_bytes()) == (vehicle["a_d_u"] != 150.0)
     assert origin(replace(vehicle, path=None)) == ({}, []), "of a vehicle that was made in Python there is no file"
+
+
+ROLES = """
+bluerov2_heavy.toml: model application/toml The vehicle file
+t200_current_16_v.csv: model text/csv Measured electric current, curve t200
+thrust_effects.toml: model application/toml The vehicle file
+thrust_12_v.csv: model text/csv Measured thrust, curve main
+thrust_16_v.csv: model text/csv Measured thrust, curve main
+thrust_16_v.csv: model text/csv Measured thrust, curve bow
+videoray_refit.toml: model application/toml The vehicle file
+covariance.csv: result text/csv Standard errors and covariance of the identified coefficients
+videoray.toml: model application/toml The vehicle file
+table6_heave_response.csv: result text/csv Published table: response in heave, printed and measured
+table3_heave_steady.csv: result text/csv Published table: steady velocities in heave, printed and measured
+table7_yaw_response.csv: result text/csv Published table: response in yaw, printed and measured
+table5_yaw_steady.csv: result text/csv Published table: steady velocities in yaw, printed and measured
+table8_surge_response.csv: result text/csv Published table: response in surge, printed and measured
+table4_surge_steady.csv: result text/csv Published table: steady velocities in surge, printed and measured
+"""
+
+
+def test_each_file_has_its_role_and_its_description() -> None:
+    vehicles = (SHIPPED["bluerov2_heavy"], THRUST_EFFECTS, _REFIT, SHIPPED["videoray"])
+    found = [one for path in vehicles for one in origin(load_vehicle(path))[1]]
+    told = [f"{one.source.rpartition('/')[2]}: {one.role} {one.type} {one.description}" for one in found]
+    assert told == ROLES.strip().splitlines()
 
 
 def test_the_covariance_is_that_of_the_vehicle_file(refit: Mapping[str, bytes]) -> None:
