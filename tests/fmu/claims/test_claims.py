@@ -185,30 +185,6 @@ def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytes
     assert answers["A step past the stop time"] == "it ended its process: exit code 3"
 
 
-@pytest.mark.parametrize(
-    ("verdict", "result", "figure"),
-    [
-        ("good", "holds", "1 of 1 axes"),
-        ("usable", "holds", "1 of 1 axes"),
-        ("do not use", "measured", "do not use surge"),
-    ],
-)
-def test_the_errors_on_unseen_data_are_those_of_the_model_card(
-    verdict: str, result: str, figure: str, videoray_fmu: Path, tmp_path: Path
-) -> None:
-    card = f"Model card\n\nHow far to trust it\n- surge: {verdict}. The 95% bands contain\n  90%.\n"
-    card += "- Unseen data: surge velocity: off by 0.15 m/s (RMS) in log_3.csv, and a\n  prediction of no "
-    card += "change by 1 m/s.\n"
-    fmu = altered(videoray_fmu, {"documentation/model_card.txt": lambda _: card.encode()}, tmp_path / "other.fmu")
-    found = measured(measures.unseen, fmu)
-    assert (found.result, found.figure) == (result, figure)
-    assert found.rows == [
-        ("surge velocity", "off by 0.15 m/s (RMS) in log_3.csv, and a prediction of no change by 1 m/s")
-    ]
-    assert f"Its verdicts: surge: {verdict}." in found.sentence
-    assert ("Do not use surge: The 95% bands contain 90%." in found.sentence) == (verdict == "do not use")
-
-
 # ---- Any FMU ---------------------------------------------------------------------------------------------------------
 
 

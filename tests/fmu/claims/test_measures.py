@@ -331,3 +331,31 @@ def test_a_number_without_bounds_has_none_beyond_them() -> None:
     found = measures.limits(subject(call, bounds={"a_d_u": (-inf, inf), "F_0_u": (-3.0, inf)}))
     assert (found.rows[3][1], found.rows[4]) == ("1 of 1", ("A step of 0 s", "0 of 1", "it cannot be run"))
     assert found.figure == "4 of 8"
+
+
+# ---- What the FMU says about itself ----
+
+
+@pytest.mark.parametrize(
+    ("verdict", "result", "figure"),
+    [
+        ("good", "holds", "1 of 1 axes"),
+        ("usable", "holds", "1 of 1 axes"),
+        ("do not use", "measured", "do not use surge"),
+    ],
+)
+def test_the_errors_on_unseen_data_are_those_of_the_model_card(
+    verdict: str, result: str, figure: str, tmp_path: Path
+) -> None:
+    card = f"Model card\n\nHow far to trust it\n- surge: {verdict}. The 95% bands contain\n  90%.\n"
+    card += "- Unseen data: surge velocity: off by 0.15 m/s (RMS) in log_3.csv, and a\n  prediction of no "
+    card += "change by 1 m/s.\n"
+    (tmp_path / "documentation").mkdir()
+    (tmp_path / "documentation" / "model_card.txt").write_text(card, "utf-8")
+    found = measures.unseen(replace(subject(_unasked), folder=str(tmp_path)))
+    assert (found.result, found.figure) == (result, figure)
+    assert found.rows == [
+        ("surge velocity", "off by 0.15 m/s (RMS) in log_3.csv, and a prediction of no change by 1 m/s")
+    ]
+    assert f"Its verdicts: surge: {verdict}." in found.sentence
+    assert ("Do not use surge: The 95% bands contain 90%." in found.sentence) == (verdict == "do not use")
