@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW
 from rov_fmu.identify.given import with_axis_alone
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -192,9 +192,20 @@ assert INPUTS[0] == "u_l"
 # ---- The mean --------------------------------------------------------------------------------------------------------
 
 
+TOLD = {
+    "z": DEPTH,
+    "w": Sensor(HEAVE, is_velocity=True, over_ground=False),
+    "psi": Sensor(YAW, is_velocity=False),
+    "r": Sensor(YAW, is_velocity=True),
+    "phi": Sensor(ROLL, is_velocity=False),
+    "theta": Sensor(PITCH, is_velocity=False),
+}
+"""Sensors by the variable that they should show."""
+
+
 @pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
 def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
-    """Samples that tell nothing leave the mean to itself."""
+    """Samples that tell nothing leave the mean to itself. What each sensor should show is a variable of the vehicle."""
     k, random = load_vehicle(SHIPPED[name]), np.random.default_rng(3)
     layout = replace(k.layout, mix={}, pulse=None, has_dead_time=False)
     k = Vehicle(layout, {name: k[name] for name in layout.coefficients})
@@ -207,15 +218,21 @@ def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
     usual = {name: value for name, value in layout.usual_inputs.items() if name not in commands}
     rest, exact = layout.at_rest, dict.fromkeys(layout.state, 1e-9)
     water = usual | {"V_N": 0.2, "V_E": -0.1}
-    log = Record((VELOCITY,), time, 0.0 * time, np.zeros(len(time), np.intc), told, told, numbers, rest, exact)
-    known = parameters(k, 1, white=(1e9,), coefficients={**k.coefficients, **water})
+    shown = [name for name in TOLD if name in {*layout.state, *layout.angles}]
+    sensor = np.arange(len(time), dtype=np.intc) % len(shown)
+    log = Record(tuple(TOLD[name] for name in shown), time, 0.0 * time, sensor, told, told, numbers, rest, exact)
+    known = parameters(k, len(shown), white=(1e9,) * len(shown), coefficients={**k.coefficients, **water})
     found = Filter(k).run(log, known, with_states=True)
     held = np.searchsorted(told, time, side="right") - 1
     given = {name: values[held] for name, values in commands.items()}
-    motion = simulate(k, time, {**given, **water, **rest}).values[:, 0]
+    run_of = simulate(k, time, {**given, **water, **rest}, [*layout.state, *shown]).values[:, 0]
+    motion, variables = run_of[: len(layout.state)], run_of[len(layout.state) :]
     scale = np.maximum(np.ptp(motion, axis=1), 1e-3)
     assert (np.abs(found.states[:, : len(motion)].T - motion).max(axis=1) < 1e-3 * scale).all()
     assert np.ptp(motion[0]) > 0.1
+    off = variables[sensor, np.arange(len(time))] + found.innovations
+    assert np.abs(np.remainder(off + pi, 2.0 * pi) - pi).max() < 1e-3
+    assert np.ptp(variables, axis=1).min() > 0.01
 
 
 def test_diverging_motion_is_an_error() -> None:
