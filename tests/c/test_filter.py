@@ -235,6 +235,20 @@ def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
     assert np.ptp(variables, axis=1).min() > 0.01
 
 
+def test_a_measured_tilt_turns_the_net_weight_and_the_way() -> None:
+    """Of a vehicle without roll and pitch; the tilt is the same from the first to the last sample."""
+    share, sensors = cos(0.5) * cos(0.3), (TOLD["w"], DEPTH)
+    log = record(sensors, [(t, n) for t in (0.25 * np.arange(20.0)).tolist() for n in (0, 1)])
+    tilt = np.array([[0.0, 5.0], [0.5, 0.5], [0.3, 0.3]])
+    tilted, level = (
+        -Filter(k).run(one, parameters(k, 2), begin=0.0).innovations
+        for k, one in ((LAGGING, replace(log, tilt=tilt)), (heave(T_top=0.2, F_0_w=0.1 * share), log))
+    )
+    assert tilted[::2] == pytest.approx(level[::2], rel=1e-9)
+    assert tilted[1::2] - START["z"] == pytest.approx(share * (level[1::2] - START["z"]), abs=1e-9)
+    assert np.ptp(level[1::2]) > 0.1
+
+
 def test_diverging_motion_is_an_error() -> None:
     log = record((DEPTH,), [(t, 0) for t in np.arange(0.0, 5.0, 0.1).tolist()])
     known = parameters(LAGGING, 1)
