@@ -20,7 +20,7 @@ from rov_fmu.equation.catalogue import (
 )
 from rov_fmu.equation.layout import Direction, Position, arm, effect_along
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VIDEORAY, fin, pulsed, thruster
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VIDEORAY, fin, pulsed, thruster, with_axes
 
 # ---- Declarations ----
 
@@ -87,6 +87,7 @@ def test_every_kind_of_variable_is_declared_as_people_read_it() -> None:
     axes = {name for rov in rovs for name in rov.layout.tuning}
     assert {name for name, of in declared if of.tunable} == {*TUNABLE.split(), *axes}
     assert {of.start for name, of in in_pulses.layout.commands.items()} == {1500.0}
+    assert [[*with_axes(axes).layout.pose][:-4] for axes in ("pr", "wq")] == [[], ["x", "y", "z"]]
     voltage = replace(VIDEORAY.layout, voltage=14.8).inputs["voltage"]
     assert (said("voltage", voltage), voltage.start) == ("voltage [V] 0 … inf, 10: Voltage of the battery", 14.8)
 
