@@ -30,32 +30,6 @@ def told_at(time: float, **values: float) -> list[tuple[float, Any]]:
     return [(time, parameter(name, value)[1]) for name, value in values.items()]
 
 
-SERVO5 = {"SERVO5_MIN": 1000.0, "SERVO5_TRIM": 1480.0, "SERVO5_MAX": 2000.0, "SERVO5_REVERSED": 1.0}
-
-
-@pytest.mark.parametrize(
-    ("values", "expected", "sentence"),
-    [
-        ({}, 0.5, ""),
-        ({"MOT_PWM_MIN": 1000, "MOT_PWM_MAX": 2000}, 0.4, "full thrust is 1000 and 2000 us, and no thrust 1500 us"),
-        ({"MOT_5_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0}, -0.5, "reverse the thrusters 5"),
-        (SERVO5, -(1700 - 1480) / 520, "reverse the thrusters 5"),
-        ({**SERVO5, "MOT_PWM_TYPE": 8.0}, -0.4, "reverse the thrusters 5"),
-        ({**SERVO5, "MOT_PWM_TYPE": 0.0}, 0.5, ""),
-        ({**SERVO5, "MOT_5_DIRECTION": -1.0}, (1700 - 1480) / 520, ""),
-    ],
-    ids=["none", "range", "direction", "servo", "servo without trim", "motor alone", "reversed twice"],
-)
-def test_parameters_define_the_commands(
-    values: dict[str, float], expected: float, sentence: str, tmp_path: Path
-) -> None:
-    log = dive(tmp_path / "a.tlog", 1700, *told_at(1.0, **values))
-    assert commanded(log, "5")[-1] == pytest.approx(expected)
-    assert commanded(log, "5")[0] == pytest.approx(0.0, abs=0.05)
-    assert sentence in told(log)
-    assert ("reverse the thrusters" in told(log)) == (expected < 0.0)
-
-
 def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
     values = {"MOT_5_DIRECTION": 1.0, "MOT_6_DIRECTION": 1.0, "MOT_PWM_MIN": 1100.0, "MOT_PWM_MAX": 1900.0}
     log = dive(

@@ -24,7 +24,7 @@ from tests.tank.logs import commanded, used
 from tests.tank.readers import motion, test_mavlink, writers
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
 from tests.tank.readers.test_mavlink import N
-from tests.tank.readers.writers import BOOT, ENU, FLU, Ros, ULogWriter, dataflash, packed, rcou, write_tlog
+from tests.tank.readers.writers import BOOT, Ros, dataflash, packed, rcou, write_tlog
 
 ROS = Ros(2)
 
@@ -57,50 +57,6 @@ def pulses(topic: str = "/rc/out") -> Iterator[tuple[str, float, Any]]:
 def numbers(topic: str, values: Iterable[float]) -> Iterator[tuple[str, float, Any]]:
     for time, value in zip(TIME, values, strict=True):
         yield topic, time, ROS.store.types["std_msgs/msg/Float64"](data=float(value))
-
-
-# ---- Frames ----------------------------------------------------------------------------------------------------------
-
-
-def twists(topic: str, frame: str, velocities: Array) -> Iterator[tuple[str, float, Any]]:
-    for time, velocity in zip(TIME, velocities, strict=True):
-        twist = ROS.message("geometry_msgs/msg/Twist", linear=ROS.vector("Vector3", velocity))
-        yield topic, time, ROS.message("geometry_msgs/msg/TwistStamped", header=ROS.header(time, frame), twist=twist)
-
-
-def imu(topic: str = "/imu") -> Iterator[tuple[str, float, Any]]:
-    for time, R in zip(TIME, DIVE.rotation, strict=True):
-        orientation = ROS.quaternion(ENU @ R @ FLU)
-        header = ROS.header(time, "imu_link")
-        yield topic, time, ROS.message("sensor_msgs/msg/Imu", header=header, orientation=orientation)
-
-
-@pytest.mark.parametrize("frame", ["map", "world_ned"])
-def test_a_twist_in_a_frame_of_the_earth_is_rotated_by_the_attitude(frame: str, tmp_path: Path) -> None:
-    earth = DIVE.over_ground @ (np.eye(3) if "ned" in frame else ENU)
-    messages = [*pulses(), *twists("/velocity_local", frame, earth), *imu()]
-    log = one(ROS.write(tmp_path, messages))
-    assert values(log, "surge velocity") == pytest.approx(motion.U, abs=1e-6)
-    assert values(log, "sway velocity") == pytest.approx(motion.V, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda n, _: ENU @ DIVE.over_ground[n], "unless it is in a frame of the earth, not of the body"),
-        (lambda _, v: 2.0 * v, "by its scale, signs or axes"),
-        (lambda _, v: v * [1.0, -1.0, -1.0], "by its scale, signs or axes"),
-    ],
-    ids=["of the earth", "scale", "signs"],
-)
-def test_a_twist_that_contradicts_the_positions_is_a_finding(change: Any, words: str, tmp_path: Path) -> None:
-    messages = [*writers.messages_of(ROS, DIVE)]
-    for n, (_, _, odometry) in enumerate(m for m in messages if m[0] == "/odom"):
-        velocity = FLU @ [motion.U[n], motion.V[n], motion.W[n]]
-        odometry.twist.twist.linear = ROS.vector("Vector3", change(n, velocity))
-    log = one(ROS.write(tmp_path, messages))
-    assert words in reason(log, "surge velocity", "/odom")
-    assert "/odom is left out for surge velocity, sway velocity" in told(log)
 
 
 # ---- What is no measurement, and what is no command ------------------------------------------------------------------
@@ -182,53 +138,6 @@ def test_the_primary_core_of_the_filter_is_used_while_it_is_primary(tmp_path: Pa
     assert "XKF4" not in dict(log.unread)
 
 
-# ---- PX4 -------------------------------------------------------------------------------------------------------------
-
-
-def two_modules(folder: Path, **functions: int) -> Path:
-    """Write instance 0 with eight sweeping lights and servos, and instance 1 with the six motors."""
-    log = ULogWriter()
-    kept = log.content
-    for name, value in functions.items():
-        key = f"int32_t {name}".encode()
-        log._add(b"P", bytes([len(key)]) + key + struct.pack("<i", value))
-    parameters = log.content[len(kept) :]
-    start = kept.index(b"A", 16)
-    first = kept.index(struct.pack("<H", 3 + len(b"actuator_motors")) + b"A" + struct.pack("<BH", 0, 0))
-    assert start
-    log.content = kept[:first] + parameters + kept[first:]
-    log._add(b"A", struct.pack("<BH", 1, 50) + b"actuator_outputs")
-    for n, time in enumerate(TIME):
-        lights = [1500.0 + 400.0 * np.sin(time + k) for k in range(8)]
-        motors = [1500.0 + 400.0 * c[n] for c in motion.THRUSTERS.values()]
-        log.message("actuator_outputs", time, 8, *[0] * 4, *lights, *[0.0] * 8)
-        packed_motors = struct.pack("<QI4B16f", round((100.0 + time) * 1e6), 6, *[0] * 4, *motors, *[0.0] * 10)
-        log._add(b"D", struct.pack("<H", 50) + packed_motors)
-        log.message("vehicle_local_position", time, 0.0, 0.0, motion.DEPTH[n], 0.0, 0.0, 0.1, True)
-    return log.write(folder / "a.ulg")
-
-
-@pytest.mark.parametrize(
-    ("functions", "instance"),
-    [
-        ({}, 1),
-        ({"PWM_MAIN_FUNC1": 420, "PWM_AUX_FUNC1": 101, "PWM_AUX_FUNC2": 102}, 1),
-        ({"PWM_MAIN_FUNC1": 0, "PWM_AUX_FUNC1": 101}, 0),
-        ({f"PWM_MAIN_FUNC{n}": 100 + n for n in range(1, 7)} | {"PWM_AUX_FUNC1": 420}, 0),
-    ],
-    ids=["as many outputs as thrusters", "AUX", "AUX alone", "MAIN"],
-)
-def test_the_module_that_drives_the_motors(functions: dict[str, int], instance: int, tmp_path: Path) -> None:
-    log = one(two_modules(tmp_path, **functions))
-    assert log.commands is not None
-    assert log.commands.source.part == f"instance {instance}"
-    assert f"(instance {instance}); not used: actuator_outputs" in told(log)
-    keys = LogKeys(outputs="actuator_outputs")
-    chosen = one(two_modules(tmp_path, **functions), keys)
-    assert chosen.commands is not None
-    assert chosen.commands.source.part == "instance 0"
-
-
 # ---- Pressures -------------------------------------------------------------------------------------------------------
 
 
@@ -283,11 +192,3 @@ def test_pressures_that_tell_no_depth(low: float, high: float, reason: str) -> N
     assert not pressure.unused
     assert depth.unused.startswith(reason)
     assert bool(depth.unused) == bool(reason)
-
-
-@pytest.mark.parametrize("outputs", [[799.0, 1500.0], [2201.0, 0.0], [1.01, 0.2]])
-def test_outputs_that_are_neither_pulses_nor_fractions_are_refused(outputs: list[float], tmp_path: Path) -> None:
-    message = ROS.message("std_msgs/msg/Float64MultiArray", data=np.array(3 * outputs))
-    path = ROS.write(tmp_path, [("/thrusters", time, message) for time in TIME])
-    with pytest.raises(DataFileError, match=r"are neither fractions within -1 \.\.\. 1 nor pulses in us: name their"):
-        one(path)

@@ -245,8 +245,10 @@ ULOG_CODES = {"float": "f", "uint64_t": "Q", "uint32_t": "I", "uint8_t": "B", "b
 class ULogWriter:
     """Collects messages."""
 
-    def __init__(self) -> None:
+    def __init__(self, **parameters: int) -> None:
         self.content = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", round(ULOG_BOOT * 1e6))
+        for name, value in parameters.items():
+            self.parameter(name, value)
         for name, fields in ULOG_FORMATS.items():
             self._add(b"F", f"{name}:uint64_t timestamp;{fields};".encode())
         for n, name in enumerate(ULOG_FORMATS):
@@ -254,6 +256,10 @@ class ULogWriter:
 
     def _add(self, kind: bytes, payload: bytes) -> None:
         self.content += struct.pack("<H", len(payload)) + kind + payload
+
+    def parameter(self, name: str, value: int) -> None:
+        key = f"int32_t {name}".encode()
+        self._add(b"P", bytes([len(key)]) + key + struct.pack("<i", value))
 
     def message(self, name: str, time: float, *values: float) -> None:
         form = ""
@@ -269,9 +275,11 @@ class ULogWriter:
         return path
 
 
-def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True) -> ULogWriter:
+def ulog_of(
+    dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True, **parameters: int
+) -> ULogWriter:
     """Return the messages of a dive. The attitude is published 2 ms after it was sampled, or stands in the odometry."""
-    log = ULogWriter()
+    log = ULogWriter(**parameters)
     for n, time in enumerate(dive.time):
         if pulses:
             log.message("actuator_outputs", time, 6, *[0] * 4, *dive.pulses[n], *[0.0] * 10)
