@@ -1,5 +1,6 @@
 """What units, messages and unknown headers mean, each with numbers that somebody else would compute, too."""
 
+from collections.abc import Iterable, Mapping
 from math import pi
 from pathlib import Path
 
@@ -95,3 +96,47 @@ def test_the_numbers_tell_the_likely_unit_of_a_header(title: str) -> None:
     for number, meant in LARGEST[title].items():
         _, columns = guessed([title], {title: np.full(3, number)}, None, [])
         assert columns.get(title) == meant, number
+
+
+GUESSED: dict[str, tuple[Mapping[str, Iterable[float]], Mapping[str, str]]] = {
+    "at most 32 thrusters": (
+        {f"thr{n}": [0.0, 1.0] for n in range(1, 34)},
+        {f"thr{n}": f"u_{n} [1]" for n in range(1, 33)},
+    ),
+    "rests at 1500": ({"a": [1000.0, 1500.0, 1500.0, 2000.0]}, {"a": "u_a [us]"}),
+    "below the usual pulses": ({"a": [999.0, 1500.0, 1500.0]}, {}),
+    "above the usual pulses": ({"a": [2001.0, 1500.0, 1500.0]}, {}),
+    "the first that rises for 50 rows": ({"a": range(50), "b": [1.0] * 50, "c": range(50)}, {"a": "time [s]"}),
+    "49 rows": ({"a": range(49)}, {}),
+    "repeated": ({"a": [*range(49), 48]}, {}),
+    "with a unit": ({"a [m]": range(50), "b [ms]": range(50)}, {"b [ms]": "time [ms]"}),
+    "5 s": ({"t": np.arange(9) * 5.0}, {"t": "time [s]"}),
+    "6 ms": ({"t": np.arange(9) * 6.0}, {"t": "time [ms]"}),
+    "many seconds": ({"t": [0.0, 2e9]}, {"t": "time [s]"}),
+    "a quaternion": ({f"orientation.{letter}": [0.5] for letter in "xyzw"}, {}),
+    "angles": (
+        {f"orientation.{letter}": [0.5] for letter in "xyz"},
+        {
+            "orientation.x": "roll angle [rad]",
+            "orientation.y": "pitch angle [rad]",
+            "orientation.z": "heading [rad]",
+        },
+    ),
+    "an upward position": (
+        {"pos z": [-1.0, -2.0, 0.5], "vel y [m/s]": [1.0], "depth": [1.0]},
+        {"pos z": "-depth [m]", "vel y [m/s]": "-sway velocity [m/s]"},
+    ),
+    "symbols beside forces": (
+        {"X_ext": [1.0], "u": [1.0], "r": [9.0]},
+        {"X_ext": "X_ext [N]", "u": "surge velocity [m/s]", "r": "yaw velocity [rad/s]"},
+    ),
+}
+"""Unknown headers with their numbers, and what they seem to mean."""
+
+
+@pytest.mark.parametrize("case", GUESSED)
+def test_headers_of_several_columns(case: str) -> None:
+    given, meant = GUESSED[case]
+    numbers = {title: np.array([*values], float) for title, values in given.items()}
+    _, columns = guessed([*numbers], numbers, None, [])
+    assert columns == meant

@@ -4,49 +4,47 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.identify.beginning import load_tests
-from rov_fmu.io.csv_table import DataFileError
-from tests.commands import TESTS
+from rov_fmu.equation.catalogue import AXES, HEAVE
+from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.io.csv_table import DataFileError, read_columns
+from rov_fmu.tank.columns import columns_of, columns_of_log, known_columns
+from tests.vehicles import VIDEORAY
 
-_THRUST, _HEAVE = ("thrust_rear", "command [%],force [N]"), ("steady_heave", "command [%],velocity [m/s]")
-_YAW, _TAU = ("steady_yaw", "command [%],velocity [rad/s]"), ("time_constant_yaw", "command [%],time constant [s]")
-_DEPTH, _SPEED = ("log_heave", "time [s],command [%],depth [m]"), ("log_surge", "time [s],command [%],velocity [m/s]")
-
-_VOLTAGE, _PRESSURE = ((_DEPTH[0], f"{_DEPTH[1]},{column}") for column in ("voltage [V]", "pressure [Pa]"))
+COLUMNS = {
+    **{kind: columns_of(kind) for kind in ("thrust", "steady", "time_constant")},
+    "log": known_columns(columns_of_log(VIDEORAY.layout, HEAVE)),
+    "wrench": known_columns(columns_of_log(Layout.of_wrench(map(VehicleAxis, AXES.values())), None)),
+}
 
 
 @pytest.mark.parametrize(
-    ("table", "within", "beyond"),
+    ("file", "title", "within", "beyond"),
     [
-        (_THRUST, "-100,-1", "-100.01,-1"),
-        (_THRUST, "50,1e6", "50,1000001"),
-        (_THRUST, "0.01,1", "0.0099,1"),
-        *((table, "-50,-1e3", "-50,-1000.1") for table in (_HEAVE, _YAW)),
-        *((table, "50,1e-5", "50,9.9e-6") for table in (_HEAVE, _YAW)),
-        (_TAU, "50,1e5", "50,100001"),
-        (_TAU, "50,1e-4", "50,9.9e-5"),
-        (_DEPTH, "-1e10,0,0", "-1.0001e10,0,0"),
-        *((_DEPTH, f"0,0,{sign}1e7", f"0,0,{sign}10000001") for sign in ("", "-")),
-        *((_VOLTAGE, f"0,0,0,{end}", f"0,0,0,{beyond}") for end, beyond in ((0, -1), ("1e4", 10001))),
-        *((_PRESSURE, f"0,0,0,{end}", f"0,0,0,{beyond}") for end, beyond in ((0, -1), ("1e9", 1000000001))),
-        (_SPEED, "0,0,1e3", "0,0,1000.1"),
-        (_SPEED, "0,0.001,1e-9", "0,100.1,1e-9"),
+        ("thrust", "command [%]", "-100", "-100.01"),
+        ("thrust", "command [%]", "100", "100.01"),
+        ("thrust", "command [%]", "0.01", "0.0099"),
+        ("thrust", "force [N]", "-1e6", "-1000001"),
+        ("thrust", "force [N]", "1e6", "1000001"),
+        *(("steady", f"velocity [{unit}]", "-1e3", "-1000.1") for unit in ("m/s", "rad/s")),
+        ("steady", "velocity [m/s]", "1e3", "1000.1"),
+        ("steady", "velocity [m/s]", "-1e-5", "-9.9e-6"),
+        ("time_constant", "time constant [s]", "1e5", "100001"),
+        ("time_constant", "time constant [s]", "1e-4", "9.9e-5"),
+        *(("log", "time [s]", f"{sign}1e10", f"{sign}1.0001e10") for sign in ("", "-")),
+        *(("log", "depth [m]", f"{sign}1e7", f"{sign}10000001") for sign in ("", "-")),
+        *(("log", "velocity [m/s]", f"{sign}1e3", f"{sign}1000.1") for sign in ("", "-")),
+        *(("log", "command [1]", f"{sign}1", f"{sign}1.001") for sign in ("", "-")),
+        *(("log", "voltage [V]", end, beyond) for end, beyond in (("0", "-1"), ("1e4", "10001"))),
+        *(("log", "pressure [Pa]", end, beyond) for end, beyond in (("0", "-1"), ("1e9", "1000000001"))),
+        ("wrench", "X_ext [N]", "-1e6", "-1000001"),
+        ("wrench", "torque z [N.m]", "1e6", "1000001"),
     ],
 )
-def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str, tmp_path: Path) -> None:
-    head = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")[0]
-    (tmp_path / "rov.toml").write_text(f'base = "videoray"\n{head}', encoding="utf-8")
-    name, header = table
-    rest = (
-        [f"{n},50,{1e-4 * n:g}" for n in range(1, 21)]
-        if name.startswith("log")
-        else ["60,1"]
-        if name == "thrust_rear"
-        else []
-    )
-    path = tmp_path / f"{name}.csv"
-    path.write_text("\n".join((header, within, *rest)), encoding="utf-8")
-    assert set(load_tests(tmp_path).inputs) == {"rov.toml", "videoray", path.name}
-    path.write_text("\n".join((header, beyond, *rest)), encoding="utf-8")
+def test_bounds_of_every_column(file: str, title: str, within: str, beyond: str, tmp_path: Path) -> None:
+    path, name = tmp_path / "a.csv", title.partition(" [")[0]
+    columns = {key: column for key, column in COLUMNS[file].items() if name in (key, *column.also)}
+    path.write_text(f"{title}\n{within}\n", encoding="utf-8")
+    assert [*read_columns(path, columns).values]
+    path.write_text(f"{title}\n{beyond}\n", encoding="utf-8")
     with pytest.raises(DataFileError, match="line 2, column"):
-        load_tests(tmp_path)
+        read_columns(path, columns)

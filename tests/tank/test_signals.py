@@ -1,14 +1,15 @@
-"""Headings that wrap, and scales of sensors."""
+"""Times and values of commands, headings that wrap, gaps, and scales of sensors."""
 
 from math import pi
 
 import numpy as np
 import pytest
 
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, range_in_words
+from rov_fmu.tank.clocks import in_rows
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, scales_differ, unwrapped
-from tests.tank.logs import channel
+from tests.tank.logs import channel, commands
 
 STEPS: Array = np.linspace(0.0, 19.9, 200)
 
@@ -27,6 +28,33 @@ def test_a_heading_is_unwrapped_keeps_its_blanks_and_noise_beyond_its_range_is_n
 def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() -> None:
     values = np.tile(np.linspace(-3.4, 3.4, 100), 2)
     assert unwrapped(channel("heading", STEPS, values)).tolist() == values.tolist()
+
+
+def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart() -> None:
+    cases = {
+        "empty": [np.nan],
+        "always 2": [2.0, 2.0, np.nan],
+        "-0.2 to 1.5": [1.5, -0.2],
+        "1000000 to 1000001": [1e6, 1e6 + 1],
+    }
+    cases["1 to 1.0000000000010001"] = [1.0, 1.0 + 1e-12]
+    assert {range_in_words(np.array(values)) for values in cases.values()} == {*cases}
+
+
+def test_commands_hold_for_one_more_usual_interval() -> None:
+    one = commands(np.array([3.0]), {"a": np.array([0.5])})
+    assert (one.interval, one.end, one.largest) == (0.0, 3.0, {"a": 0.5})
+    several = commands(np.array([3.0, 4.0, 6.0, 10.0]), {"a": np.array([0.1, -0.4, 0.2, 0.2]), "b": np.zeros(4)})
+    assert (several.interval, several.end, several.largest) == (2.0, 12.0, {"a": 0.4, "b": 0.0})
+    assert several.at(np.array([2.9, 3.0, 5.9])).tolist() == [[0.0, 0.0], [0.1, 0.0], [-0.4, 0.0]]
+    assert (several.time.tolist(), several.since.tolist()) == ([3.0, 3.0, 4.0, 6.0], [3.0, 3.0, 3.0, 4.0])
+
+
+def test_rows_begin_when_each_series_has_a_value() -> None:
+    series = {"a": (np.array([1.0, 3.0]), np.array([5.0, 6.0])), "b": (np.array([2.0, 4.0]), np.array([7.0, 8.0]))}
+    rows, values = in_rows(series)
+    assert rows.tolist() == [2.0, 3.0, 4.0]
+    assert {name: held.tolist() for name, held in values.items()} == {"a": [5.0, 6.0, 6.0], "b": [7.0, 7.0, 8.0]}
 
 
 def test_a_gap_is_longer_than_1_s_and_than_ten_usual_intervals() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.clocks import restart_rows, usual_delay
+from rov_fmu.tank.clocks import restart_rows, restarts, usual_delay
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.read_log import read_logs
@@ -55,6 +55,18 @@ def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
 def test_a_restart_is_ten_messages_of_times_that_come_again_or_are_all_earlier(later: Array, rows: list[int]) -> None:
     before = np.append(2.0 * np.arange(20), 100.0 + np.arange(20))
     assert restart_rows(np.append(before, later)) == rows
+
+
+def test_what_several_topics_show_at_once_is_one_restart() -> None:
+    """The last message before it arrived at 20 s and at 20.5 s, and the first one after it at 21 s and at 20.8 s."""
+    stamp = np.append(np.arange(21.0), np.arange(15.0))
+    arrival = np.append(np.arange(21.0), 21.0 + np.arange(15.0))
+    pairs = np.column_stack([stamp, arrival])
+    other = np.column_stack([stamp, arrival + 0.5])
+    other[21, 1] = 20.8
+    later = np.vstack([pairs, [[np.nan, 50.0]], np.column_stack([np.arange(10.0), 60.0 + np.arange(10.0)])])
+    assert restarts([pairs, np.empty((0, 2)), other]) == [20.8]
+    assert restarts([pairs, later]) == [21.0, 60.0]
 
 
 def test_a_delay_of_less_than_a_second_is_of_the_same_clock() -> None:
