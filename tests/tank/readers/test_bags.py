@@ -13,7 +13,7 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from tests.tank.logs import Read, axes, commanded, measured, read_log, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import ARRIVAL, ENU, FLU, Dive, Ros, messages_of
+from tests.tank.readers.writers import ARRIVAL, ENU, FLU, Dive, Ros, messages_of, outputs
 
 
 def array(ros: Ros, dive: Dive, n: int) -> Any:
@@ -99,3 +99,10 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
     assert commanded(log.log, "2") == pytest.approx(motion.THRUSTERS["2"])
     assert log.log.names >= table.keys()
+    assert log.log.commands
+    assert log.log.commands.source.topic == "/out.data[0] ... /out.data[5]"
+    messages += [("/rc/out", time, outputs(ros, DIVE, n)) for n, time in enumerate(TIME)]
+    names, _ = names_of(BLUEROV2, RovTables(topics={"/alt.z": "-depth [cm]"}))
+    found = read_log(ros.write(tmp_path / "autopilot", messages), BLUEROV2, names=names).log
+    assert commanded(found, "2") == pytest.approx(motion.THRUSTERS["2"])
+    assert (axes(found), [*found.unread]) == (["heave"], ["/out", *(f"/out.data[{n}]" for n in range(6))])

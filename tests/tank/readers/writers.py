@@ -214,7 +214,7 @@ def att(time: float, yaw: float) -> bytes:
 
 
 def flash(folder: Path, dive: Dive) -> Path:
-    messages = []
+    messages = [packed("PARM", round(dive.start * 1e6), b"MOT_1_DIRECTION", 1.0, 0.0)]
     for n, time in enumerate(dive.start + dive.time):
         degrees, stamp = np.degrees(dive.euler[n]), round(time * 1e6)
         heading = degrees[2] % 360.0
