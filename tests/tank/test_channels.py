@@ -7,8 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.channels import Topic, channels_of, frames_of
-from rov_fmu.tank.log import Channel, Source
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.channels import Topic, channels_of, frames_of, of_scalar
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.log import Channel, Log, Source
+from rov_fmu.tank.quality import checked
+from tests.tank.logs import used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
 from tests.tank.readers.writers import ENU, FLU
@@ -26,21 +30,24 @@ def found(topics: Sequence[Topic], quantity: str) -> Channel:
     return channel
 
 
-@pytest.mark.parametrize(
-    ("frames", "earth", "body"),
-    [
-        (("", ""), ENU, FLU),
-        (("map", "base_link"), ENU, FLU),
-        (("world_ned", ""), NED, NED),
-        (("world_ned", "base_link_flu"), NED, FLU),
-        (("map", "base_link_frd"), ENU, NED),
-        (("", "imu_frd"), NED, NED),
-        (("", "imu_ned"), NED, NED),
-    ],
-)
-def test_names_of_frames(frames: tuple[str, str], earth: Array, body: Array) -> None:
-    found = frames_of(Source("/odom", frames=frames))
-    assert [matrix.tolist() for matrix in found] == [earth.tolist(), body.tolist()]
+FRAMES = {
+    "; ": "ENU FLU",
+    "map; base_link": "ENU FLU",
+    "world_ned; ": "NED NED",
+    "world_ned; base_link_flu": "NED FLU",
+    "map; base_link_frd": "ENU NED",
+    "; imu_frd": "NED NED",
+    "; imu_ned": "NED NED",
+}
+"""The names of the frames of the earth and of the body, and which they are; that of the sea is NED for both."""
+
+
+@pytest.mark.parametrize("names", FRAMES)
+def test_names_of_frames(names: str) -> None:
+    earth, body = names.split("; ")
+    matrices = {"ENU": ENU, "FLU": FLU, "NED": NED}
+    expected = [matrices[word].tolist() for word in FRAMES[names].split()]
+    assert [matrix.tolist() for matrix in frames_of(Source("/odom", frames=(earth, body)))] == expected
 
 
 QUATERNION = Rotation.from_matrix(DIVE.rotation).as_quat(scalar_first=True)
@@ -101,7 +108,7 @@ def test_the_first_source_with_20_samples_that_change_is_used() -> None:
     """If there is none, it is the first."""
     time = np.arange(20.0)
     few, constant, good = (np.where(time < 19, time, np.nan), np.ones(20), time)
-    for first, second, used in (
+    for first, second, best in (
         (few, good, "CTUN"),
         (constant, good, "CTUN"),
         (good, good + 1.0, "VFR_HUD"),
@@ -109,4 +116,78 @@ def test_the_first_source_with_20_samples_that_change_is_used() -> None:
     ):
         topics = [topic("CTUN", time, "Alt", second[:, None]), topic("VFR_HUD", time, "alt", first[:, None])]
         reasons = {channel.source.topic: channel.unused for channel in channels_of(topics, None)}
-        assert reasons == dict.fromkeys(("VFR_HUD", "CTUN"), f"{used} is used") | {used: ""}
+        assert reasons == dict.fromkeys(("VFR_HUD", "CTUN"), f"{best} is used") | {best: ""}
+
+
+def test_what_is_of_another_vehicle_or_part_or_no_measurement_is_not_used() -> None:
+    """The commands are of component 1 of vehicle 1. Of its components, only 154 tells the altitude."""
+    angles = np.column_stack([motion.ROLL, motion.PITCH, motion.HEADING])
+    sources = {
+        Source("ATTITUDE", "ATTITUDE", "1", "component 154"): "component 1, which sent the commands, sent it too",
+        Source("ATTITUDE", "ATTITUDE", "1", "component 1"): "",
+        Source("ATTITUDE", "ATTITUDE", "2", "component 1"): "it is of 2, another vehicle",
+        Source("target", "ATTITUDE", "1", "component 1"): "its name has the word target, so it is no measurement of "
+        "the vehicle",
+    }
+    topics = [topic("", TIME, "roll pitch yaw", angles, source) for source in sources]
+    topics += [topic("", TIME, "alt", -motion.DEPTH[:, None], Source("VFR_HUD", "VFR_HUD", "1", "component 154"))]
+    channels = channels_of(topics, Source("RCOU", "RCOU", "1", "component 1"), ["2"])
+    assert {one.source: one.unused for one in channels if one.quantity.name == "heading"} == sources
+    assert [one.unused for one in channels if one.quantity.name == "depth"] == [""]
+
+
+def test_a_depth_sensor_and_an_imu() -> None:
+    orientation = Rotation.from_matrix(ENU @ DIVE.rotation @ FLU).as_quat()
+    fields = " ".join(f"orientation.{letter}" for letter in "xyzw")
+    imu = topic("", TIME, fields, orientation, Source("/imu", "sensor_msgs/msg/Imu"))
+    assert np.unwrap(found([imu], "heading").values) == pytest.approx(motion.HEADING)
+    assert found([imu], "pitch angle").values == pytest.approx(motion.PITCH)
+    for name, quantities in (("/bar30/depth", {"depth"}), ("/depths", set())):
+        sensor = topic("", TIME, "data", motion.DEPTH[:, None], Source(name, "std_msgs/msg/Float64"))
+        assert {channel.quantity.name for channel in channels_of([sensor], None)} == quantities
+
+
+def test_of_several_barometers_the_one_in_the_water_tells_the_depth() -> None:
+    def barometer(name: str, pascals: Array) -> Topic:
+        return topic("", TIME, "fluid_pressure", pascals[:, None], Source(name, "sensor_msgs/msg/FluidPressure"))
+
+    hull, water = barometer("/hull", 100900.0 + 15.0 * np.sin(7.0 * TIME)), barometer("/bar30", WATER)
+    alone = checked(Log("a", None, tuple(channels_of([hull], None))))
+    reason = (
+        "its pressure changes by only 3 mm of water and is that of the air, so the barometer seems to be inside the "
+    )
+    reason += "hull"
+    assert sentences(alone.findings, SENTENCES) == (
+        f"a: /hull is left out for depth: {reason}",
+        "a: pressure from /hull, 10 Hz",
+    )
+    both = checked(Log("a", None, tuple(channels_of([hull, water], None))))
+    assert used(both, "depth").values == pytest.approx(motion.DEPTH)
+    assert sentences(both.findings, SENTENCES) == (
+        "a: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water the true depth is 2.5 "
+        "% smaller",
+        "a: pressure from /bar30, 10 Hz; also in /hull, not used",
+        f"a: depth from /bar30, 10 Hz; also in /hull ({reason}), not used",
+    )
+
+
+AIR = 101325.0
+WATER = AIR + 9806.65 * motion.DEPTH
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "reason"),
+    [
+        (100.0, 0.0099 * AIR, "its pressures of 100 ... 1003 are below 1 % of an atmosphere, so they are not in Pa"),
+        (100.0, 0.0101 * AIR, ""),
+        (1.049 * AIR - 195.0, 1.049 * AIR, "its pressure changes by only 20 mm of water and is that of the air"),
+        (0.951 * AIR - 195.0, 0.951 * AIR, "its pressure changes by only 20 mm of water and is that of the air"),
+        (1.051 * AIR - 195.0, 1.051 * AIR, ""),
+        (AIR - 197.0, AIR, ""),
+    ],
+)
+def test_pressures_that_tell_no_depth(low: float, high: float, reason: str) -> None:
+    pressure, depth = of_scalar(QUANTITIES["pressure"], Source("p"), np.arange(2.0), np.array([low, high]))
+    assert not pressure.unused
+    assert depth.unused.startswith(reason)
+    assert bool(depth.unused) == bool(reason)

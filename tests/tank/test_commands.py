@@ -25,6 +25,7 @@ PX4 = PX4.format("output[0]=1500,1600 output[1]=1500,1700")
 SERVO1 = "MOT_1_DIRECTION=1 SERVO1_MIN=1000 SERVO1_TRIM=1480 SERVO1_MAX=2000"
 TWO = f"{SERVOS} 1 . servo1_raw=1500,1700 servo2_raw=1500,1400"
 ONE = f"{SERVOS} 1 . servo1_raw=1720,1240"
+VEHICLES = f"/rov_a/cmd {ARRAY} rov_a . data[0]=0,1; /rov_b/cmd {ARRAY} rov_b . data[0]=0,-1"
 COMMANDS: dict[str, tuple[str, str, str, str]] = {
     "of two rules the first": (
         f"/cmd {ARRAY} . . data[0]=-1,1; /rc/out mavros_msgs/msg/RCOut . . channels[0]=1500,1600",
@@ -43,6 +44,24 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         "a b",
         "",
         "/b/cmd: a -1 1, b 1 1",
+    ),
+    **{
+        f"no commands of {word}": (f"/esc/motor_1/{word} {NUMBER} . . data=0,0.5", "a", "", "None: : ()")
+        for word in ("duty", "rpm", "force")
+    },
+    "of two vehicles the first": (
+        VEHICLES,
+        "a",
+        "",
+        "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; [logs] of rov.toml can "
+        "name another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
+    ),
+    "a named vehicle": (VEHICLES, "a", "vehicle=rov_b", "/rov_b/cmd: a 0 -1: | rov_b is used"),
+    "an unknown vehicle": (
+        VEHICLES,
+        "a",
+        "vehicle=rov_c",
+        "log: [logs] names the vehicle 'rov_c', but the log has 'rov_a' and 'rov_b'",
     ),
     "the vehicle with most messages": (
         f"a {SERVOS.split()[1]} 7 . servo1_raw=1500,1600; b SERVO_OUTPUT_RAW 8 . servo1_raw=1500,1600,1700",
@@ -145,7 +164,9 @@ def told(found: Commanded) -> str:
 def test_commands(case: str) -> None:
     given, thrusters, words, expected = COMMANDS[case]
     pairs = dict(word.split("=") for word in words.split())
-    keys = {key: value if key == "outputs" else float(value) for key, value in pairs.items() if key.islower()}
+    keys = {
+        key: value if key in ("outputs", "vehicle") else float(value) for key, value in pairs.items() if key.islower()
+    }
     parameters = Parameters.of_pairs({key: [(0.0, float(value))] for key, value in pairs.items() if key.isupper()})
     log = Path("log"), [*topics(given)]
     try:

@@ -17,34 +17,32 @@ COLUMNS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("file", "title", "within", "beyond"),
-    [
-        ("thrust", "command [%]", "-100", "-100.01"),
-        ("thrust", "command [%]", "100", "100.01"),
-        ("thrust", "command [%]", "0.01", "0.0099"),
-        ("thrust", "force [N]", "-1e6", "-1000001"),
-        ("thrust", "force [N]", "1e6", "1000001"),
-        *(("steady", f"velocity [{unit}]", "-1e3", "-1000.1") for unit in ("m/s", "rad/s")),
-        ("steady", "velocity [m/s]", "1e3", "1000.1"),
-        ("steady", "velocity [m/s]", "-1e-5", "-9.9e-6"),
-        ("time_constant", "time constant [s]", "1e5", "100001"),
-        ("time_constant", "time constant [s]", "1e-4", "9.9e-5"),
-        *(("log", "time [s]", f"{sign}1e10", f"{sign}1.0001e10") for sign in ("", "-")),
-        *(("log", "depth [m]", f"{sign}1e7", f"{sign}10000001") for sign in ("", "-")),
-        *(("log", "velocity [m/s]", f"{sign}1e3", f"{sign}1000.1") for sign in ("", "-")),
-        *(("log", "command [1]", f"{sign}1", f"{sign}1.001") for sign in ("", "-")),
-        *(("log", "voltage [V]", end, beyond) for end, beyond in (("0", "-1"), ("1e4", "10001"))),
-        *(("log", "pressure [Pa]", end, beyond) for end, beyond in (("0", "-1"), ("1e9", "1000000001"))),
-        ("wrench", "X_ext [N]", "-1e6", "-1000001"),
-        ("wrench", "torque z [N.m]", "1e6", "1000001"),
-    ],
-)
-def test_bounds_of_every_column(file: str, title: str, within: str, beyond: str, tmp_path: Path) -> None:
+LIMITS = """
+thrust: command [%]: -100, -100.01; 100, 100.01; 0.01, 0.0099
+thrust: force [N]: -1e6, -1000001; 1e6, 1000001
+steady: velocity [m/s]: -1e3, -1000.1; 1e3, 1000.1; -1e-5, -9.9e-6
+steady: velocity [rad/s]: -1e3, -1000.1
+time_constant: time constant [s]: 1e5, 100001; 1e-4, 9.9e-5
+log: time [s]: -1e10, -1.0001e10; 1e10, 1.0001e10
+log: depth [m]: -1e7, -10000001; 1e7, 10000001
+log: velocity [m/s]: -1e3, -1000.1; 1e3, 1000.1
+log: command [1]: -1, -1.001; 1, 1.001
+log: voltage [V]: 0, -1; 1e4, 10001
+log: pressure [Pa]: 0, -1; 1e9, 1000000001
+wrench: X_ext [N]: -1e6, -1000001; 1e6, 1000001
+wrench: torque z [N.m]: 1e6, 1000001
+"""
+"""The kind of file, the header, and numbers within and beyond each limit."""
+
+
+@pytest.mark.parametrize("line", LIMITS.strip().splitlines())
+def test_bounds_of_every_column(line: str, tmp_path: Path) -> None:
+    file, title, limits = line.split(": ")
     path, name = tmp_path / "a.csv", title.partition(" [")[0]
     columns = {key: column for key, column in COLUMNS[file].items() if name in (key, *column.also)}
-    path.write_text(f"{title}\n{within}\n", encoding="utf-8")
-    assert [*read_columns(path, columns).values]
-    path.write_text(f"{title}\n{beyond}\n", encoding="utf-8")
-    with pytest.raises(DataFileError, match="line 2, column"):
-        read_columns(path, columns)
+    for within, beyond in (limit.split(", ") for limit in limits.split("; ")):
+        path.write_text(f"{title}\n{within}\n", encoding="utf-8")
+        assert [*read_columns(path, columns).values]
+        path.write_text(f"{title}\n{beyond}\n", encoding="utf-8")
+        with pytest.raises(DataFileError, match="line 2, column"):
+            read_columns(path, columns)

@@ -13,7 +13,7 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from tests.tank.logs import Read, axes, commanded, measured, read_log, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import ARRIVAL, ENU, FLU, Dive, Ros, messages_of, outputs
+from tests.tank.readers.writers import ARRIVAL, Dive, Ros, messages_of, outputs
 
 
 def array(ros: Ros, dive: Dive, n: int) -> Any:
@@ -56,28 +56,6 @@ def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:
     log = read_log(ros.write(tmp_path, messages), BLUEROV2)
     motion.check(log.log)
     assert "dive.db3: 1 damaged piece left out" in told(log)
-
-
-def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> None:
-    """The topics count from 0; the IMU measures the attitude."""
-    ros = Ros(2)
-    messages: list[tuple[str, float, Any]] = []
-    for n, (time, R) in enumerate(zip(TIME, DIVE.rotation, strict=True)):
-        number = ros.store.types["std_msgs/msg/Float64"]
-        pulse = 1500.0 + 400.0 * np.array([*motion.THRUSTERS.values()])[:, n]
-        messages += [(f"/rov/thruster{k}/input", time, number(data=float(value))) for k, value in enumerate(pulse)]
-        messages += [("/bar30/depth", time, number(data=float(motion.DEPTH[n])))]
-        header = ros.header(time, "imu_link")
-        imu = ros.message("sensor_msgs/msg/Imu", header=header, orientation=ros.quaternion(ENU @ R @ FLU))
-        messages += [("/imu", time - ARRIVAL, imu)]
-    log = read_log(ros.write(tmp_path, messages), BLUEROV2).log
-    assert axes(log) == ["heave", "roll", "pitch", "yaw"]
-    assert measured(log, "depth") == pytest.approx(motion.DEPTH)
-    assert commanded(log, "6", used(log, "depth").time) == pytest.approx(motion.THRUSTERS["6"])
-    assert measured(log, "heading") == pytest.approx(motion.HEADING, abs=1e-6)
-    late = used(log, "depth").time - used(log, "heading").time
-    assert late == pytest.approx(ARRIVAL * np.ones(len(TIME)), abs=1e-6)
-    assert measured(log, "pitch angle").min() == pytest.approx(-0.2, abs=1e-3)
 
 
 def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:

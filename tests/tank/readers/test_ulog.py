@@ -1,17 +1,15 @@
 """Logs of PX4, which the tests write in the ULog format."""
 
 import struct
-from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rov_fmu.tank.findings import Finding
 from tests.tank.logs import commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import ULogWriter, ulog_of
+from tests.tank.readers.writers import ulog_of
 
 
 @pytest.mark.parametrize("velocity", ["vehicle_local_position", "body", "earth"])
@@ -42,14 +40,3 @@ def test_velocities_that_the_filter_does_not_know_are_left_out(tmp_path: Path) -
     assert measured(read.log, "depth") == pytest.approx(0.5 * motion.DEPTH)
     assert measured(read.log, "surge velocity")[:100] == pytest.approx(motion.U, abs=1e-5)
     assert Finding("dropouts", file="a.ulg", numbers={"count": 3, "longest": 1.5}) in read.findings
-
-
-def test_disarmed_thrusters_have_the_command_0(tmp_path: Path) -> None:
-    log = ULogWriter()
-    for n, time in enumerate(TIME):
-        values: Sequence[float] = [np.nan] * 6 if n < 50 else [0.0] * 4 + [0.5, 0.5]
-        log.message("actuator_motors", time, *values, *[np.nan] * 6)
-        log.message("vehicle_odometry", time, *[0.0] * 6, motion.DEPTH[n], *[0.0] * 6, 3)
-    found = read_log(log.write(tmp_path / "a.ulg"), BLUEROV2).log
-    assert commanded(found, "5") == pytest.approx(np.where(np.arange(100) < 50, 0.0, 0.5))
-    assert not commanded(found, "1").any()
