@@ -1,6 +1,5 @@
 """Sensors that stop changing before a log ends: they are told, and the rest of the recording is used."""
 
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +8,7 @@ from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
 from rov_fmu.tank.quality import checked
-from tests.tank.logs import axes, channel, commands, log, read_log, used
-from tests.vehicles import VIDEORAY
+from tests.tank.logs import channel, commands, log, used
 
 TIME: Array = np.arange(0.0, 60.0, 0.1)
 MOVING: Array = np.minimum(TIME, 20.0)
@@ -29,34 +27,25 @@ def frozen(values: Array, at: float, value: float | None = None) -> Array:
     return np.where(at > TIME, values, last)
 
 
-@pytest.mark.parametrize("value", [None, 0.0])
-def test_what_frozen_sensors_say_is_left_out(value: float | None, tmp_path: Path) -> None:
-    """They keep their last value, or say 0, while the commands go on; the voltage goes on too."""
-    depth, turn = (frozen(noisy(seed, 0.01, 0.001), 30.0, value) for seed in (1, 2))
-    command = np.where(TIME % 8.0 < 4.0, 0.4, -0.2)
-    rows = zip(TIME, command, depth, turn, 16.0 - 0.01 * TIME, strict=True)
-    text = "time [s],u_t [1],u_l [1],u_r [1],depth [m],heading [rad],voltage [V]\n"
-    text += "".join(f"{t:.1f},{c},{c},{-c},{d:.3f},{h:.3f},{V:.2f}\n" for t, c, d, h, V in rows)
-    path = tmp_path / "pool.csv"
-    path.write_text(text, encoding="utf-8")
-    read = read_log(path, VIDEORAY.layout)
-    start = "29.9" if value is None else "30"
-    assert sentences(read.findings) == (
-        f"pool.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
-        "log or the sensor stop? Their later values are left out",
-    )
-    assert {heading(finding) for finding in read.findings} == {"Warnings"}
-    assert axes(read.log) == ["heave", "yaw"]
-    for quantity in ("depth", "heading"):
-        frozen_channel = used(read.log, quantity)
-        assert frozen_channel.time[frozen_channel.there][-1] == pytest.approx(float(start) - 0.1)
-    voltage = used(read.log, "voltage")
-    assert voltage.time[-1] == pytest.approx(59.9)
-    assert voltage.values[-1] == pytest.approx(15.4, abs=0.01)
-
-
 def channels(*values: Array) -> list[Channel]:
     return [channel(name, TIME[: len(some)], some) for name, some in zip(("depth", "heading"), values, strict=True)]
+
+
+@pytest.mark.parametrize("value", [None, 0.0])
+def test_what_frozen_sensors_say_is_left_out(value: float | None) -> None:
+    """They keep their last value, or say 0, while the voltage goes on."""
+    measured = channels(*(frozen(noisy(seed, 0.01, 0.001), 30.0, value) for seed in (1, 2)))
+    voltage = channel("voltage", TIME, 16.0 - 0.01 * TIME)
+    found = checked(log(None, *measured, voltage))
+    start = "29.9" if value is None else "30"
+    assert sentences(found.findings) == (
+        f"a.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
+        "log or the sensor stop? Their later values are left out",
+    )
+    assert {heading(finding) for finding in found.findings} == {"Warnings"}
+    for quantity in ("depth", "heading"):
+        assert used(found, quantity).samples[0][-1] == pytest.approx(float(start) - 0.1)
+    assert used(found, "voltage").values.tolist() == voltage.values.tolist()
 
 
 @pytest.mark.parametrize(

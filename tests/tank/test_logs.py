@@ -88,6 +88,7 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     depths = [measured(one, "depth") for one in log.logs]
     assert [len(depth) for depth in depths] == [600, 600]
     assert depths[1][0] == pytest.approx(6.0)
+    assert [one.file for one in log.logs] == ["log.csv", "log.csv (from 29.95 s)"]
     assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
 
 

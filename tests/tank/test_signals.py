@@ -41,20 +41,19 @@ def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart() -> None:
     assert {range_in_words(np.array(values)) for values in cases.values()} == {*cases}
 
 
-def test_commands_hold_for_one_more_usual_interval() -> None:
+def test_commands_hold_for_one_more_usual_interval_and_begin_at_0() -> None:
     one = commands(np.array([3.0]), {"a": np.array([0.5])})
-    assert (one.interval, one.end, one.largest) == (0.0, 3.0, {"a": 0.5})
+    assert (one.interval, one.end) == (0.0, 3.0)
     several = commands(np.array([3.0, 4.0, 6.0, 10.0]), {"a": np.array([0.1, -0.4, 0.2, 0.2]), "b": np.zeros(4)})
-    assert (several.interval, several.end, several.largest) == (2.0, 12.0, {"a": 0.4, "b": 0.0})
-    assert several.at(np.array([2.9, 3.0, 5.9])).tolist() == [[0.0, 0.0], [0.1, 0.0], [-0.4, 0.0]]
-    assert (several.time.tolist(), several.since.tolist()) == ([3.0, 3.0, 4.0, 6.0], [3.0, 3.0, 3.0, 4.0])
+    assert (several.end, several.largest) == (12.0, {"a": 0.4, "b": 0.0})
+    assert several.at(np.array([2.9, 3.0, 5.9]))[:, 0].tolist() == [0.0, 0.1, -0.4]
 
 
 def test_rows_begin_when_each_series_has_a_value() -> None:
-    series = {"a": (np.array([1.0, 3.0]), np.array([5.0, 6.0])), "b": (np.array([2.0, 4.0]), np.array([7.0, 8.0]))}
-    rows, values = in_rows(series)
-    assert rows.tolist() == [2.0, 3.0, 4.0]
-    assert {name: held.tolist() for name, held in values.items()} == {"a": [5.0, 6.0, 6.0], "b": [7.0, 7.0, 8.0]}
+    rows, values = in_rows({"a": (STEPS[:3], STEPS[:3]), "b": (STEPS[1:4] + 0.05, STEPS[:3])})
+    assert rows == pytest.approx([0.15, 0.2, 0.25, 0.35])
+    assert values["a"] == pytest.approx([0.1, 0.2, 0.2, 0.2])
+    assert values["b"] == pytest.approx([0.0, 0.0, 0.1, 0.2])
 
 
 def test_a_gap_is_longer_than_1_s_and_than_ten_usual_intervals() -> None:

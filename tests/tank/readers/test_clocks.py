@@ -1,5 +1,6 @@
 """Clocks that restart, and times in every unit."""
 
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -9,36 +10,31 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import restart_rows, restarts, usual_delay
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Source
 from rov_fmu.tank.read_log import read_logs
-from tests.tank.logs import read_log
-from tests.tank.readers import motion
-from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
+from rov_fmu.tank.readers.content import content_of
+from tests.tank.readers.motion import BLUEROV2
 from tests.tank.readers.test_mavlink import N
-from tests.tank.readers.writers import START, Ros, outputs
 
 
-def test_a_simulation_that_is_reset_is_two_logs(tmp_path: Path) -> None:
-    """The clock in the headers restarts at 5 s, and the arrivals go on."""
-    ros, messages = Ros(2), []
-    for n, time in enumerate(TIME):
-        simulated = time if time < 4.95 else time - 5.0
-        header = ros.header(simulated - START + 100.0)
-        commands = outputs(ros, DIVE, n)
-        commands.header = header
-        place = ros.vector("Point", [0.0, 0.0, -motion.DEPTH[n]])
-        pose = ros.message("geometry_msgs/msg/Pose", position=place)
-        messages += [("/rc/out", time, commands)]
-        messages += [("/pose", time, ros.message("geometry_msgs/msg/PoseStamped", header=header, pose=pose))]
-    read = read_log(ros.write(tmp_path, messages), BLUEROV2)
-    logs = read.logs
-    assert [one.file for one in logs] == ["dive.db3", "dive.db3 (from 5 s)"]
-    assert [finding.names for finding in read.findings if finding.kind == "clock restarts"] == [{"at": "5"}]
-    for log, part in zip(logs, (TIME < 4.95, TIME >= 4.95), strict=True):
-        depth = log.used("depth")
-        assert depth is not None
-        assert depth.values == pytest.approx(motion.DEPTH[part])
-        assert log.commands is not None
-        assert log.commands.at(log.commands.rows)[:, 5] == pytest.approx(motion.THRUSTERS["6"][part], abs=2e-3)
+def test_a_simulation_that_is_reset_is_two_pieces() -> None:
+    """Its clock restarts after 30 s, and the arrivals go on. A topic without times has those of their arrival."""
+    stamps = [*range(100, 130), *range(100, 120)]
+    times = [(float(stamp), 500.0 + n) for n, stamp in enumerate(stamps)]
+    messages = {Source("/timed"): times, Source("/untimed"): [(nan, arrival + 0.1) for _, arrival in times]}
+    given = {source: [(*pair, {"x": float(n)}) for n, pair in enumerate(pairs)] for source, pairs in messages.items()}
+    content = content_of("a", given, {"P": [(510.0, 7.0)]})
+    assert [piece.since for piece in content.pieces] == [0.0, 30.0]
+    for piece, first, count in zip(content.pieces, (0, 30), (30, 20), strict=True):
+        timed, untimed = piece.topics
+        assert timed.time.tolist() == [100.0 + n for n in range(count)]
+        assert timed.fields["x"].tolist() == [float(first + n) for n in range(count)]
+        assert untimed.time == pytest.approx(timed.time + 0.1)
+    assert content.pieces[0].parameters.told["P"][0] == pytest.approx([110.0])
+    assert content.findings == [
+        Finding("time of arrival", file="a", names={"topics": "/untimed"}, numbers={"count": 50})
+    ]
 
 
 @pytest.mark.parametrize(
