@@ -4,10 +4,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from jinja2 import UndefinedError
 
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import brief, first_of, lines_on, only, shown
 from rov_fmu.io.reading import root_of_xml
+from rov_fmu.io.templates import render
 from rov_fmu.io.toml_file import join_names
 
 
@@ -32,6 +34,22 @@ def test_xml_of_a_stranger_contains_no_other_file(tmp_path: Path) -> None:
     xml = f'<!DOCTYPE a [<!ENTITY b SYSTEM "{secret.as_uri()}">]><a c="d">e&b;</a>'
     root = root_of_xml(xml.encode())
     assert (root.get("c"), root.text, "password" in "".join(map(str, root.itertext()))) == ("d", "e", False)
+
+
+TEMPLATE = """{% for one in names %}
+  {{ one | shout }}
+  {% endfor %}
+<a{{ {"b": "<", "c": none, "d": 0.1} | attributes }}/>
+"""
+
+
+def test_templates_escape_what_they_show_and_leave_no_line_of_their_own(tmp_path: Path) -> None:
+    for name, first in (("a.xml.j2", "  &lt;X&gt;"), ("a.toml.j2", "  <X>")):
+        (tmp_path / name).write_text(TEMPLATE, encoding="utf-8")
+        text = render(name, tmp_path, names=["<x>"], shout=str.upper)
+        assert text == f'{first}\n<a b="&lt;" d="0.1"/>\n'
+        with pytest.raises(UndefinedError):
+            render(name, tmp_path, shout=str.upper)
 
 
 def test_a_temporary_folder_is_removed_at_the_second_attempt_and_may_be_gone_already(

@@ -57,8 +57,7 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
 MATLAB = {
     "t m(1) m(2)": {"t": [0.0, 1.0, 2.0], "m": np.ones((2, 3)), "x": [0.0, 1.0], "s": "text"},
     "tout m(1) m(2) m(3)": {"tout": [0.0, 1.0, 2.0], "m": np.ones((3, 3)), "t": 1.0},
-    "a c": {"a": [0.0, 1.0, 2.0], "b": [0.0, 1.0], "c": [True, False, True]},
-    "x.time x.y": {"x": {"time": [0, 1], "y": [2, 3]}, "a": [0.0, 1.0, 2.0], "b": [0.0, 1.0, 2.0]},
+    "a b": {"a": [0, 1, 2], "b": [True, False, True], "c": [0.0, 1.0]},
 }
 """The headers of variables: of all vectors and columns of matrices that are as long as the time, or as most others."""
 

@@ -1,6 +1,5 @@
 """Sensors that stop changing before a log ends: they are told, and the rest of the recording is used."""
 
-
 import numpy as np
 import pytest
 

@@ -6,19 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
-from tests.tank.logs import Read, axes, commanded, measured, read_log, used
+from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import ARRIVAL, Dive, Ros, messages_of, outputs
-
-
-def array(ros: Ros, dive: Dive, n: int) -> Any:
-    """Return commands without a header."""
-    return ros.message("std_msgs/msg/Float64MultiArray", data=(dive.pulses[n] - 1500.0) / 400.0)
+from tests.tank.readers.writers import Ros, messages_of, outputs
 
 
 def told(log: Read) -> tuple[str, ...]:
@@ -33,20 +27,6 @@ def test_frames_that_are_named_ned_are_those_of_the_sea_already(tmp_path: Path) 
         "dive.db3: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
         "push ahead above its neutral pulse",
     )
-
-
-def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path) -> None:
-    ros = Ros(2)
-    path = ros.write(tmp_path, messages_of(ros, DIVE, commands=array))
-    log = read_log(path, BLUEROV2)
-    assert f"{path.name}: 100 messages of /thrusters without a time in the header: the time of arrival is used" in (
-        told(log)
-    )
-    commands = log.log.commands
-    assert commands is not None
-    (step,) = np.flatnonzero(np.diff(commanded(log.log, "5")))
-    first = used(log.log, "depth").time[0]
-    assert commands.rows[step + 1] - first == pytest.approx(TIME[10] + ARRIVAL - TIME[0], abs=1e-6)
 
 
 def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:
@@ -67,8 +47,6 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
         messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=np.array(commands[n])))]
         messages += [("/alt", time, ros.vector("Vector3", [0.0, 0.0, -100.0 * motion.DEPTH[n]]))]
     path = ros.write(tmp_path, messages)
-    with pytest.raises(DataFileError, match="no commands of thrusters were found"):
-        read_log(path, BLUEROV2)
     table = {f"/out.data[{n}]": f"u_{n + 1} [%]" for n in range(6)} | {"/alt.z": "-depth [cm]"}
     names, mistakes = names_of(BLUEROV2, RovTables(topics=table))
     assert not mistakes

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
@@ -21,7 +20,7 @@ from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.parsers import budget, format_of, one_parser, read_parsed
 from tests.tank.logs import read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
-from tests.tank.readers.writers import LOGS, Ros, att, bag, ctun, dataflash, flash, packed, rcou
+from tests.tank.readers.writers import LOGS, Ros, bag, flash
 
 
 def read(path: Path) -> Content:
@@ -123,25 +122,6 @@ def test_messages_without_a_time_or_an_output_are_no_traceback(tmp_path: Path) -
         with pytest.raises(DataFileError, match=reason):
             read_log(path, BLUEROV2)
         assert all(one.path == path for one in inspect(path, [BLUEROV2]))
-
-
-@pytest.mark.parametrize("stamp", ["repeated", "huge", "in bursts"])
-def test_times_that_no_clock_shows_are_no_traceback(stamp: str, tmp_path: Path) -> None:
-    stamps = {"repeated": lambda n: 0 * n, "huge": lambda n: 2**62 * (n % 3), "in bursts": lambda n: 10**6 * (n // 10)}
-    messages = []
-    for n in range(60):
-        time = stamps[stamp](n) * 1e-6
-        pulse = 1500 + 200 * (n >= 10)
-        messages += [
-            rcou(time, pulse, 3000 - pulse, 3000 - pulse, pulse, 1500, 1500),
-            ctun(time, -0.1 * n),
-            att(time, n),
-        ]
-        messages += [packed("BAT", round(time * 1e6), 0, float("nan") if n % 2 else float("inf"))]
-    path = dataflash(tmp_path / "a.bin", messages)
-    assert all(np.isfinite(row.rate) for one in inspect(path, [BLUEROV2]) for row in one.channels)
-    with suppress(DataFileError):
-        read_log(path, BLUEROV2)
 
 
 # ---- Damaged files ---------------------------------------------------------------------------------------------------

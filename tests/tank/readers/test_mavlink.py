@@ -1,6 +1,7 @@
 """Logs of ArduSub, which the tests write with pymavlink (.tlog) and in the DataFlash format (.bin)."""
 
 import sys
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +9,16 @@ import numpy as np
 import pytest
 
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank import quality
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.channels import channels_of
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.mavlink import Message, read_messages
 from tests.tank.logs import commanded, measured, read_log, used
 from tests.tank.readers.motion import BLUEROV2, DIVE
-from tests.tank.readers.writers import altitude, attitude, flash, pulse, servos, write_tlog
+from tests.tank.readers.writers import altitude, attitude, flash, servos, write_tlog
 
 N = 60
 EKF, LOCAL = "EKF_STATUS_REPORT", "LOCAL_POSITION_NED"
@@ -23,13 +27,12 @@ EKF, LOCAL = "EKF_STATUS_REPORT", "LOCAL_POSITION_NED"
 # ---- .tlog -----------------------------------------------------------------------------------------------------------
 
 
-def dive(start: float = 100.0) -> list[tuple[float, Any]]:
+def dive(start: float = 100.0, down: int = 1700) -> list[tuple[float, Any]]:
     """Return messages of a dive: from 1 s on, the vertical thrusters push down and the depth grows at 0.2 m/s."""
     found = []
     for n in range(N):
         time = start + 0.1 * n
-        down = pulse(0.5) if n >= 10 else 1500
-        found += [servos(time, 1500, 1500, 1500, 1500, down, down)]
+        found += [servos(time, *[1500] * 4, *[down if n >= 10 else 1500] * 2)]
         found += [altitude(time + 0.03, -1.0 - 0.02 * max(n - 10, 0)), attitude(time + 0.05, 1.0)]
     return found
 
@@ -100,6 +103,18 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
     assert 90 < len(measured(read_log(path, BLUEROV2).log, "heading")) <= 100
 
 
+@pytest.mark.parametrize(
+    ("stamps", "rate"), [(np.zeros(60), 0.0), (2.0**62 * (np.arange(60) % 3), 0.0), (1e6 * (np.arange(60) // 10), 1.0)]
+)
+def test_times_that_no_clock_shows_have_no_rate(stamps: Array, rate: float) -> None:
+    """They are repeated, huge, or come in bursts."""
+    source, numbers = Source("BAT", "BAT"), (nan, inf, 16.0, 15.0)
+    messages = [Message(source, 0.0, {"TimeUS": stamp, "Volt": numbers[n % 4]}) for n, stamp in enumerate(stamps)]
+    (piece, *_) = read_messages(Path("a.bin"), messages, ()).pieces
+    (channel,) = channels_of(piece.topics, None)
+    assert quality.rate(channel.samples[0]) == rate
+
+
 # ---- Neither ---------------------------------------------------------------------------------------------------------
 
 
@@ -115,6 +130,16 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
             "a.tlog",
             bytes(range(256)) * 20,
             "its first bytes are those of none of the formats that are read",
+        ),
+        (
+            "a.db3",
+            b"SQLite format 3\0" + bytes(99),
+            "begins as a bag of ROS 2, but is damaged .*; `sqlite3 .recover` may rep",
+        ),
+        (
+            "a.ulg",
+            b"ULog\1\x12\x35" + bytes(99),
+            "begins as a ULog, but is damaged or was cut short, and cannot be r[^;]*$",
         ),
     ],
 )

@@ -16,8 +16,8 @@ from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import commanded, measured
 from tests.tank.readers.motion import BLUEROV2, TIME
-from tests.tank.readers.test_mavlink import N
-from tests.tank.readers.writers import Ros, altitude, parameter, servos, write_tlog
+from tests.tank.readers.test_mavlink import N, dive
+from tests.tank.readers.writers import Ros, parameter, write_tlog
 
 
 def one(path: Path, keys: LogKeys = LogKeys(), topics: dict[str, str] | None = None) -> Log:  # noqa: B008 (frozen)
@@ -31,28 +31,18 @@ def told(log: Log) -> str:
     return "\n".join(sentences(log.findings, SENTENCES))
 
 
-def dive(path: Path, pulse: int, *parameters: tuple[float, Any]) -> Log:
-    """Write a log in which thrusters 5 and 6 get a pulse from the tenth row on."""
-    messages = [*parameters]
-    for n in range(N):
-        time = 2.0 + 0.1 * n
-        messages += [servos(time, *[1500] * 4, *[pulse if n >= 10 else 1500] * 2), altitude(time, -1.0 - 0.01 * n)]
-    return one(write_tlog(path, messages))
-
-
 def told_at(time: float, **values: float) -> list[tuple[float, Any]]:
     return [(time, parameter(name, value)[1]) for name, value in values.items()]
 
 
 def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
     values = {"MOT_5_DIRECTION": 1.0, "MOT_6_DIRECTION": 1.0, "MOT_PWM_MIN": 1100.0, "MOT_PWM_MAX": 1900.0}
-    log = dive(
-        tmp_path / "a.tlog",
-        1700,
+    told_by = [
         *told_at(1.0, **values),
         *told_at(5.0, MOT_5_DIRECTION=-1.0, MOT_6_DIRECTION=-1.0),
         *told_at(6.0, MOT_PWM_MAX=2000.0),
-    )
+    ]
+    log = one(write_tlog(tmp_path / "a.tlog", [*told_by, *dive(2.0)]))
     assert commanded(log, "5")[29] == pytest.approx(0.5)
     assert commanded(log, "5")[31] == pytest.approx(-0.5)
     assert commanded(log, "5")[41] == pytest.approx(-0.4)
@@ -77,7 +67,7 @@ def test_rov_toml_states_neutral_and_span(tmp_path: Path) -> None:
 
 def test_clipping_is_told_in_every_format(tmp_path: Path) -> None:
     sentence = "50 commands of {} beyond full thrust taken as full thrust"
-    log = dive(tmp_path / "a.tlog", 1964)
+    log = one(write_tlog(tmp_path / "a.tlog", dive(2.0, 1964)))
     assert commanded(log, "5")[-1] == 1.0
     assert sentence.format("thruster 5") in told(log)
     pulses = np.where(np.arange(N) > 9, 1964, 1500)
