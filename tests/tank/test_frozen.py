@@ -7,7 +7,7 @@ from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
 from rov_fmu.tank.quality import checked
-from tests.tank.logs import channel, commands, log, used
+from tests.tank.logs import channel, log, used
 
 TIME: Array = np.arange(0.0, 60.0, 0.1)
 MOVING: Array = np.minimum(TIME, 20.0)
@@ -47,42 +47,39 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None) -> None:
     assert used(found, "voltage").values.tolist() == voltage.values.tolist()
 
 
-@pytest.mark.parametrize(
-    "measured",
-    [
-        channels(noisy(1, 0.01, 0.001), noisy(2, 0.01, 0.001)),
-        channels(frozen(noisy(1, 0.01, 0.001), 30.0), noisy(2, 0.01, 0.001)),
-        channels(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 32.1)),
-        channels(frozen(noisy(1, 0.01, 0.001), 48.1), frozen(noisy(2, 0.01, 0.001), 48.1)),
-        channels(noisy(1, 0.001, 0.01), noisy(2, 0.001, 0.01)),
-        channels(frozen(noisy(1, 0.006, 0.01), 30.0), frozen(noisy(2, 0.006, 0.01), 30.0)),
-        channels(*(frozen(noisy(seed, 0.01, 0.001), 9.8)[:147] for seed in (1, 2))),
-        channels(frozen(np.sin(TIME), 30.0), frozen(np.cos(TIME), 30.0)),
-        channels(*(np.repeat(frozen(noisy(seed, 0.01, 0.001), 10.0)[:200], 3) for seed in (1, 2))),
-    ],
-    ids=[
-        "with noise",
-        "one sensor",
-        "at different times",
-        "for less than a fifth of the log",
-        "at rest",
-        "steps of the resolution",
-        "for less than 5 s",
-        "smooth motions",
-        "samples that stand three times",
-    ],
-)
-def test_sensors_that_may_be_right_are_used(measured: list[Channel]) -> None:
-    found = checked(log(commands(TIME, {"1": 0.0 * TIME}), *measured))
-    assert [*found.channels] == measured
-    assert "frozen sensors" not in {finding.kind for finding in found.findings}
+SENSORS = {
+    "with noise": "0.01 0.001 99 99 60 -",
+    "one sensor": "0.01 0.001 30 99 60 -",
+    "within 2 s": "0.01 0.001 32 30 60 29.9",
+    "at different times": "0.01 0.001 30 32.1 60 -",
+    "for a fifth of the log": "0.01 0.001 48 48 60 47.9",
+    "for less than a fifth of the log": "0.01 0.001 48.1 48.1 60 -",
+    "for 5 s": "0.01 0.001 9.8 9.8 14.9 9.7",
+    "for less than 5 s": "0.01 0.001 9.8 9.8 14.7 -",
+    "at rest": "0.001 0.01 99 99 60 -",
+    "steps of the resolution": "0.006 0.01 30 30 60 -",
+}
+"""The noise and the resolution of two sensors, the times at which they freeze and at which the log ends, and the time
+that is told, if they are said to be frozen."""
 
 
-@pytest.mark.parametrize(("first", "second", "rows"), [(32.0, 30.0, 600), (48.0, 48.0, 600), (9.8, 9.8, 149)])
-def test_sensors_that_froze_within_2_s_for_5_s_and_a_fifth_of_the_log_are_told(
-    first: float, second: float, rows: int
-) -> None:
-    measured = channels(*(frozen(noisy(n, 0.01, 0.001), at)[:rows] for n, at in ((1, first), (2, second))))
-    (found,) = checked(log(None, *measured)).findings
-    assert found.kind == "frozen sensors"
-    assert found.numbers["start"] == pytest.approx(min(first, second) - 0.1)
+@pytest.mark.parametrize("case", SENSORS)
+def test_sensors_that_froze_together_are_told(case: str) -> None:
+    *numbers, start = SENSORS[case].split()
+    noise, step, first, second, end = map(float, numbers)
+    told = [[float(start)]] if start != "-" else []
+    check(told, *(frozen(noisy(n, noise, step), at)[: round(10 * end)] for n, at in ((1, first), (2, second))))
+
+
+def check(told: list[list[float]], *measured: Array) -> None:
+    """Check the numbers of the findings about frozen sensors, and that sensors that may be right stay as they are."""
+    given = channels(*measured)
+    found = checked(log(None, *given))
+    assert [pytest.approx([finding.numbers["start"]]) for finding in found.findings] == told
+    assert told or [*found.channels] == given
+
+
+def test_motions_without_visible_noise_may_end() -> None:
+    """They are smooth, or each sample stands three times."""
+    check([], frozen(np.sin(TIME), 30.0), frozen(np.cos(TIME), 30.0))
+    check([], *(np.repeat(frozen(noisy(seed, 0.01, 0.001), 10.0)[:200], 3) for seed in (1, 2)))

@@ -19,17 +19,16 @@ from tests.tank.readers.motion import BLUEROV2
 def test_a_simulation_that_is_reset_is_two_pieces() -> None:
     """Its clock restarts after 30 s, and the arrivals go on. A topic without times has those of their arrival."""
     stamps = [*range(100, 130), *range(100, 120)]
-    times = [(float(stamp), 500.0 + n) for n, stamp in enumerate(stamps)]
-    messages = {Source("/timed"): times, Source("/untimed"): [(nan, arrival + 0.1) for _, arrival in times]}
-    given = {source: [(*pair, {"x": float(n)}) for n, pair in enumerate(pairs)] for source, pairs in messages.items()}
-    content = content_of("a", given, {"P": [(510.0, 7.0)]})
-    assert [piece.since for piece in content.pieces] == [0.0, 30.0]
-    for piece, first, count in zip(content.pieces, (0, 30), (30, 20), strict=True):
-        timed, untimed = piece.topics
-        assert timed.time.tolist() == [100.0 + n for n in range(count)]
-        assert timed.fields["x"].tolist() == [float(first + n) for n in range(count)]
-        assert untimed.time == pytest.approx(timed.time + 0.1)
-    assert content.pieces[0].parameters.told["P"][0] == pytest.approx([110.0])
+    timed = [(float(stamp), 500.0 + n, {"x": float(n)}) for n, stamp in enumerate(stamps)]
+    untimed = [(nan, arrival + 0.1, x) for _, arrival, x in timed]
+    content = content_of("a", {Source("/timed"): timed, Source("/untimed"): untimed}, {"P": [(510.0, 7.0)]})
+    first, second = content.pieces
+    assert (first.since, second.since) == (0.0, 30.0)
+    assert first.parameters.told["P"][0] == pytest.approx([110.0])
+    for piece, numbers in ((first, np.arange(30.0)), (second, np.arange(30.0, 50.0))):
+        for topic, late in zip(piece.topics, (0.0, 0.1), strict=True):
+            assert topic.fields["x"].tolist() == numbers.tolist()
+            assert topic.time == pytest.approx(100.0 + late + np.arange(len(numbers)))
     assert content.findings == [
         Finding("time of arrival", file="a", names={"topics": "/untimed"}, numbers={"count": 50})
     ]

@@ -171,9 +171,7 @@ def blueos(folder: Path, dive: Dive) -> Path:
 # Type, name, format and columns, as ArduSub 4.1 declares them.
 FORMATS = {
     "RCOU": (150, "QHHHHHHHHHHHHHH", "TimeUS,C1,C2,C3,C4,C5,C6,C7,C8,C9,C10,C11,C12,C13,C14"),
-    "CTUN": (151, "Qffffffffffhh", "TimeUS,ThI,ABst,ThO,ThH,DAlt,Alt,BAlt,DSAlt,SAlt,TAlt,DCRt,CRt"),
     "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
-    "BARO": (153, "QBffcfIffB", "TimeUS,I,Alt,Press,Temp,CRt,SMS,Offset,GndTemp,Health"),
     "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
     "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
     "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
@@ -203,14 +201,6 @@ def dataflash(path: Path, messages: Iterable[bytes]) -> Path:
 
 def rcou(time: float, *pulses: int) -> bytes:
     return packed("RCOU", round(time * 1e6), *pulses, *[0] * (14 - len(pulses)))
-
-
-def ctun(time: float, alt: float) -> bytes:
-    return packed("CTUN", round(time * 1e6), 0.0, 0.0, 0.0, 0.0, 0.0, alt, 0.0, 0.0, 0.0, 0.0, 0, 0)
-
-
-def att(time: float, yaw: float) -> bytes:
-    return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
 
 
 def flash(folder: Path, dive: Dive) -> Path:
