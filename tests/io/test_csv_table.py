@@ -120,6 +120,7 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
         [False, True, True],
         [False, True, False],
     ]
+    assert len(read_columns(_file(tmp_path, "length [m]\n1,2\n3\n"), {"length": LENGTH}, loose=True).lines) == 1
     assert ({name: [*rows] for name, rows in table.unread.items()}, table.torn) == ({"length": [1], "time": []}, 1)
 
 

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from rov_fmu.tank.columns import names_of
@@ -41,10 +40,9 @@ def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:
 def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     """A driver publishes percent, and an altitude in cm that is negative below the surface."""
     ros = Ros(2)
-    commands = [[100.0 * c[n] for c in motion.THRUSTERS.values()] for n in range(len(TIME))]
     messages: list[tuple[str, float, Any]] = []
     for n, time in enumerate(TIME):
-        messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=np.array(commands[n])))]
+        messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=0.25 * DIVE.pulses[n] - 375.0))]
         messages += [("/alt", time, ros.vector("Vector3", [0.0, 0.0, -100.0 * motion.DEPTH[n]]))]
     path = ros.write(tmp_path, messages)
     table = {f"/out.data[{n}]": f"u_{n + 1} [%]" for n in range(6)} | {"/alt.z": "-depth [cm]"}

@@ -1,7 +1,7 @@
 """Logs of ArduSub, which the tests write with pymavlink (.tlog) and in the DataFlash format (.bin)."""
 
 import sys
-from math import inf, nan
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.tank import quality
-from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.channels import channels_of
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
@@ -99,18 +96,6 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
     path = flash(tmp_path, DIVE)
     path.write_bytes(path.read_bytes()[:-500])
     assert 90 < len(measured(read_log(path, BLUEROV2).log, "heading")) <= 100
-
-
-@pytest.mark.parametrize(
-    ("stamps", "rate"), [(np.zeros(60), 0.0), (2.0**62 * (np.arange(60) % 3), 0.0), (1e6 * (np.arange(60) // 10), 1.0)]
-)
-def test_times_that_no_clock_shows_have_no_rate(stamps: Array, rate: float) -> None:
-    """They are repeated, huge, or come in bursts."""
-    source, numbers = Source("BAT", "BAT"), (nan, inf, 16.0, 15.0)
-    messages = [Message(source, 0.0, {"TimeUS": stamp, "Volt": numbers[n % 4]}) for n, stamp in enumerate(stamps)]
-    (piece, *_) = read_messages(Path("a.bin"), messages, ()).pieces
-    (channel,) = channels_of(piece.topics, None)
-    assert quality.rate(channel.samples[0]) == rate
 
 
 # ---- Neither ---------------------------------------------------------------------------------------------------------

@@ -76,8 +76,7 @@ def test_clipping_is_told_in_every_format(tmp_path: Path) -> None:
     number = ros.store.types["std_msgs/msg/Float64"]
     percent = ros.write(tmp_path / "p", [("/out", time, number(data=120.0 * (time > 4.95))) for time in TIME])
     assert sentence.format("/out.data") in told(one(percent, topics={"/out.data": "u_5 [%]"}))
-    forces = one(percent, topics={"/out.data": "u_5 [N 150]"})
-    assert commanded(forces, "5")[-1] == pytest.approx(120.0 / 150.0)
+    assert commanded(one(percent, topics={"/out.data": "u_5 [N 150]"}), "5")[-1] == pytest.approx(0.8)
     _, (line,) = names_of(BLUEROV2, RovTables(topics={"/f.data": "u_1 [N]"}))
     assert "must be a unit of force with the force at full command, such as [N 50]" in line
 
