@@ -61,12 +61,13 @@ def test_signs_and_units_of_messages(message: str) -> None:
 
 def test_the_page_that_flies_gets_the_quantities_of_an_axis() -> None:
     keys = "name", "short", "isPressure", "isPosition", "largest", "wraps"
-    assert [tuple(one[key] for key in keys) for axis in (HEAVE, YAW) for one in as_json(axis)] == [
-        ("depth", "depth", False, True, 1e7, False),
-        ("pressure", "pressure", True, True, 1e9, False),
-        ("heave velocity", "velocity", False, False, 1e3, False),
-        ("heading", "heading", False, True, 1e7, True),
-        ("yaw velocity", "velocity", False, False, 1e3, False),
+    rows = (" ".join(str(one[key]) for key in keys) for axis in (HEAVE, YAW) for one in as_json(axis))
+    assert [*rows] == [
+        "depth depth False True 10000000.0 False",
+        "pressure pressure True True 1000000000.0 False",
+        "heave velocity velocity False False 1000.0 False",
+        "heading heading False True 10000000.0 True",
+        "yaw velocity velocity False False 1000.0 False",
     ]
     assert rules_of_page()["pressures"]["least"] == pytest.approx(1013.25)
 

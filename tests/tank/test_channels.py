@@ -92,14 +92,29 @@ OF_EARTH = "it contradicts the positions in the same messages, unless it is in a
         (0.2 * VELOCITY, 0.1 * PLACE, ""),
         (0.6 * VELOCITY, 0.3 * PLACE, OF_SCALE),
         (np.where(TIME[:, None] == TIME[50], np.nan, 1.5 * VELOCITY), PLACE, ""),
+        (np.where(TIME[:, None] == TIME[50], 0.0, 1.5 * VELOCITY), PLACE, ""),
     ],
-    ids=["right", "29 %", "31 %", "signs", "7 s", "8 s", "of the earth", "noise", "2 cm/s", "7 cm/s", "a blank"],
+    ids=[
+        "right",
+        "29 %",
+        "31 %",
+        "signs",
+        "7 s",
+        "8 s",
+        "earth",
+        "noise",
+        "2 cm/s",
+        "7 cm/s",
+        "a blank",
+        "no attitude",
+    ],
 )
 def test_a_velocity_that_contradicts_the_positions_is_not_used(velocity: Array, position: Array, words: str) -> None:
     fields = " ".join(
         f"{name}[{n}]" for name, count in (("q", 4), ("position", 3), ("velocity", 3)) for n in range(count)
     )
-    values = np.hstack([QUATERNION[: len(velocity)], position, velocity])
+    attitude = np.where(velocity.any(axis=1, keepdims=True), QUATERNION[: len(velocity)], np.nan)
+    values = np.hstack([attitude, position, velocity])
     source = Source("/odom", "vehicle_odometry", frames=("ned", "frd"))
     assert found([topic("", TIME[: len(velocity)], fields, values, source)], "surge velocity").unused == words
 

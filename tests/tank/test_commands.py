@@ -88,7 +88,7 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
     "AUX, by its twelfth motor": (PX4, "a", "PWM_MAIN_FUNC1=113 PWM_AUX_FUNC1=112", "(instance 1)"),
     "AUX, by its first motor": (PX4, "a", "PWM_MAIN_FUNC1=100 PWM_AUX_FUNC2=101", "(instance 1): a 0 0.5"),
     "AUX alone": (PX4, "a", "PWM_MAIN_FUNC1=0 PWM_AUX_FUNC2=101", "(instance 0): a 0 0.5"),
-    "MAIN": (PX4, "a", "PWM_MAIN_FUNC1=101 PWM_AUX_FUNC1=420", "(instance 0): a 0 0.25"),
+    "MAIN": (PX4, "a", "PWM_MAIN_FUNC1=101 PWM_MAIN_FUNC2=420 PWM_AUX_FUNC1=420", "(instance 0): a 0 0.25"),
     "no parameters": (ONE, "a", "", "0.55 -0.65"),
     "a range": (ONE, "a", "MOT_PWM_MIN=1000 MOT_PWM_MAX=2000", "0.44 -0.52 | full thrust is 1000 and 2000 us, and no"),
     "a range of zeros": (ONE, "a", "MOT_PWM_MIN=0 MOT_PWM_MAX=0 SERVO1_MIN=1000", "0.55 -0.65"),

@@ -165,25 +165,27 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("unit", "number", "told"),
-    [
-        ("%", "1", "no command exceeds 1 %. Are they fractions? Then write [1]"),
-        ("%", "1.01", ""),
-        ("us", "-1", "no pulse beyond 1 us: fractions under [us]? Write [1]"),
-        ("us", "1.01", "no pulse beyond 100 us: percent under [us]? Write [%]"),
-        ("us", "100", "no pulse beyond 100 us: percent under [us]? Write [%]"),
-        ("us", "100.1", ""),
-        ("us", "0", ""),
-    ],
-)
-def test_commands_that_cannot_be_in_their_unit_are_refused(unit: str, number: str, told: str, tmp_path: Path) -> None:
+SLIPS = {
+    "% 1": "no command exceeds 1 %. Are they fractions? Then write [1]",
+    "% 1.01": "",
+    "us -1": "no pulse beyond 1 us: fractions under [us]? Write [1]",
+    "us 1.01": "no pulse beyond 100 us: percent under [us]? Write [%]",
+    "us 100": "no pulse beyond 100 us: percent under [us]? Write [%]",
+    "us 100.1": "",
+    "us 0": "",
+}
+"""The unit and the largest number of a command, and why they cannot belong together."""
+
+
+@pytest.mark.parametrize("case", SLIPS)
+def test_commands_that_cannot_be_in_their_unit_are_refused(case: str, tmp_path: Path) -> None:
+    unit, number = case.split()
     try:
         read(tmp_path, f"time [s],command [{unit}],depth [m]", ["0,0,1", f"1,{number},2"], HEAVE)
         found = ""
     except DataFileError as error:
-        found = str(error)
-    assert found == (f"{tmp_path / 'log.csv'}, column 'command [{unit}]': {told}" if told else "")
+        found = str(error).removeprefix(f"{tmp_path / 'log.csv'}, column 'command [{unit}]': ")
+    assert found == SLIPS[case]
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------

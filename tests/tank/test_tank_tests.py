@@ -193,6 +193,12 @@ def test_a_log_that_teaches_nothing_is_refused_where_there_is_no_other_test(
     ]
 
 
+def test_a_folder_with_the_name_of_a_table_is_refused(folder: Path) -> None:
+    (folder / "steady_surge.csv").unlink()
+    (folder / "steady_surge.csv").mkdir()
+    assert refused(folder) == [f"{folder / 'steady_surge.csv'}: cannot be read: Is a directory"]
+
+
 def refused(folder: Path) -> list[str]:
     """Return the lines of the refusal."""
     with pytest.raises(FileError) as error:
