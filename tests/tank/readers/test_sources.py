@@ -1,6 +1,5 @@
 """Where commands and a depth come from: parameters of the autopilot, [logs] and [topics] of rov.toml, and pressures."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -51,18 +50,15 @@ def test_a_parameter_counts_from_when_it_was_told(tmp_path: Path) -> None:
     assert "MOT_5_DIRECTION and MOT_6_DIRECTION changed 3 s after the first command. Each value is used" in told(log)
 
 
-def csv(folder: Path, unit: str, values: Iterable[float]) -> Path:
-    rows = [f"{n / 10},{value},{0.01 * n}" for n, value in enumerate(values)]
-    path = folder / "dive.csv"
-    path.write_text("\n".join([f"time [s],u_5 [{unit}],depth [m]", *rows]), encoding="utf-8")
-    return path
-
-
-def test_rov_toml_states_neutral_and_span(tmp_path: Path) -> None:
-    keys = LogKeys(neutral=1520.0, span=250.0)
-    pulse = np.where(np.arange(N) > 9, 1645, 1520)
-    assert commanded(one(csv(tmp_path, "us", pulse), keys), "5")[-1] == pytest.approx(0.5)
-    assert commanded(one(csv(tmp_path, "us 1500 290", pulse), keys), "5")[-1] == pytest.approx(0.5), "the header counts"
+def test_rov_toml_states_neutral_and_span_of_columns_without_their_own_and_a_pressure_tells_the_depth(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "dive.csv"
+    rows = (f"{n},1645,1645,{1013.25 + 0.980665 * n}" for n in range(N))
+    path.write_text("\n".join(["time [s],u_5 [us],u_6 [us 1500 290],pressure [mbar]", *rows]), encoding="utf-8")
+    log = one(path, LogKeys(neutral=1520.0, span=250.0))
+    assert [commanded(log, thruster)[-1] for thruster in "56"] == pytest.approx([0.5, 0.5])
+    assert measured(log, "depth") == pytest.approx(0.01 * np.arange(N))
 
 
 def test_clipping_is_told_of_thrusters_and_of_topics(tmp_path: Path) -> None:
@@ -75,10 +71,3 @@ def test_clipping_is_told_of_thrusters_and_of_topics(tmp_path: Path) -> None:
     percent = ros.write(tmp_path / "p", [("/out", time, number(data=120.0 * (time > 4.95))) for time in TIME])
     assert sentence.format("/out.data") in told(one(percent, topics={"/out.data": "u_5 [%]"}))
     assert commanded(one(percent, topics={"/out.data": "u_5 [N 150]"}), "5")[-1] == pytest.approx(0.8)
-
-
-def test_a_column_of_pressures(tmp_path: Path) -> None:
-    rows = [f"{n},{30 * (n > 9)},{1013.25 + 0.980665 * n}" for n in range(N)]
-    path = tmp_path / "log_heave.csv"
-    path.write_text("\n".join(["time [s],u_5 [%],pressure [mbar]", *rows]), encoding="utf-8")
-    assert measured(one(path), "depth") == pytest.approx(0.01 * np.arange(N))
