@@ -171,9 +171,9 @@ def test_commands(case: str) -> None:
     log = Path("log"), [*topics(given)]
     try:
         if thrusters == "wrench":
-            found = told(wrench_of(*log, FORCES, LogKeys(**keys)))
+            found = told(wrench_of(*log, FORCES, LogKeys.model_validate(keys)))
         else:
-            found = told(commands_of(*log, thrusters.split(), parameters, LogKeys(**keys)))
+            found = told(commands_of(*log, thrusters.split(), parameters, LogKeys.model_validate(keys)))
     except DataFileError as error:
         found = str(error)
     assert all(part in found for part in expected.split(" | "))

@@ -12,16 +12,18 @@ from rov_fmu.tank.columns import Names
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.tank.readers.content import content_of
+from rov_fmu.tank.readers.content import Messages, content_of
 from tests.tank.readers.motion import BLUEROV2
 
 
 def test_a_simulation_that_is_reset_is_two_pieces() -> None:
     """Its clock restarts after 30 s, and the arrivals go on. A topic without times has those of their arrival."""
     stamps = [*range(100, 130), *range(100, 120)]
-    timed = [(float(stamp), 500.0 + n, {"x": float(n)}) for n, stamp in enumerate(stamps)]
-    untimed = [(nan, arrival + 0.1, x) for _, arrival, x in timed]
-    content = content_of("a", {Source("/timed"): timed, Source("/untimed"): untimed}, {"P": [(510.0, 7.0)]})
+    messages: Messages = {Source("/timed"): [], Source("/untimed"): []}
+    for n, stamp in enumerate(stamps):
+        for own, row in zip(messages.values(), ((float(stamp), 500.0 + n), (nan, 500.1 + n)), strict=True):
+            own.append((*row, {"x": float(n)}))
+    content = content_of("a", messages, {"P": [(510.0, 7.0)]})
     first, second = content.pieces
     assert (first.since, second.since) == (0.0, 30.0)
     assert first.parameters.told["P"][0] == pytest.approx([110.0])
