@@ -102,6 +102,7 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = flash(tmp_path, DIVE)
+    assert read(path).pieces  # from then on the process has imported the parser
     with monkeypatch.context() as patch:
         patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
         with pytest.raises(DataFileError) as error:
