@@ -84,6 +84,10 @@ def test_blank_cells_are_nan_where_they_are_allowed(tmp_path: Path) -> None:
         ("length [m],time [s]\n0,5,25\n", r"column 3 = '25': there is no such column \(are these decimal commas\?"),
         ('length [m],time [s]\n"0,5",25\n', "must be a number with a decimal point, unless ; separates the columns"),
         ("time [s]\n1\n", r"column 2: 'length \[m\]' is missing$"),
+        (
+            "0,1\n",
+            r"line 1 = '0, 1': the first line must be a header that names the columns, such as length \[m\], time",
+        ),
         ("", "the file is empty"),
     ],
 )
@@ -102,6 +106,10 @@ def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     with pytest.raises(DataFileError) as error:
         _table(tmp_path, "length [ft],tim [s]\n", time=MAYBE)
     assert len(str(error.value).splitlines()) == 2
+    for header, hint in {"note [1]": ". The other columns are 'note [1]'!", "tim": "; is it the column 'tim'?"}.items():
+        with pytest.raises(DataFileError) as error:
+            read_columns(_file(tmp_path, f"{header}\n1\n"), {"length": LENGTH, "time": MAYBE}, others=True, hint="!")
+        assert str(error.value).endswith(f", line 1, column 2: 'length [m]' is missing, and so is 'time [s]'{hint}")
 
 
 def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> None:
@@ -112,6 +120,7 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
         [False, True, True],
         [False, True, False],
     ]
+    assert len(read_columns(_file(tmp_path, "length [m]\n1,2\n3\n"), {"length": LENGTH}, loose=True).lines) == 1
     assert ({name: [*rows] for name, rows in table.unread.items()}, table.torn) == ({"length": [1], "time": []}, 1)
 
 
@@ -120,6 +129,7 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
 SERIES = {
     "0,1\n1,2\n": ": the first line must be a header that names the columns: the time, and then variables",
     "time,u [%]\n0,1\n": ", line 1, column 'u [%]': must be 'u' without a unit; a command of 30 % is 0.3 here",
+    "time [ms],u\n0,1\n": ", line 1, column 'time [ms]': must be the time in s, which is the unit here",
     "time,u,u\n0,1,1\n": ", line 1, column 'u': this column occurs twice",
     "time,u\n0,1\n1,2,3\n": ", line 3, column 3 = '3': there is no such column (are these decimal commas? They need ; "
     "between the columns)",

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.io.paths import MODELS, inside_or_shipped
+from rov_fmu.io.paths import MODELS, inside_or_shipped, name_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE, BARE, TESTS
@@ -123,3 +123,11 @@ def test_tables_are_searched_in_the_folder_and_then_among_the_shipped_ones(folde
     assert load_vehicle(vehicle).data == own
     with pytest.raises(ValueError, match=OUTSIDE):
         inside_or_shipped(folder, "../models/videoray")
+
+
+def test_the_name_of_a_place_leads_back_to_it(folder: Path) -> None:
+    for place, name in ((folder / "tables" / "a.csv", "tables/a.csv"), (MODELS / "videoray", "videoray")):
+        assert name_of(place, folder) == name
+        assert inside_or_shipped(folder, name) == place
+    with pytest.raises(ValueError, match=r"secret is not inside the folder of this file$"):
+        name_of(folder.parent / "secret", folder)

@@ -1,13 +1,18 @@
 """Texts of any length in messages, XML of a stranger, and a temporary folder that has gone."""
 
 import shutil
+from math import inf, nan
 from pathlib import Path
 
 import pytest
+from jinja2 import UndefinedError
+from pydantic import TypeAdapter, ValidationError
 
+from rov_fmu.io.field_types import Finite, Name, Symbol, Text
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import brief, first_of, lines_on, only, shown
-from rov_fmu.io.reading import root_of_xml
+from rov_fmu.io.messages import FileError, brief, first_of, lines_on, only, part, shown
+from rov_fmu.io.reading import read_bytes, root_of_xml
+from rov_fmu.io.templates import render
 from rov_fmu.io.toml_file import join_names
 
 
@@ -32,6 +37,49 @@ def test_xml_of_a_stranger_contains_no_other_file(tmp_path: Path) -> None:
     xml = f'<!DOCTYPE a [<!ENTITY b SYSTEM "{secret.as_uri()}">]><a c="d">e&b;</a>'
     root = root_of_xml(xml.encode())
     assert (root.get("c"), root.text, "password" in "".join(map(str, root.itertext()))) == ("d", "e", False)
+
+
+def test_texts_and_numbers_of_files_have_limits() -> None:
+    limits = {Text: 10_000, Name: 100, Symbol: 30}
+    for kind, most in limits.items():
+        adapter = TypeAdapter(kind)
+        assert adapter.validate_python(most * "x") == most * "x"
+        for wrong in ("", (most + 1) * "x", " \n", "\x07"):
+            with pytest.raises(ValidationError):
+                adapter.validate_python(wrong)
+    for number in (inf, nan):
+        with pytest.raises(ValidationError):
+            TypeAdapter(Finite).validate_python(number)
+
+
+def test_a_file_has_a_largest_size(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"abc")
+    assert read_bytes(path, most=3) == b"abc"
+    with pytest.raises(FileError, match="is too large, with 0 MB: at most 0 MB are read"):
+        read_bytes(path, most=2)
+
+
+def test_a_part_of_the_work_has_a_part_of_the_progress() -> None:
+    shown: list[tuple[str, float]] = []
+    part(lambda *step: shown.append(step), 0.25, 0.75)("x", 0.5)
+    assert shown == [("x", 0.5)]
+
+
+TEMPLATE = """{% for one in names %}
+  {{ one | shout }}
+  {% endfor %}
+<a{{ {"b": "<", "c": none, "d": 0.1} | attributes }}/>
+"""
+
+
+def test_templates_escape_what_they_show_and_leave_no_line_of_their_own(tmp_path: Path) -> None:
+    for name, first in (("a.xml.j2", "  &lt;X&gt;"), ("a.toml.j2", "  <X>")):
+        (tmp_path / name).write_text(TEMPLATE, encoding="utf-8")
+        text = render(name, tmp_path, names=["<x>"], shout=str.upper)
+        assert text == f'{first}\n<a b="&lt;" d="0.1"/>\n'
+        with pytest.raises(UndefinedError):
+            render(name, tmp_path, shout=str.upper)
 
 
 def test_a_temporary_folder_is_removed_at_the_second_attempt_and_may_be_gone_already(

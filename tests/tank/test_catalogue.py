@@ -1,6 +1,6 @@
 """What units, messages and unknown headers mean, each with numbers that somebody else would compute, too."""
 
-from math import pi
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -40,58 +40,107 @@ def test_all_units_of_a_column(name: str, tmp_path: Path) -> None:
         assert value == pytest.approx(float(numbers[0][0]), rel=1e-12), unit
 
 
-@pytest.mark.parametrize(
-    ("kind", "field", "number", "quantity", "expected"),
-    [
-        *((kind, field, -2.0, "depth", 2.0) for kind, field in (("VFR_HUD", "alt"), ("CTUN", "Alt"), ("BARO", "Alt"))),
-        ("GLOBAL_POSITION_INT", "relative_alt", -2000.0, "depth", 2.0),
-        ("SCALED_PRESSURE3", "press_abs", 1111.3165, "depth", 1.0),
-        ("SYS_STATUS", "voltage_battery", 65535.0, "voltage", np.nan),
-        ("battery_status", "voltage_v", 0.0, "voltage", np.nan),
-    ],
-)
-def test_signs_and_units_of_messages(kind: str, field: str, number: float, quantity: str, expected: float) -> None:
-    topic = Topic(Source(kind, kind), np.arange(2.0), {field: np.full(2, number)})
+SIGNS = {
+    "VFR_HUD alt -2": "depth 2",
+    "CTUN Alt -2": "depth 2",
+    "BARO Alt -2": "depth 2",
+    "GLOBAL_POSITION_INT relative_alt -2000": "depth 2",
+    "SCALED_PRESSURE3 press_abs 1111.3165": "depth 1",
+    "SYS_STATUS voltage_battery 65535": "voltage nan",
+    "battery_status voltage_v 0": "voltage nan",
+}
+
+
+@pytest.mark.parametrize("message", SIGNS)
+def test_signs_and_units_of_messages(message: str) -> None:
+    kind, field, number = message.split()
+    topic = Topic(Source(kind, kind), np.arange(2.0), {field: np.full(2, float(number))})
     *_, found = channels_of([topic], None)
-    assert found.quantity.name == quantity
-    assert found.values[-1] == pytest.approx(expected, nan_ok=True)
+    assert f"{found.quantity.name} {found.values[-1]:g}" == SIGNS[message]
 
 
 def test_the_page_that_flies_gets_the_quantities_of_an_axis() -> None:
     keys = "name", "short", "isPressure", "isPosition", "largest", "wraps"
-    assert [tuple(one[key] for key in keys) for axis in (HEAVE, YAW) for one in as_json(axis)] == [
-        ("depth", "depth", False, True, 1e7, False),
-        ("pressure", "pressure", True, True, 1e9, False),
-        ("heave velocity", "velocity", False, False, 1e3, False),
-        ("heading", "heading", False, True, 1e7, True),
-        ("yaw velocity", "velocity", False, False, 1e3, False),
+    rows = (" ".join(str(one[key]) for key in keys) for axis in (HEAVE, YAW) for one in as_json(axis))
+    assert [*rows] == [
+        "depth depth False True 10000000.0 False",
+        "pressure pressure True True 1000000000.0 False",
+        "heave velocity velocity False False 1000.0 False",
+        "heading heading False True 10000000.0 True",
+        "yaw velocity velocity False False 1000.0 False",
     ]
     assert rules_of_page()["pressures"]["least"] == pytest.approx(1013.25)
 
 
-LARGEST: dict[str, dict[float, str | None]] = {
-    "Depth": {100.0: "depth [m]", 101.0: "depth [cm]", 10_001.0: "depth [mm]"},
-    "yaw": {2.1 * pi: "heading [rad]", 6.6: "heading [deg]"},
-    "roll": {pi: "roll angle [rad]", 3.2: "roll angle [deg]"},
-    "pitch": {0.5 * pi: "pitch angle [rad]", 1.6: "pitch angle [deg]"},
-    "battery": {1000.0: "voltage [V]", 1001.0: "voltage [mV]"},
-    "t": {1e11: "time [s]", 2e11: "time [ms]", 2e14: "time [us]", 2e17: "time [ns]"},
-    "thr_1": dict.fromkeys((101.0, 799.0, 2201.0))
-    | {1.0: "u_1 [1]", 1.5: "u_1 [%]", 100.0: "u_1 [%]", 800.0: "u_1 [us]", 2200.0: "u_1 [us]"},
-    "fore (%)": {100.0: "u_fore [%]", 101.0: None},
-    "Leg1": dict.fromkeys((1521.0, 1479.0)) | dict.fromkeys((1480.0, 1520.0), "u_1 [us]"),
-    "pos z": {1.0: "depth [m]", -1.0: "-depth [m]"},
-    "dvl_y": {2000.0: "sway velocity [m/s]"},
-    "rates x": {2000.0: "roll velocity [rad/s]"},
-    "surge speed": {1.0: None},
-    "force.x": {2000.0: "X_ext [N]"},
-    "torque.z": {2000.0: "N_ext [N.m]"},
+MEANT = {
+    "Depth=100": "depth [m]",
+    "Depth=101": "depth [cm]",
+    "Depth=10001": "depth [mm]",
+    "yaw=6.597": "heading [rad]",
+    "yaw=6.6": "heading [deg]",
+    "roll=3.141": "roll angle [rad]",
+    "roll=3.2": "roll angle [deg]",
+    "pitch=1.57": "pitch angle [rad]",
+    "pitch=1.6": "pitch angle [deg]",
+    "battery=1000": "voltage [V]",
+    "battery=1001": "voltage [mV]",
+    "t=1e11": "time [s]",
+    "t=2e11": "time [ms]",
+    "t=2e14": "time [us]",
+    "t=2e17": "time [ns]",
+    "thr_1=1": "u_1 [1]",
+    "thr_1=1.5": "u_1 [%]",
+    "thr_1=100": "u_1 [%]",
+    "thr_1=101": "",
+    "thr_1=799": "",
+    "thr_1=800": "u_1 [us]",
+    "thr_1=2200": "u_1 [us]",
+    "thr_1=2201": "",
+    "fore(%)=100": "u_fore [%]",
+    "fore(%)=101": "",
+    "Leg1=1479": "",
+    "Leg1=1480": "u_1 [us]",
+    "Leg1=1520": "u_1 [us]",
+    "Leg1=1521": "",
+    "Leg1=1000,1500,1500,2000": "u_1 [us]",
+    "Leg1=999,1500,1500": "",
+    "Leg1=2001,1500,1500": "",
+    "pos_z=1": "depth [m]",
+    "pos_z=-1,-2,0.5 vel_y=1 depth[m]=1": "-depth [m], -sway velocity [m/s]",
+    "dvl_y=2000": "sway velocity [m/s]",
+    "rates_x=2000": "roll velocity [rad/s]",
+    "surge_speed=1": "",
+    "force.x=2000": "X_ext [N]",
+    "torque.z=2000": "N_ext [N.m]",
+    "X_ext=1 u=1 r=9": "X_ext [N], surge velocity [m/s], yaw velocity [rad/s]",
+    "a=0...49 b=1...49 c=0...49": "time [s]",
+    "a=0...48": "",
+    "a=0...49,49": "",
+    "a[m]=0...49 b[ms]=0...49": "time [ms]",
+    "t=0,5,10": "time [s]",
+    "t=0,6,12": "time [ms]",
+    "t=0,2e9": "time [s]",
+    "orientation.x=1 orientation.y=1 orientation.z=1 orientation.w=1": "",
+    "orientation.x=1 orientation.y=1 orientation.z=1": "roll angle [rad], pitch angle [rad], heading [rad]",
 }
-"""Unknown headers of columns with one number alone, and what it makes of each."""
+"""Unknown headers with the numbers below them, and what they seem to mean."""
 
 
-@pytest.mark.parametrize("title", LARGEST)
-def test_the_numbers_tell_the_likely_unit_of_a_header(title: str) -> None:
-    for number, meant in LARGEST[title].items():
-        _, columns = guessed([title], {title: np.full(3, number)}, None, [])
-        assert columns.get(title) == meant, number
+@pytest.mark.parametrize("given", MEANT)
+def test_headers_and_their_numbers_tell_their_likely_meaning(given: str) -> None:
+    columns = guessed_of(dict(pair.split("=") for pair in given.split()))
+    assert ", ".join(columns.values()) == MEANT[given]
+
+
+def guessed_of(texts: Mapping[str, str]) -> dict[str, str]:
+    numbers = {}
+    for title, text in texts.items():
+        first, _, last = text.partition("...")
+        values = [*range(int(first), int(last.partition(",")[0]) + 1)] if last else []
+        numbers[title] = np.array([*values, *(last.split(",")[1:] if last else text.split(","))], float)
+    _, columns = guessed([*numbers], numbers, None, [])
+    return columns
+
+
+def test_at_most_32_columns_are_commands() -> None:
+    assert guessed_of({f"thr{n}": "1" for n in range(1, 34)}) == {f"thr{n}": f"u_{n} [1]" for n in range(1, 33)}

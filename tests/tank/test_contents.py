@@ -8,10 +8,12 @@ import pytest
 from scipy.io import savemat
 
 from rov_fmu.identify.beginning import load_tests
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
+from rov_fmu.tank.readers.tables import open_matlab
 from tests.folders import rows_of
 from tests.tank.logs import channel, commanded, commands, log, measured
 from tests.tank.readers import motion
@@ -50,6 +52,53 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
     (one,) = load_tests(folder(tmp_path, columns)).folder.logs
     assert measured(one, "depth") == pytest.approx(motion.DEPTH)
     assert commanded(one, "6") == pytest.approx(motion.THRUSTERS["6"])
+
+
+MATLAB = {
+    "t m(1) m(2)": {"t": [0.0, 1.0, 2.0], "m": np.ones((2, 3)), "x": [0.0, 1.0], "s": "text"},
+    "tout m(1) m(2) m(3)": {"tout": [0.0, 1.0, 2.0], "m": np.ones((3, 3)), "t": 1.0},
+    "a b": {"a": [0, 1, 2], "b": [True, False, True], "c": [0.0, 1.0]},
+}
+"""The headers of variables: of all vectors and columns of matrices that are as long as the time, or as most others."""
+
+
+@pytest.mark.parametrize("headers", MATLAB)
+def test_vectors_of_matlab(headers: str, tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", MATLAB[headers])
+    assert open_matlab(tmp_path / "a.mat")().readline() == headers.replace(" ", ";") + "\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        (None, "has no vectors of numbers"),
+        (
+            b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(99),
+            "is a .mat file of version 7.3 (HDF5), which SciPy does not read: save it with -v7",
+        ),
+    ],
+)
+def test_what_cannot_be_read_of_matlab(content: bytes | None, line: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    path.write_bytes(content) if content else savemat(path, {"x": 1.0, "y": "text"})
+    with pytest.raises(DataFileError) as error:
+        inspect(path, [BLUEROV2])
+    assert str(error.value) == f"{path}: {line}"
+
+
+def test_what_is_listed_of_headers_that_are_not_known(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = ["0,1,x,1,5,5", "1,2,y,2,5,5", "2,3,z,a,5,5", "3,4,3,b,5,5", "4,5,4,,5,5"]
+    listed = {"p": "text", "q": "1 to 2", "n": ""}
+    for header, channels in ("time [s],depth [m],p,q,n,n", ["depth"]), ("time [s],r,p,q,n,n", []):
+        path.write_text("\n".join([header, *rows]), encoding="utf-8")
+        (seen,) = inspect(path, [BLUEROV2])
+        assert seen.unread == ({} if channels else {"r": "1 to 5"}) | listed
+        assert [row.name for row in seen.channels] == channels
+    path.write_text("a,b\nx,y\n", encoding="utf-8")
+    with pytest.raises(DataFileError) as error:
+        inspect(path, [BLUEROV2])
+    assert str(error.value) == f"{path}, line 1 = 'a, b': no column below these headers has numbers"
 
 
 @pytest.mark.parametrize("name", ["thrust_t200_dive.csv", "steady_surge.csv"])

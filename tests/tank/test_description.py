@@ -11,12 +11,10 @@ from rov_fmu.equation.catalogue import HEAVE, SWAY
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.result import Identification
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
 from tests.folders import (
     BLUEROV2,
@@ -33,12 +31,6 @@ from tests.recordings import run, write_log
 from tests.tank.test_description_mistakes import LIMITS
 
 DOCS = Path(__file__).parents[2] / "docs"
-
-
-def read_again(found: Identification, path: Path) -> None:
-    """Check that the vehicle can be written to a file and read again."""
-    write_vehicle(found.vehicle, path)
-    assert load_vehicle(path).layout == found.vehicle.layout
 
 
 # ---- A vehicle to begin from -----------------------------------------------------------------------------------------

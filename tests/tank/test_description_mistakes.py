@@ -23,6 +23,7 @@ from tests.folders import (
     RATE,
     SPEED,
     TAU,
+    THRUSTER,
     TOP,
     TURNS,
     VECTORED,
@@ -66,6 +67,16 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         f"{HEAD}[curves.t200]\n",
         HEAVE_ALONE,
         "/rov.toml: thruster: this table is missing, and there is curves: write [[t",
+    ),
+    (
+        f"{HEAD}[body]\n{MASS}{THRUSTER.format(name='v', x=0, y=0, z=1)}[curves]\n",
+        HEAVE_ALONE,
+        "/rov.toml: curves: this table is missing, and there is body: write [curves.<name>]",
+    ),
+    (
+        DOWN.replace("[curves.t200]", "[curves.t200]\nelectric_current = { voltage = 16, table = 'A' }"),
+        WITH_THRUST | {"A": "command [1],current [A]\n-1,9\n0,0\n1,10\n"},
+        "/rov.toml: curves.t200.electric_current: identification does not use it. Add it to the identified vehicle",
     ),
     (
         f"{HEAD}[body]\n{MASS}",
@@ -143,7 +154,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: axes.heave.Z_wdot: there is no such key; give -Z_wdot, which is positive, as m_a of [axes.heave]",
     ),
     (
-        f"{BLUEROV2}{LIMITS.format(-1.01, 1, 0.2, 0.2, -0.1, 0, 1e4)}",
+        f"{BLUEROV2}{LIMITS.format(-1.01, 1, 0.2, 0.2, -0.1, 0, 10001)}",
         HEAVE_ALONE,
         " | ".join(
             f"/rov.toml: {line}"
@@ -152,6 +163,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
                 "windows.surge = [0.2, 0.2]: must be [low, high]",
                 "priors.inertia = -0.1: must be 0 or above",
                 "logs.neutral = 0: must be greater than 0",
+                "logs.span = 10001: must be less than or equal to 10000",
             )
         ),
     ),
@@ -250,7 +262,12 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
             "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or 'force [lbf]' | "
             "/rov.toml: columns.Tiefe = 'depth [ft]': must be 'depth [m]' or",
         ),
-        ("[columns]", "[column]", "column: there is no such key; did you mean columns?"),
+        ("u_v [us]", "u_w [us]", "columns.thr_pwm = 'u_w [us]': there is no such column, but time [s], u_v [%], "),
+        (
+            "[columns]",
+            '[topics]\n"/f.x" = "time [s]"\n[columns]',
+            "topics./f.x = 'time [s]': there is no such column, but ",
+        ),
     ],
 )
 def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, line: str, tmp_path: Path) -> None:

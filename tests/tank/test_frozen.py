@@ -1,7 +1,5 @@
 """Sensors that stop changing before a log ends: they are told, and the rest of the recording is used."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,7 @@ from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
 from rov_fmu.tank.quality import checked
-from tests.tank.logs import axes, channel, commands, log, read_log, used
-from tests.vehicles import VIDEORAY
+from tests.tank.logs import channel, log, used
 
 TIME: Array = np.arange(0.0, 60.0, 0.1)
 MOVING: Array = np.minimum(TIME, 20.0)
@@ -29,64 +26,60 @@ def frozen(values: Array, at: float, value: float | None = None) -> Array:
     return np.where(at > TIME, values, last)
 
 
+def channels(*values: Array) -> list[Channel]:
+    return [channel(name, TIME[: len(some)], some) for name, some in zip(("depth", "heading"), values, strict=True)]
+
+
 @pytest.mark.parametrize("value", [None, 0.0])
-def test_what_frozen_sensors_say_is_left_out(value: float | None, tmp_path: Path) -> None:
-    """They keep their last value, or say 0, while the commands go on; the voltage goes on too."""
-    depth, turn = (frozen(noisy(seed, 0.01, 0.001), 30.0, value) for seed in (1, 2))
-    command = np.where(TIME % 8.0 < 4.0, 0.4, -0.2)
-    rows = zip(TIME, command, depth, turn, 16.0 - 0.01 * TIME, strict=True)
-    text = "time [s],u_t [1],u_l [1],u_r [1],depth [m],heading [rad],voltage [V]\n"
-    text += "".join(f"{t:.1f},{c},{c},{-c},{d:.3f},{h:.3f},{V:.2f}\n" for t, c, d, h, V in rows)
-    path = tmp_path / "pool.csv"
-    path.write_text(text, encoding="utf-8")
-    read = read_log(path, VIDEORAY.layout)
+def test_what_frozen_sensors_say_is_left_out(value: float | None) -> None:
+    """They keep their last value, or say 0, while the voltage goes on."""
+    measured = channels(*(frozen(noisy(seed, 0.01, 0.001), 30.0, value) for seed in (1, 2)))
+    voltage = channel("voltage", TIME, 16.0 - 0.01 * TIME)
+    found = checked(log(None, *measured, voltage))
     start = "29.9" if value is None else "30"
-    assert sentences(read.findings) == (
-        f"pool.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
+    assert sentences(found.findings) == (
+        f"a.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
         "log or the sensor stop? Their later values are left out",
     )
-    assert {heading(finding) for finding in read.findings} == {"Warnings"}
-    assert axes(read.log) == ["heave", "yaw"]
+    assert {heading(finding) for finding in found.findings} == {"Warnings"}
     for quantity in ("depth", "heading"):
-        frozen_channel = used(read.log, quantity)
-        assert frozen_channel.time[frozen_channel.there][-1] == pytest.approx(float(start) - 0.1)
-    voltage = used(read.log, "voltage")
-    assert voltage.time[-1] == pytest.approx(59.9)
-    assert voltage.values[-1] == pytest.approx(15.4, abs=0.01)
+        assert used(found, quantity).samples[0][-1] == pytest.approx(float(start) - 0.1)
+    assert used(found, "voltage").values.tolist() == voltage.values.tolist()
 
 
-def channels(*values: Array) -> list[Channel]:
-    return [channel(name, TIME, some) for name, some in zip(("depth", "heading"), values, strict=True)]
+SENSORS = {
+    "with noise": "0.01 0.001 99 99 60 -",
+    "one sensor": "0.01 0.001 30 99 60 -",
+    "within 2 s": "0.01 0.001 32 30 60 29.9",
+    "at different times": "0.01 0.001 30 32.1 60 -",
+    "for a fifth of the log": "0.01 0.001 48 48 60 47.9",
+    "for less than a fifth of the log": "0.01 0.001 48.1 48.1 60 -",
+    "for 5 s": "0.01 0.001 9.8 9.8 14.9 9.7",
+    "for less than 5 s": "0.01 0.001 9.8 9.8 14.7 -",
+    "at rest": "0.001 0.01 99 99 60 -",
+    "steps of the resolution": "0.006 0.01 30 30 60 -",
+}
+"""The noise and the resolution of two sensors, the times at which they freeze and at which the log ends, and the time
+that is told, if they are said to be frozen."""
 
 
-@pytest.mark.parametrize(
-    "measured",
-    [
-        channels(noisy(1, 0.01, 0.001), noisy(2, 0.01, 0.001)),
-        channels(frozen(noisy(1, 0.01, 0.001), 30.0), noisy(2, 0.01, 0.001)),
-        channels(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 32.1)),
-        channels(frozen(noisy(1, 0.01, 0.001), 48.1), frozen(noisy(2, 0.01, 0.001), 48.1)),
-        channels(noisy(1, 0.001, 0.01), noisy(2, 0.001, 0.01)),
-        channels(frozen(noisy(1, 0.006, 0.01), 30.0), frozen(noisy(2, 0.006, 0.01), 30.0)),
-    ],
-    ids=[
-        "with noise",
-        "one sensor",
-        "at different times",
-        "for less than a fifth of the log",
-        "at rest",
-        "steps of the resolution",
-    ],
-)
-def test_sensors_that_may_be_right_are_used(measured: list[Channel]) -> None:
-    found = checked(log(commands(TIME, {"1": 0.0 * TIME}), *measured))
-    assert [*found.channels] == measured
-    assert "frozen sensors" not in {finding.kind for finding in found.findings}
+@pytest.mark.parametrize("case", SENSORS)
+def test_sensors_that_froze_together_are_told(case: str) -> None:
+    *numbers, start = SENSORS[case].split()
+    noise, step, first, second, end = map(float, numbers)
+    told = [[float(start)]] if start != "-" else []
+    check(told, *(frozen(noisy(n, noise, step), at)[: round(10 * end)] for n, at in ((1, first), (2, second))))
 
 
-@pytest.mark.parametrize(("first", "second"), [(32.0, 30.0), (48.0, 48.0)])
-def test_sensors_that_froze_within_2_s_and_for_a_fifth_of_the_log_are_told(first: float, second: float) -> None:
-    measured = channels(frozen(noisy(1, 0.01, 0.001), first), frozen(noisy(2, 0.01, 0.001), second))
-    (found,) = checked(log(None, *measured)).findings
-    assert found.kind == "frozen sensors"
-    assert found.numbers["start"] == pytest.approx(min(first, second) - 0.1)
+def check(told: list[list[float]], *measured: Array) -> None:
+    """Check the numbers of the findings about frozen sensors, and that sensors that may be right stay as they are."""
+    given = channels(*measured)
+    found = checked(log(None, *given))
+    assert [pytest.approx([finding.numbers["start"]]) for finding in found.findings] == told
+    assert told or [*found.channels] == given
+
+
+def test_motions_without_visible_noise_may_end() -> None:
+    """They are smooth, or each sample stands three times."""
+    check([], frozen(np.sin(TIME), 30.0), frozen(np.cos(TIME), 30.0))
+    check([], *(np.repeat(frozen(noisy(seed, 0.01, 0.001), 10.0)[:200], 3) for seed in (1, 2)))

@@ -11,7 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.findings import SENTENCES, sentences
 from tests.tank.logs import Read, commanded, measured, read_log, used
 from tests.vehicles import VIDEORAY, thruster
 
@@ -88,6 +88,7 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     depths = [measured(one, "depth") for one in log.logs]
     assert [len(depth) for depth in depths] == [600, 600]
     assert depths[1][0] == pytest.approx(6.0)
+    assert [one.file for one in log.logs] == ["log.csv", "log.csv (from 29.95 s)"]
     assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
 
 
@@ -120,7 +121,6 @@ def test_rows_that_arrive_late_are_sorted(tmp_path: Path) -> None:
             r"column time \[s\] gives 0\.099 rows a second\. Is its unit another one",
         ),
         ([f"{9e-6 * n},30,1" for n in range(N)], r"column time \[s\] gives 1\.11e\+05 rows a second"),
-        ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command exceeds 1 %. Are they fractions"),
     ],
 )
 def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, tmp_path: Path) -> None:
@@ -154,48 +154,72 @@ def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) ->
 
 
 def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
-    pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 28]
+    pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 26, 1900, 1100]
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
     assert commanded(log.log, "t")[[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
-    for kind in ("no pulse", "beyond full thrust"):
-        assert Finding(kind, file="log.csv", names={"column": "u_t [us]"}, numbers={"count": 2}) in log.findings
+    assert sentences(log.findings, SENTENCES) == (
+        "log.csv: 2 pulses of u_t [us] of 0 or 65535 us taken as no command",
+        "log.csv: 2 commands of u_t [us] beyond full thrust taken as full thrust",
+        "log.csv: there is no column of u_l. Its command is taken as 0. Add the column if this is wrong",
+        "log.csv: there is no column of u_r. Its command is taken as 0. Add the column if this is wrong",
+    )
+
+
+SLIPS = {
+    "% 1": "no command exceeds 1 %. Are they fractions? Then write [1]",
+    "% 1.01": "",
+    "us -1": "no pulse beyond 1 us: fractions under [us]? Write [1]",
+    "us 1.01": "no pulse beyond 100 us: percent under [us]? Write [%]",
+    "us 100": "no pulse beyond 100 us: percent under [us]? Write [%]",
+    "us 100.1": "",
+    "us 0": "",
+}
+"""The unit and the largest number of a command, and why they cannot belong together."""
+
+
+@pytest.mark.parametrize("case", SLIPS)
+def test_commands_that_cannot_be_in_their_unit_are_refused(case: str, tmp_path: Path) -> None:
+    unit, number = case.split()
+    try:
+        read(tmp_path, f"time [s],command [{unit}],depth [m]", ["0,0,1", f"1,{number},2"], HEAVE)
+        found = ""
+    except DataFileError as error:
+        found = str(error).removeprefix(f"{tmp_path / 'log.csv'}, column 'command [{unit}]': ")
+    assert found == SLIPS[case]
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------
 
 REFUSED = {
-    "no commands": (
-        "time [s],depth [m]",
-        "0,1",
-        "line 1: there is no column of commands. Possible columns: u_l, u_r, u_t, each in",
-    ),
-    "a pulse under another name": (
-        "time [s],PWM (us),depth [m]",
-        "0,1500,1",
-        "each in [%], [1] or [us]; is it the column 'PWM (us)'? Units stand in square brackets.",
-    ),
-    "no motion": ("time [s],u_t [%]", "0,1", "line 1: column 'surge distance [m]' or 'surge velocity [m/s]' or 'depth"),
-    "no such unit": ("time [s],u_t [V],depth [m]", "0,1,1", "'u_t [V]': must be 'u_t [%]' or 'u_t [1]' or 'u_t [us]'"),
-    "span of none": ("time [s],u_t [us 1500 0],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),
-    "two kinds": (
-        "time [s],command [%],u_t [%],depth [m]",
-        "0,0,0,0",
-        "columns 'command [%]', 'u_t [%]'",
-    ),
-    "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "this column occurs twice"),
-    "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),
-    "percent as pulses": ("time [s],u_t [us],depth [m]", "0,50,1", "no pulse beyond 100 us: percent under [us]?"),
+    "no commands": "time [s],depth [m] | 0,1 | line 1: there is no column of commands. Possible columns: u_l, u_r, "
+    "u_t, each in",
+    "a pulse under another name": "time [s],PWM (us),depth [m] | 0,1500,1 | each in [%], [1] or [us]; is it the column "
+    "'PWM (us)'? Units stand in square brackets.",
+    "no motion": "time [s],u_t [%] | 0,1 | line 1: column 'surge distance [m]' or 'surge velocity [m/s]' or 'depth",
+    "no such unit": "time [s],u_t [V],depth [m] | 0,1,1 | 'u_t [V]': must be 'u_t [%]' or 'u_t [1]' or 'u_t [us]'",
+    "span of none": "time [s],u_t [us 1500 0],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] such as",
+    "two kinds": "time [s],command [%],u_t [%],depth [m] | 0,0,0,0 | columns 'command [%]', 'u_t [%]'",
+    "twice": "time [s],u_t [%],t [1],depth [m] | 0,1,1,1 | this column occurs twice",
+    "percent as fractions": "time [s],u_t [1],depth [m] | 0,30,1 | line 2, column 'u_t [1]' = '30': must be at",
+    "neutral of none": "time [s],u_t [us 0 400],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] such as",
+    "neutral alone": "time [s],u_t [us 1500],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] such as",
+    "words in a unit": "time [s],u_t [us 1500 x],depth [m] | 0,1,1 | column 2 = 'u_t [us 1500 x]': only numbers may "
+    "follow us",
+    "a number in a unit": "time [s],u_t [% 5],depth [m] | 0,1,1 | column 2 = 'u_t [% 5]': must be [%] alone",
+    "no force at full command": "time [s],u_t [N 0],depth [m] | 0,1,1 | must be a unit of force with the force at full "
+    "com",
 }
+"""Headers, a row, and a part of the line about them."""
 
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_cannot_be_is_one_clear_line(case: str, tmp_path: Path) -> None:
-    header, row, told = REFUSED[case]
+    header, row, told = REFUSED[case].split(" | ")
     with pytest.raises(DataFileError) as error:
         read(tmp_path, header, [row], HEAVE if case == "two kinds" else None)
-    assert str(error.value).startswith(str(tmp_path / "log.csv"))
-    assert told in str(error.value)
-    assert len(str(error.value).splitlines()) == 1
+    (line,) = str(error.value).splitlines()
+    assert line.startswith(str(tmp_path / "log.csv"))
+    assert told in line
 
 
 def test_a_log_of_one_axis_tells_of_the_conditions(tmp_path: Path) -> None:

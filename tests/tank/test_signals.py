@@ -1,14 +1,15 @@
-"""Headings that wrap, and scales of sensors."""
+"""Times and values of commands, headings that wrap, gaps, and scales of sensors."""
 
 from math import pi
 
 import numpy as np
 import pytest
 
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, range_in_words
+from rov_fmu.tank.clocks import in_rows
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, scales_differ, unwrapped
-from tests.tank.logs import channel
+from tests.tank.logs import channel, commands
 
 STEPS: Array = np.linspace(0.0, 19.9, 200)
 
@@ -27,6 +28,34 @@ def test_a_heading_is_unwrapped_keeps_its_blanks_and_noise_beyond_its_range_is_n
 def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() -> None:
     values = np.tile(np.linspace(-3.4, 3.4, 100), 2)
     assert unwrapped(channel("heading", STEPS, values)).tolist() == values.tolist()
+
+
+RANGES = {
+    "nan": "empty",
+    "2 2 nan": "always 2",
+    "1.5 -0.2": "-0.2 to 1.5",
+    "1e6 1000001": "1000000 to 1000001",
+    "1 1.000000000001": "1 to 1.0000000000010001",
+}
+
+
+def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart() -> None:
+    assert [range_in_words(np.array(values.split(), float)) for values in RANGES] == [*RANGES.values()]
+
+
+def test_commands_hold_for_one_more_usual_interval_and_begin_at_0() -> None:
+    one = commands(np.array([3.0]), {"a": np.array([0.5])})
+    assert (one.interval, one.end) == (0.0, 3.0)
+    several = commands(np.array([3.0, 4.0, 6.0, 10.0]), {"a": np.array([0.1, -0.4, 0.2, 0.2]), "b": np.zeros(4)})
+    assert (several.end, several.largest) == (12.0, {"a": 0.4, "b": 0.0})
+    assert several.at(np.array([2.9, 3.0, 5.9]))[:, 0].tolist() == [0.0, 0.1, -0.4]
+
+
+def test_rows_begin_when_each_series_has_a_value() -> None:
+    rows, values = in_rows({"a": (STEPS[:3], STEPS[:3]), "b": (STEPS[1:4] + 0.05, STEPS[:3])})
+    assert rows == pytest.approx([0.15, 0.2, 0.25, 0.35])
+    assert values["a"] == pytest.approx([0.1, 0.2, 0.2, 0.2])
+    assert values["b"] == pytest.approx([0.0, 0.0, 0.1, 0.2])
 
 
 def test_a_gap_is_longer_than_1_s_and_than_ten_usual_intervals() -> None:

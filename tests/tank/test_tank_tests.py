@@ -12,11 +12,11 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import heading, sentences
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import FileError
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
-from tests.commands import TESTS, without_progress
+from tests.commands import TESTS
 from tests.folders import rows_of
 
 
@@ -137,18 +137,18 @@ STEADY, TAU, LOG = (
     "time [s],command [%],depth [m]\n",
 )
 BAD: list[tuple[str, str, str]] = [
-    ("steady_surge.csv", STEADY + "20,fast\n", "line 2 | 'velocity [m/s]' = 'fast' | number"),
-    ("steady_surge.csv", STEADY + "20,0\n", "line 2 | 'velocity [m/s]' = 0 | sign"),
-    ("steady_surge.csv", STEADY + "0,0.1\n", "line 2 | 'command [%]' = 0 | must not be 0, because nothing moves then"),
-    ("steady_surge.csv", STEADY + "120,0.3\n", "line 2 | [%]' = '120' | at most 100"),
+    ("steady_surge.csv", f"{STEADY}20,fast\n", "line 2 | 'velocity [m/s]' = 'fast' | number"),
+    ("steady_surge.csv", f"{STEADY}20,0\n", "line 2 | 'velocity [m/s]' = 0 | sign"),
+    ("steady_surge.csv", f"{STEADY}0,0.1\n", "line 2 | 'command [%]' = 0 | must not be 0, because nothing moves then"),
+    ("steady_surge.csv", f"{STEADY}120,0.3\n", "line 2 | [%]' = '120' | at most 100"),
     ("steady_surge.csv", STEADY.replace("%", "us") + "1901,0.3\n", "[us]' = 1901: is beyond full thrust; [us NEUTRAL"),
     ("thrust_rear.csv", "command [%],force [N]\n60,10\n-9,0.49\n-8,0.51\n", "line 4 | = 0.51: must have the sign"),
-    ("steady_surge.csv", STEADY + "0.2,0.3\n", "'command [%]' | Are they fractions? Then write [1]"),
+    ("steady_surge.csv", f"{STEADY}0.2,0.3\n", "'command [%]' | Are they fractions? Then write [1]"),
     ("steady_surge.csv", "command [%],velocity\n20,0.3\n", "line 1 | column 2 = 'velocity' | [m/s]"),
     ("steady_surge.csv", "command [%],velocity [m/s],command [1]\n", "line 1 | column 3 | [1]' | twice"),
-    ("steady_yaw.csv", STEADY + "20,1\n", "line 1 | column 2 | 'velocity [rad/s]' or 'velocity [deg/s]'"),
-    ("time_constant_yaw.csv", TAU + "20,-3\n", "line 2 | 'time constant [s]' = -3 | above 0"),
-    ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0,30,0\n", "line 4 | 'time [s]' = 0: | goes back"),
+    ("steady_yaw.csv", f"{STEADY}20,1\n", "line 1 | column 2 | 'velocity [rad/s]' or 'velocity [deg/s]'"),
+    ("time_constant_yaw.csv", f"{TAU}20,-3\n", "line 2 | 'time constant [s]' = -3 | above 0"),
+    ("log_heave.csv", f"{LOG}0,30,0\n0.1,30,0\n0,30,0\n", "line 4 | 'time [s]' = 0: | goes back"),
     ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", "line 1 | 'depth [m]' or"),
     ("stedy_surge.csv", STEADY, "neither a log, which has a column 'time [s]' | ; did you mean steady?"),
     ("dive.csv", "time,u_l [%],depth [m]\n0,0,0\n", "line 1 | 'time': must be 'time [s]' or 'time [ms]'"),
@@ -160,12 +160,13 @@ BAD: list[tuple[str, str, str]] = [
 
 
 @pytest.mark.parametrize("case", range(len(BAD)))
-def test_bad_file_is_one_clear_line(case: int, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_file_is_one_clear_line(case: int, folder: Path) -> None:
     name, content, named = BAD[case]
     path = folder / name
     without_curve(folder, name.removesuffix(".csv").rpartition("_")[2])
     path.write_text(content, encoding="utf-8", errors="surrogateescape")
-    refused(folder, (str(path), *named.split(" | ")), capsys)
+    (line,) = refused(folder)
+    assert all(word in line for word in (str(path), *named.split(" | ")))
 
 
 STILL = [f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)]
@@ -179,32 +180,36 @@ STILL = [f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)]
     ],
 )
 def test_a_log_that_teaches_nothing_is_refused_where_there_is_no_other_test(
-    rows: list[str], reason: str, folder: Path, capsys: pytest.CaptureFixture[str]
+    rows: list[str], reason: str, folder: Path
 ) -> None:
     for path in folder.glob("[st]*.csv"):
         path.unlink()
     log = folder / "log_heave.csv"
     log.write_text(LOG + "\n".join(rows) + "\n", encoding="utf-8")
-    refused(folder, (f"{log}: {reason}: nothing is identifiable",), capsys)
+    assert refused(folder) == [f"{log}: {reason}: nothing is identifiable"]
     (folder / "log_heave_2.csv").write_text(log.read_text(encoding="utf-8") + "9,,\n", encoding="utf-8")
-    with pytest.raises(DataFileError) as error:
-        load_tests(folder)
-    assert [line.partition(": ")[0] for line in str(error.value).splitlines()] == [
+    assert [line.partition(": ")[0] for line in refused(folder)] == [
         str(folder / name) for name in ("log_heave.csv", "log_heave_2.csv")
     ]
 
 
-def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    """The exit code is 2, one line has all the words, and the output file stays as it was."""
-    output = folder.parent / "out.toml"
-    output.write_text("before", encoding="utf-8")
-    there = sorted(folder.parent.rglob("*"))
-    assert main(["identify", str(folder), "--force", "-o", str(output)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    err = without_progress(err)
-    assert len(err.splitlines()) == 1
-    for word in named:
-        assert word in err
-    assert output.read_text(encoding="utf-8") == "before"
-    assert sorted(folder.parent.rglob("*")) == there
+def test_a_folder_with_the_name_of_a_table_is_refused(folder: Path) -> None:
+    (folder / "steady_surge.csv").unlink()
+    (folder / "steady_surge.csv").mkdir()
+    assert refused(folder) == [f"{folder / 'steady_surge.csv'}: cannot be read: Is a directory"]
+
+
+def refused(folder: Path) -> list[str]:
+    """Return the lines of the refusal."""
+    with pytest.raises(FileError) as error:
+        load_tests(folder)
+    return str(error.value).splitlines()
+
+
+def test_a_refusal_leaves_the_output_as_it_was(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "steady_surge.csv").write_text(STEADY, encoding="utf-8")
+    (folder / "out.toml").write_text("before", encoding="utf-8")
+    there = {path: path.read_bytes() for path in folder.iterdir()}
+    assert main(["identify", str(folder), "--force", "-o", str(folder / "out.toml")]) == 2
+    assert capsys.readouterr().out == ""
+    assert {path: path.read_bytes() for path in folder.iterdir()} == there

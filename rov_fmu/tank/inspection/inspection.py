@@ -91,10 +91,11 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
         is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {title: ranges[title] for title in titles if not is_column(meant[title])}
+        count = sum(title not in unread for title in titles)
         has_time = has_column(meant.values(), {"time": TIME})
         if not has_time and (table := _of_unnamed_table(path, renamed, ranges)):
             return [table]
-        if len(unread) > len(titles) - 2 or not has_time:
+        if count < 2 or not has_time:
             return [Inspection(path, path.name, (), (), unread, (), columns)]
     else:
         names, _ = names_of(layout if description else None, tables)

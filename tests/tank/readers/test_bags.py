@@ -3,22 +3,15 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
-from tests.tank.logs import Read, axes, commanded, measured, read_log, used
+from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import ARRIVAL, ENU, FLU, Dive, Ros, messages_of
-
-
-def array(ros: Ros, dive: Dive, n: int) -> Any:
-    """Return commands without a header."""
-    return ros.message("std_msgs/msg/Float64MultiArray", data=(dive.pulses[n] - 1500.0) / 400.0)
+from tests.tank.readers.writers import Ros, messages_of, outputs
 
 
 def told(log: Read) -> tuple[str, ...]:
@@ -35,20 +28,6 @@ def test_frames_that_are_named_ned_are_those_of_the_sea_already(tmp_path: Path) 
     )
 
 
-def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path) -> None:
-    ros = Ros(2)
-    path = ros.write(tmp_path, messages_of(ros, DIVE, commands=array))
-    log = read_log(path, BLUEROV2)
-    assert f"{path.name}: 100 messages of /thrusters without a time in the header: the time of arrival is used" in (
-        told(log)
-    )
-    commands = log.log.commands
-    assert commands is not None
-    (step,) = np.flatnonzero(np.diff(commanded(log.log, "5")))
-    first = used(log.log, "depth").time[0]
-    assert commands.rows[step + 1] - first == pytest.approx(TIME[10] + ARRIVAL - TIME[0], abs=1e-6)
-
-
 def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:
     """A message of one byte stands among those of 64 bits."""
     ros = Ros(2)
@@ -58,39 +37,14 @@ def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:
     assert "dive.db3: 1 damaged piece left out" in told(log)
 
 
-def test_a_topic_for_each_thruster_a_depth_sensor_and_an_imu(tmp_path: Path) -> None:
-    """The topics count from 0; the IMU measures the attitude."""
-    ros = Ros(2)
-    messages: list[tuple[str, float, Any]] = []
-    for n, (time, R) in enumerate(zip(TIME, DIVE.rotation, strict=True)):
-        number = ros.store.types["std_msgs/msg/Float64"]
-        pulse = 1500.0 + 400.0 * np.array([*motion.THRUSTERS.values()])[:, n]
-        messages += [(f"/rov/thruster{k}/input", time, number(data=float(value))) for k, value in enumerate(pulse)]
-        messages += [("/bar30/depth", time, number(data=float(motion.DEPTH[n])))]
-        header = ros.header(time, "imu_link")
-        imu = ros.message("sensor_msgs/msg/Imu", header=header, orientation=ros.quaternion(ENU @ R @ FLU))
-        messages += [("/imu", time - ARRIVAL, imu)]
-    log = read_log(ros.write(tmp_path, messages), BLUEROV2).log
-    assert axes(log) == ["heave", "roll", "pitch", "yaw"]
-    assert measured(log, "depth") == pytest.approx(motion.DEPTH)
-    assert commanded(log, "6", used(log, "depth").time) == pytest.approx(motion.THRUSTERS["6"])
-    assert measured(log, "heading") == pytest.approx(motion.HEADING, abs=1e-6)
-    late = used(log, "depth").time - used(log, "heading").time
-    assert late == pytest.approx(ARRIVAL * np.ones(len(TIME)), abs=1e-6)
-    assert measured(log, "pitch angle").min() == pytest.approx(-0.2, abs=1e-3)
-
-
 def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     """A driver publishes percent, and an altitude in cm that is negative below the surface."""
     ros = Ros(2)
-    commands = [[100.0 * c[n] for c in motion.THRUSTERS.values()] for n in range(len(TIME))]
     messages: list[tuple[str, float, Any]] = []
     for n, time in enumerate(TIME):
-        messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=np.array(commands[n])))]
+        messages += [("/out", time, ros.message("std_msgs/msg/Float64MultiArray", data=0.25 * DIVE.pulses[n] - 375.0))]
         messages += [("/alt", time, ros.vector("Vector3", [0.0, 0.0, -100.0 * motion.DEPTH[n]]))]
     path = ros.write(tmp_path, messages)
-    with pytest.raises(DataFileError, match="no commands of thrusters were found"):
-        read_log(path, BLUEROV2)
     table = {f"/out.data[{n}]": f"u_{n + 1} [%]" for n in range(6)} | {"/alt.z": "-depth [cm]"}
     names, mistakes = names_of(BLUEROV2, RovTables(topics=table))
     assert not mistakes
@@ -99,3 +53,10 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     assert measured(log.log, "depth") == pytest.approx(motion.DEPTH)
     assert commanded(log.log, "2") == pytest.approx(motion.THRUSTERS["2"])
     assert log.log.names >= table.keys()
+    assert log.log.commands
+    assert log.log.commands.source.topic == "/out.data[0] ... /out.data[5]"
+    messages += [("/rc/out", time, outputs(ros, DIVE, n)) for n, time in enumerate(TIME)]
+    names, _ = names_of(BLUEROV2, RovTables(topics={"/alt.z": "-depth [cm]"}))
+    found = read_log(ros.write(tmp_path / "autopilot", messages), BLUEROV2, names=names).log
+    assert commanded(found, "2") == pytest.approx(motion.THRUSTERS["2"])
+    assert (axes(found), [*found.unread]) == (["heave"], ["/out", *(f"/out.data[{n}]" for n in range(6))])

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
@@ -21,7 +20,7 @@ from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.parsers import budget, format_of, one_parser, read_parsed
 from tests.tank.logs import read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
-from tests.tank.readers.writers import LOGS, Ros, att, bag, ctun, dataflash, flash, packed, rcou
+from tests.tank.readers.writers import LOGS, Ros, bag, flash
 
 
 def read(path: Path) -> Content:
@@ -103,6 +102,7 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = flash(tmp_path, DIVE)
+    assert read(path).pieces  # from then on the process has imported the parser
     with monkeypatch.context() as patch:
         patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
         with pytest.raises(DataFileError) as error:
@@ -113,35 +113,16 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
 
 def test_messages_without_a_time_or_an_output_are_no_traceback(tmp_path: Path) -> None:
     time = struct.pack("<Q", 10**6)
-    for name, format_of_message, reason in (
-        ("none.ulg", "actuator_motors:float[12] control;", "no commands of thrusters"),
-        ("no_control.ulg", "actuator_motors:uint64_t timestamp;float other;", "no commands of thrusters"),
-        ("no_output.ulg", "actuator_outputs:uint64_t timestamp;uint32_t noutputs;", "no commands of thrusters"),
-        ("text.ulg", "actuator_motors:uint64_t timestamp;char[12] control;", "no commands of thrusters"),
+    for name, format_of_message in (
+        ("none.ulg", "actuator_motors:float[12] control;"),
+        ("no_control.ulg", "actuator_motors:uint64_t timestamp;float other;"),
+        ("no_output.ulg", "actuator_outputs:uint64_t timestamp;uint32_t noutputs;"),
+        ("text.ulg", "actuator_motors:uint64_t timestamp;char[12] control;"),
     ):
         path = _ulog(tmp_path / name, format_of_message, data=time + bytes(200))
-        with pytest.raises(DataFileError, match=reason):
+        with pytest.raises(DataFileError, match="no commands of thrusters"):
             read_log(path, BLUEROV2)
         assert all(one.path == path for one in inspect(path, [BLUEROV2]))
-
-
-@pytest.mark.parametrize("stamp", ["repeated", "huge", "in bursts"])
-def test_times_that_no_clock_shows_are_no_traceback(stamp: str, tmp_path: Path) -> None:
-    stamps = {"repeated": lambda n: 0 * n, "huge": lambda n: 2**62 * (n % 3), "in bursts": lambda n: 10**6 * (n // 10)}
-    messages = []
-    for n in range(60):
-        time = stamps[stamp](n) * 1e-6
-        pulse = 1500 + 200 * (n >= 10)
-        messages += [
-            rcou(time, pulse, 3000 - pulse, 3000 - pulse, pulse, 1500, 1500),
-            ctun(time, -0.1 * n),
-            att(time, n),
-        ]
-        messages += [packed("BAT", round(time * 1e6), 0, float("nan") if n % 2 else float("inf"))]
-    path = dataflash(tmp_path / "a.bin", messages)
-    assert all(np.isfinite(row.rate) for one in inspect(path, [BLUEROV2]) for row in one.channels)
-    with suppress(DataFileError):
-        read_log(path, BLUEROV2)
 
 
 # ---- Damaged files ---------------------------------------------------------------------------------------------------

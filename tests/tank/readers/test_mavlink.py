@@ -1,50 +1,37 @@
 """Logs of ArduSub, which the tests write with pymavlink (.tlog) and in the DataFlash format (.bin)."""
 
 import sys
-from math import cos, pi, sin
+from math import nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
+from rov_fmu.tank.readers.mavlink import Message, read_messages
 from tests.tank.logs import commanded, measured, read_log, used
 from tests.tank.readers.motion import BLUEROV2, DIVE
-from tests.tank.readers.writers import altitude, attitude, flash, parameter, pulse, servos, write_tlog
+from tests.tank.readers.writers import altitude, attitude, flash, servos, write_tlog
 
 N = 60
+EKF, LOCAL = "EKF_STATUS_REPORT", "LOCAL_POSITION_NED"
 
 
 # ---- .tlog -----------------------------------------------------------------------------------------------------------
 
 
-def dive(start: float = 100.0) -> list[tuple[float, Any]]:
+def dive(start: float = 100.0, down: int = 1700) -> list[tuple[float, Any]]:
     """Return messages of a dive: from 1 s on, the vertical thrusters push down and the depth grows at 0.2 m/s."""
     found = []
     for n in range(N):
         time = start + 0.1 * n
-        down = pulse(0.5) if n >= 10 else 1500
-        found += [servos(time, 1500, 1500, 1500, 1500, down, down)]
+        found += [servos(time, *[1500] * 4, *[down if n >= 10 else 1500] * 2)]
         found += [altitude(time + 0.03, -1.0 - 0.02 * max(n - 10, 0)), attitude(time + 0.05, 1.0)]
     return found
-
-
-def test_thrusters_by_the_parameters_of_the_autopilot(tmp_path: Path) -> None:
-    """Motor 6 is on servo 9 and turns in the opposite direction; the lights are on servo 6."""
-    numbers = {"MOT_6_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0, "SERVO9_FUNCTION": 38}
-    parameters = [parameter(name, value) for name, value in numbers.items()]
-    messages = []
-    for n in range(N):
-        down = 0.5 * (n >= 10)
-        messages += [servos(0.1 * n, 1500, 1500, 1500, 1500, pulse(down), 1100, 1500, 1500, pulse(-down))]
-        messages += [altitude(0.1 * n, -0.01 * n)]
-    log = read_log(write_tlog(tmp_path / "dive.tlog", [*parameters, *messages]), BLUEROV2)
-    assert commanded(log.log, "6")[-1] == 0.5
-    assert log.findings == [Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"})]
 
 
 def test_a_clock_of_servos_that_begins_anew(tmp_path: Path) -> None:
@@ -56,25 +43,36 @@ def test_a_clock_of_servos_that_begins_anew(tmp_path: Path) -> None:
     assert since[np.flatnonzero(commanded(log, "5"))[0]] == pytest.approx(1.0, abs=2e-3)
 
 
-def test_velocities_are_turned_into_the_body(tmp_path: Path) -> None:
-    """The vehicle moves ahead at 0.01 n m/s over ground while it turns, with a pitch of -0.2 and a roll of 0.1 rad.
+def test_the_filter_tells_which_velocities_it_knows() -> None:
+    """Of its flags, 2 means that it knows the horizontal velocity, and 128 that it assumes that the vehicle rests."""
+    messages = []
+    for n, flags in enumerate((0, 253, 255, 126)):
+        local = {"time_boot_ms": 1000.0 * n + 500.0, "vx": 1.0, "vy": 2.0, "vz": 3.0}
+        messages += [Message(Source(EKF, EKF, "1"), 9.0 + n, {"flags": flags, "time_boot_ms": 1000.0 * n})]
+        messages += [Message(Source(LOCAL, LOCAL, vehicle), 9.5 + n, local) for vehicle in "12"]
+    content = read_messages(Path("a.tlog"), messages, ())
+    own, other = content.pieces[0].topics
+    np.testing.assert_equal([own.fields["vx"], own.fields["vy"]], [[nan] * 3 + [1.0], [nan] * 3 + [2.0]])
+    assert (own.fields["vz"].tolist(), other.fields["vx"].tolist()) == ([3.0] * 4, [1.0] * 4)
+    assert content.findings == [Finding("unknown velocity", file="a.tlog", numbers={"count": 3})]
 
-    The first nine velocities are unknown.
-    """
-    ahead, messages = pulse(0.4), []
-    flags = [0, 253, 255, *[126] * 20]  # 2: it knows the horizontal velocity, 128: it assumes that the vehicle rests
-    for n in range(N):
-        psi, V = -pi / 4 + 0.01 * n, 0.01 * n
-        outputs = [3000 - ahead, 3000 - ahead, ahead, ahead, 1500, 1500] if n > 5 else [1500] * 6
-        local = mavlink.MAVLink_local_position_ned_message(100 * n, 0, 0, 0, V * cos(psi), V * sin(psi), 0)
-        state = mavlink.MAVLink_ekf_status_report_message(flags[n // 3], 0, 0, 0, 0, 0)
-        messages += [(0.1 * n - 0.01, state), servos(0.1 * n, *outputs), attitude(0.1 * n, psi), (0.1 * n, local)]
-    read = read_log(write_tlog(tmp_path / "dive.tlog", messages), BLUEROV2)
-    log, speed = read.log, 0.01 * np.arange(9, N)
-    assert measured(log, "surge velocity") == pytest.approx(cos(-0.2) * speed, abs=1e-6)
-    assert measured(log, "sway velocity") == pytest.approx(sin(0.1) * sin(-0.2) * speed, abs=1e-6)
-    assert [commanded(log, thruster)[-1] for thruster in "1234"] == pytest.approx([-0.4, -0.4, 0.4, 0.4])
-    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 9}) in read.findings
+
+def test_the_primary_core_of_the_filter_is_used_while_it_is_primary() -> None:
+    messages = []
+    for n in range(4):
+        for core in (0, 1, 2):
+            told = {"XKF1": {"VN": 1.0 + core, "VE": 0.0}, "XKF4": {"SS": 831.0, "PI": float(n > 1)}}
+            for kind, numbers in told.items():
+                source = Source(kind, kind, part=f"core {core}")
+                messages += [Message(source, float(n), {"TimeUS": 1e6 * n, **numbers})]
+    content = read_messages(Path("a.bin"), messages, ())
+    primary, *cores = content.pieces[0].topics
+    assert primary.source.part == "core 0 and 1, the primary one"
+    assert primary.fields["VN"].tolist() == [1.0, 1.0, 2.0, 2.0]
+    assert {core.source.part: core.unused for core in cores} == dict.fromkeys(
+        ("core 0", "core 1", "core 2"), "the autopilot used core 0 and 1"
+    )
+    assert not content.findings
 
 
 def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) -> None:
@@ -86,6 +84,8 @@ def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) 
     assert commanded(log.log, "5")[0] == 0.0
     names = {"vehicles": "1 and 2", "vehicle": "1"}
     assert Finding("several vehicles", file="dive.tlog", names=names) in log.findings
+    assert log.log.commands
+    assert log.log.commands.source.part == "component 1"
     assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
 
 
@@ -113,6 +113,16 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
             "a.tlog",
             bytes(range(256)) * 20,
             "its first bytes are those of none of the formats that are read",
+        ),
+        (
+            "a.db3",
+            b"SQLite format 3\0" + bytes(99),
+            "begins as a bag of ROS 2, but is damaged .*; `sqlite3 .recover` may rep",
+        ),
+        (
+            "a.ulg",
+            b"ULog\1\x12\x35",
+            "begins as a ULog, but is damaged or was cut short, and cannot be r[^;]*$",
         ),
     ],
 )

@@ -14,7 +14,7 @@ TOLD = {
     ".csv": [],
     ".tlog": ["time of arrival", "unknown direction"],
     "BlueOS": ["time of arrival", "damaged pieces", "source of commands"],
-    ".bin": ["unknown direction"],
+    ".bin": [],
     ".ulg": ["unknown direction"],
 }
 """The kinds of findings by format but for bags of ROS."""

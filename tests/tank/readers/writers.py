@@ -171,9 +171,7 @@ def blueos(folder: Path, dive: Dive) -> Path:
 # Type, name, format and columns, as ArduSub 4.1 declares them.
 FORMATS = {
     "RCOU": (150, "QHHHHHHHHHHHHHH", "TimeUS,C1,C2,C3,C4,C5,C6,C7,C8,C9,C10,C11,C12,C13,C14"),
-    "CTUN": (151, "Qffffffffffhh", "TimeUS,ThI,ABst,ThO,ThH,DAlt,Alt,BAlt,DSAlt,SAlt,TAlt,DCRt,CRt"),
     "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
-    "BARO": (153, "QBffcfIffB", "TimeUS,I,Alt,Press,Temp,CRt,SMS,Offset,GndTemp,Health"),
     "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
     "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
     "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
@@ -205,16 +203,8 @@ def rcou(time: float, *pulses: int) -> bytes:
     return packed("RCOU", round(time * 1e6), *pulses, *[0] * (14 - len(pulses)))
 
 
-def ctun(time: float, alt: float) -> bytes:
-    return packed("CTUN", round(time * 1e6), 0.0, 0.0, 0.0, 0.0, 0.0, alt, 0.0, 0.0, 0.0, 0.0, 0, 0)
-
-
-def att(time: float, yaw: float) -> bytes:
-    return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
-
-
 def flash(folder: Path, dive: Dive) -> Path:
-    messages = []
+    messages = [packed("PARM", round(dive.start * 1e6), b"MOT_1_DIRECTION", 1.0, 0.0)]
     for n, time in enumerate(dive.start + dive.time):
         degrees, stamp = np.degrees(dive.euler[n]), round(time * 1e6)
         heading = degrees[2] % 360.0
@@ -245,8 +235,10 @@ ULOG_CODES = {"float": "f", "uint64_t": "Q", "uint32_t": "I", "uint8_t": "B", "b
 class ULogWriter:
     """Collects messages."""
 
-    def __init__(self) -> None:
+    def __init__(self, **parameters: int) -> None:
         self.content = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", round(ULOG_BOOT * 1e6))
+        for name, value in parameters.items():
+            self.parameter(name, value)
         for name, fields in ULOG_FORMATS.items():
             self._add(b"F", f"{name}:uint64_t timestamp;{fields};".encode())
         for n, name in enumerate(ULOG_FORMATS):
@@ -254,6 +246,10 @@ class ULogWriter:
 
     def _add(self, kind: bytes, payload: bytes) -> None:
         self.content += struct.pack("<H", len(payload)) + kind + payload
+
+    def parameter(self, name: str, value: int) -> None:
+        key = f"int32_t {name}".encode()
+        self._add(b"P", bytes([len(key)]) + key + struct.pack("<i", value))
 
     def message(self, name: str, time: float, *values: float) -> None:
         form = ""
@@ -269,9 +265,11 @@ class ULogWriter:
         return path
 
 
-def ulog_of(dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True) -> ULogWriter:
+def ulog_of(
+    dive: Dive, velocity: str = "vehicle_local_position", *, pulses: bool = True, **parameters: int
+) -> ULogWriter:
     """Return the messages of a dive. The attitude is published 2 ms after it was sampled, or stands in the odometry."""
-    log = ULogWriter()
+    log = ULogWriter(**parameters)
     for n, time in enumerate(dive.time):
         if pulses:
             log.message("actuator_outputs", time, 6, *[0] * 4, *dive.pulses[n], *[0.0] * 10)
