@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -68,6 +69,9 @@ def test_numbers_and_units(heavy: VehicleModel) -> None:
         (0, 0.2, 0.3),
         (1_000_000_000, -0.1, 0.3),
     ]
+    (stamp,) = (tf.timestamp for tf in found["/tf"][-1][1].transforms)
+    assert (stamp.seconds, stamp.nanos) == (2, 0)
+    assert heavy.to_mcap(pd.DataFrame({**result, "t": result.time, "run": 7})) == content
     summary = make_reader(BytesIO(content)).get_summary()
     assert summary
     schemas = {c.topic: summary.schemas[c.schema_id] for c in summary.channels.values()}
@@ -110,8 +114,9 @@ def test_frames(heavy: VehicleModel, angles: tuple[float, float, float]) -> None
 def test_level_frames_and_the_picture_with_the_jets(heavy: VehicleModel) -> None:
     """A jet leaves its thruster against the force; the longest one has 1.5 times the length of the hull."""
     videoray = rov_fmu.load("videoray")
-    (_, first), *_ = messages(videoray.to_mcap(recorded(videoray, 0.1, {}, x=1.0, z=3.0, psi=2.5)))["/pose"]
-    np.testing.assert_allclose(turned(first.pose), by_hand(0.0, 0.0, 2.5), atol=1e-12)
+    at_rest = messages(videoray.to_mcap(recorded(videoray, 0.1, {}, x=1.0, z=3.0, psi=2.5)))
+    np.testing.assert_allclose(turned(at_rest["/pose"][0][1].pose), by_hand(0.0, 0.0, 2.5), atol=1e-12)
+    assert not at_rest["/scene"][0][1].entities[0].arrows
     found = messages(heavy.to_mcap(recorded(heavy, 0.1, {"u_5": 0.5, "u_1": -0.2}, x=1.0, z=3.0)))
     ((_, moved),) = found["/tf"][-1:]
     (tf,) = moved.transforms

@@ -19,7 +19,7 @@ from tests.commands import BARE
 from tests.vehicles import EVERYTHING, THRUST_EFFECTS, VIDEORAY
 
 Capsys = pytest.CaptureFixture[str]
-COMMANDS = "time,u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
+COMMANDS = "time [s],u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
 
 
 @pytest.fixture
