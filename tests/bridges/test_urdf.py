@@ -49,9 +49,10 @@ def test_each_axis_accelerates_as_the_vehicle_does(name: str) -> None:
     linear, quadratic = (six(element, f"{n}_damping", f) for n, f in (("linear", "{0}{1}"), ("quadratic", "{0}{1}{1}")))
     level = rov.layout.at_rest
     weight, buoyancy = (float(element.find(tag).text) for tag in ("weight", "buoyancy"))
+    own = [rov.coefficients.get(moment, 0.0) for moment in ("I_p", "I_q", "I_r")]
     for n in (n for n, v in enumerate("uvwpqr") if v not in rov.layout.by_velocity):
         assert (M[n], linear[n], quadratic[n]) == (rigid[n], 0.0, 0.0)
-        assert n < 3 or name == "bare" or rigid[n] == max(rov.coefficients.get(I, 0.0) for I in ("I_p", "I_q", "I_r"))
+        assert n < 3 or name == "bare" or rigid[n] == max(own)
     assert weight == pytest.approx(rov.coefficients.get("W", rov["m_rov"] * 9.8))
     for form in rov.layout.axes:
         v = form.axis.velocity
