@@ -252,6 +252,7 @@ def test_the_thrust_of_each_propeller_is_listed_and_what_the_vehicle_lacks_is_he
             assert 0.0 < -gazebo.rigid[n, n] / gazebo.linear[n, n] < 0.1, "s until it rests"
             typical = max(own, default=rov["m_rov"] * gazebo.volume ** (2.0 / 3.0) / 6.0)
             assert n < 3 or gazebo.rigid[n, n] == pytest.approx(1000.0 * typical, rel=5e-4)
+            assert n < 3 or not any(abs(wrench[n]) > 1e-9 for wrench in gazebo.thrusters.values())
     if name == "bluerov2_heavy":
         for t in rov.layout.thrusters:
             assert gazebo.places[t.name] == pytest.approx(HALF_TURN @ t.place)
@@ -374,7 +375,7 @@ def test_the_warning_is_there_where_the_plugin_diverges(case: str) -> None:
 
 # ---- Notes and mistakes ----------------------------------------------------------------------------------------------
 
-PARALLEL = tuned("bluerov2_heavy", F_0_w=2.0, alpha_u=0.8, alpha_v=0.6, alpha_w=0.0)
+PARALLEL = tuned("bluerov2_heavy", I_r=0.8, F_0_w=2.0, alpha_u=0.8, alpha_v=0.6, alpha_w=0.0)
 LEVEL = "thrusters stand where their force has no moment in roll and pitch"
 SENDER = "the Thruster plugin takes newtons, so these are left to the sender: the thrust curve"
 NOTES = {
@@ -428,6 +429,7 @@ NOTES = {
 def test_the_notes_say_what_is_otherwise_in_the_file_too(case: str) -> None:
     vehicle, explicit, notes = NOTES[case]
     model = gazebo_model(vehicle, explicit=explicit)
+    check_model(root_of(model.text))
     assert [*model.notes] == notes
     (comment, *_) = root_of(model.text).xpath("/comment()")
     assert all(f"- {note}.\n" in comment.text for note in notes)

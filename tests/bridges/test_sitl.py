@@ -343,10 +343,9 @@ def test_the_distance_to_the_bottom_is_that_of_a_sensor_with_a_range_of_100_m(
     assert found["attitude"][2] == pytest.approx(remainder(start.get("psi_0", 0.0), 2.0 * pi), abs=1e-3)
 
 
-@pytest.mark.parametrize("offset", [pytest.param(0.0, marks=pytest.mark.long), 1.05])
-def test_holds_its_place_in_a_current(offset: float) -> None:
-    """ArduSub's position hold, which faces the current or lies across it: depth to 5 cm, heading to 2 degrees."""
-    heading = atan2(-0.1, -0.2) + offset
+def test_holds_its_place_in_a_current() -> None:
+    """ArduSub's position hold, which lies across the current: depth to 5 cm, heading to 2 degrees."""
+    heading = atan2(-0.1, -0.2) + 1.05
     with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=heading + 0.05)) as (_, port):
         autopilot = ArduSub(port, depth=1.0, heading=heading, place=(0.0, 0.0))
         autopilot.fly(25.0)
@@ -467,7 +466,6 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
         ("videoray --set V_X=0.5", "--set V_X=0.5: the vehicle has no such"),
         ("videoray --log a.txt", "--log a.txt: the name must end with .csv or .mcap"),
         ("videoray --host 192.0.2.1", "--host 192.0.2.1, --port 9002: cannot listen there"),
-        ("videoray --bottom x", "Invalid value for '--bottom': 'x' must be a number"),
         (quote(f"{ROOT / 'verification' / 'fuzzing' / 'bare.toml'}"), "VEHICLE: none of ArduSub's frames"),
     ],
 )

@@ -14,14 +14,8 @@ from numpy.typing import NDArray
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, ROOT
-from tests.vehicles import EVERYTHING
+from tests.bridges.test_sdf import LOADED
 
-REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
-FILES = {**SHIPPED, "bare": BARE, "everything": EVERYTHING, "remus100": REMUS}
-LOADED = {name: load_vehicle(path) for name, path in FILES.items()}
 SIX = ("Xu", "Yv", "Zw", "Kp", "Mq", "Nr")
 
 

@@ -53,7 +53,6 @@ TYPED: dict[str, tuple[str, str]] = {
         "study plan.toml -o r --workers x",
         "Invalid value for '--workers': 'x' must be a whole number from 1 to 1024",
     ),
-    "a tolerance in words": ("prove x.fmu --tolerance x", "'--tolerance': 'x' must be a number above 0"),
     "percent": ("tune videoray --axis heave --command 30% --v-ss 0.2", f"'--command': '30%' {_COMMAND}"),
     "percent without a sign": (
         "tune videoray --axis heave --command 30 --v-ss 0.2",
@@ -233,16 +232,6 @@ _LOG = "time [s],command [%],depth [m]\n" + _ROWS
 _NAMED = "is not an axis of this vehicle"
 # A file of tank tests, and what the one line says of it.
 TABLES: dict[str, tuple[str, str, str]] = {
-    "a log without a command": (
-        "log_heave.csv",
-        "time [s],depth [m]\n" + _ROWS,
-        "line 1: there is no column of commands. Possible columns: u_l, u_r, u_t or command, each in [%], [1] or [us]",
-    ),
-    "a command with its unit in other brackets": (
-        "log_heave.csv",
-        "time [s],command (us),depth [m]\n" + _ROWS,
-        "is it the column 'command (us)'? Units stand in square brackets.",
-    ),
     "a log of an axis that no thruster drives": (
         "log_roll_1.csv",
         _LOG.replace("depth [m]", "roll [deg]"),

@@ -231,11 +231,12 @@ def test_a_table_of_any_name_is_recognised_by_its_units_and_told_its_name(
         (["H1", "H2", "H3", "H4", "V1", "V2"], ""),
         ([f"Leg{n} (mbar)" for n in range(1, 7)], "?"),
         ([f"RC{n}" for n in range(1, 7)], "?"),
+        (["T1"], "?"),
     ],
 )
 def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp_path: Path, inspect: Inspect) -> None:
     """A vehicle that ships is the base where the names are numbers; each number is that of its thruster."""
-    pulses = [np.where(TIME < 6.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS]
+    pulses = [np.where(TIME < 6.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS[: len(titles)]]
     table(tmp_path / "dive.csv", ",".join(["time [s]", *titles, "depth [m]"]), TIME, *pulses, DEPTH)
     _, text = inspect()
     assert [*re.findall(r'^base = "(.*)"', text, re.M)] == [base] * bool(base)
