@@ -18,7 +18,6 @@ import pytest
 from lxml import etree
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.spatial.transform import Rotation
 
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.cli import main
@@ -29,6 +28,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
 from tests.vehicles import VEHICLES, pulsed
+from verification.references.rigid_body import coriolis, quaternion_of, rigid_body_mass, rotation, skew
 
 Array = NDArray[np.float64]
 REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
@@ -138,9 +138,8 @@ class Gazebo:
             inertial, at = link.find("inertial"), numbers(link.findtext("pose") or "0 0 0 0 0 0")
             mass = float(inertial.findtext("mass"))
             centre = at[:3] + numbers(inertial.findtext("pose") or "0 0 0 0 0 0")[:3]
-            S = skew(centre)
-            about = inertia_of(inertial) - mass * S @ S
-            self.rigid += np.block([[mass * np.eye(3), -mass * S], [mass * S, about]])
+            about = inertia_of(inertial) - mass * skew(centre) @ skew(centre)
+            self.rigid += rigid_body_mass(mass, about, centre)
             self.weights.append((mass, centre))
             for entry in inertial.iterfind("fluid_added_mass/*"):
                 i, j = map("xyzpqr".index, entry.tag)
@@ -182,21 +181,14 @@ class Gazebo:
         """The derivatives of position, rotation matrix and velocities: Kirchhoff's equations."""
         turned, velocity = state[3:12].reshape(3, 3), state[12:]
         matrix = self.rigid + self.added
-        momentum, v, omega = matrix @ velocity, velocity[:3], velocity[3:]
-        gyroscopic = np.concatenate(
-            [np.cross(momentum[:3], omega), np.cross(momentum[3:], omega) + np.cross(momentum[:3], v)]
-        )
-        change = np.linalg.solve(matrix, self.wrench(turned, velocity) + self.thrust(newtons) + gyroscopic)
-        return np.concatenate([turned @ v, (turned @ skew(omega)).ravel(), change])
+        load = self.wrench(turned, velocity) + self.thrust(newtons) - coriolis(matrix, velocity)
+        turning = (turned @ skew(velocity[3:])).ravel()
+        return np.concatenate([turned @ velocity[:3], turning, np.linalg.solve(matrix, load)])
 
     def alone(self, axis: int, newtons: Mapping[str, float]) -> Callable[[float, Array], list[float]]:
         """The acceleration along one axis of a level vehicle that the others do not move."""
         push, inertia = self.thrust(newtons)[axis], (self.rigid + self.added)[axis, axis]
         return lambda _, v: [(self.wrench(np.eye(3), v[0] * np.eye(6)[axis])[axis] + push) / inertia]
-
-
-def skew(a: Array) -> Array:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 SIGNS = {"u": 1.0, "v": -1.0, "w": -1.0, "p": 1.0, "q": -1.0, "r": -1.0}
@@ -240,6 +232,12 @@ HALF_TURN = np.diag([1.0, -1.0, -1.0])
 """From forward-starboard-down to forward-left-up."""
 
 
+def turned_in_gazebo(phi: float, theta: float, psi: float) -> Array:
+    """The axes of the vehicle (forward, to port, up) in east, north and up, by the Euler angles of the FMU."""
+    turned: Array = rotation(quaternion_of(phi, theta, psi)).astype(float)
+    return EARTH @ turned @ HALF_TURN
+
+
 @pytest.mark.parametrize("name", LOADED)
 def test_the_thrust_of_each_propeller_is_listed_and_what_the_vehicle_lacks_is_held(name: str) -> None:
     rov = LOADED[name]
@@ -269,9 +267,9 @@ def test_the_thrust_of_each_propeller_is_listed_and_what_the_vehicle_lacks_is_he
 def in_gazebo(rov: Vehicle, state: dict[str, float]) -> Array:
     """Position, rotation matrix and velocities of a state of the FMU, in Gazebo's frames."""
     angles = state | rov.calculated(rov.layout.usual_inputs, state)
-    turned = Rotation.from_euler("ZYX", [angles["psi"], angles.get("theta", 0.0), angles.get("phi", 0.0)]).as_matrix()
+    turned = turned_in_gazebo(*(angles.get(name, 0.0) for name in ("phi", "theta", "psi")))
     velocity = [sign * state.get(name, 0.0) for name, sign in SIGNS.items()]
-    return np.concatenate([EARTH @ [state[name] for name in "xyz"], (EARTH @ turned @ HALF_TURN).ravel(), velocity])
+    return np.concatenate([EARTH @ [state[name] for name in "xyz"], turned.ravel(), velocity])
 
 
 def fly(vehicle: Vehicle, state: dict[str, float], pieces: int, seed: int) -> tuple[Array, Array]:

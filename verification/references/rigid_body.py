@@ -104,9 +104,10 @@ def coriolis(M: Array, nu: Array) -> Array:
 
 def rotation(quaternion: Sequence[Number] | Array) -> Array:
     """Return the matrix from the body to the earth frame of a quaternion (scalar first) of any length."""
-    q = np.asarray(quaternion)
+    q: Array = np.asarray(quaternion)
     S = skew(q[1:])
-    return np.eye(3) + (q[0] * S + S @ S) * 2 / (q @ q)
+    turned: Array = np.eye(3) + (q[0] * S + S @ S) * 2 / (q @ q)
+    return turned
 
 
 def quaternion_of(phi: Number, theta: Number, psi: Number) -> list[Number]:
@@ -137,7 +138,7 @@ def forces(body: Body, nu: Array, R: Array, lagging: Array) -> Array:
     steady[body.lags != 0] = lagging
     thrust = body.alpha * ((steady - body.advances * (body.wrenches @ nu)) @ body.wrenches)
     fins = body.fins * (abs(nu[0]) * nu[0])
-    tau = body.load - damping + fins + thrust + body.righting @ R[2]
+    tau: Array = body.load - damping + fins + thrust + body.righting @ R[2]
     for (i, j, k), factor in body.bilinear.items():
         tau[i] += factor * nu[j] * nu[k]
     return tau
