@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -31,13 +32,10 @@ def motion(k: Vehicle, commands: Commands, time: Array, conditions: Conditions =
     start = np.zeros(13 + len(k.layout.lagging))
     start[6] = 1.0
     y = pool.piecewise(partial(_rates, k, conditions), k.layout, commands, fine, conditions, start, _PRECISION)
-    R = np.array([*map(rigid_body.rotation, y[6:10].T)])
-    found = dict(zip((*rigid_body.VELOCITIES, *"xyz"), (*y[:6], *y[10:13]), strict=True))
-    found["phi"] = np.arctan2(R[:, 2, 1], R[:, 2, 2])
-    found["theta"] = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 2, 1], R[:, 2, 2]))
-    found["psi"] = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
-    asked = np.searchsorted(fine, time)
-    return {name: values[asked] for name, values in found.items()}
+    psi, theta, phi = Rotation.from_quat(y[6:10].T, scalar_first=True).as_euler("ZYX").T
+    names = (*rigid_body.VELOCITIES, "x", "y", "z", "phi", "theta", "psi")
+    found = np.stack([*y[:6], *y[10:13], phi, theta, np.unwrap(psi)])
+    return dict(zip(names, found[:, np.searchsorted(fine, time)], strict=True))
 
 
 def _rates(k: Vehicle, conditions: Conditions, command: Array) -> pool.Rates:
