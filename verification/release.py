@@ -29,8 +29,8 @@ from rov_fmu.build import build
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.checkouts import ROOT
 
-ROOT = Path(__file__).parent.parent
 _TOOLS = {"native": ("rov-fmu", "ziglang"), "pythonfmu": ("rov-fmu", "pythonfmu")}
 """The packages that make an FMU of each kind, parts of which are in its binaries."""
 

@@ -13,6 +13,7 @@ schemas; all other variables are JSON with the names and units of the FMU, with 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,7 +176,7 @@ def _picture_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Con
     forces = {t.name: values[f"F_{t.name}"] for t in vehicle.layout.thrusters if f"F_{t.name}" in values}
     strongest = max((float(np.nanmax(np.abs(force))) for force in forces.values()), default=0.0)
     size = hull_size(vehicle)
-    due = -1
+    due = -inf
 
     def write(n: int, stamp: int) -> None:
         nonlocal due

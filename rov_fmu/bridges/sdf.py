@@ -330,7 +330,7 @@ def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
     effects *= _SIGNS
     force, moment = effects[:3], effects[3:]
     scale = float(np.linalg.norm(force))
-    if scale == 0.0:
+    if not scale:
         return None
     direction = force / scale
     given = _SIGNS[:3] * thruster.place

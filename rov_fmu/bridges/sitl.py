@@ -88,9 +88,11 @@ class Log:
             self._motion = [*layout.state, *layout.calculated]
         self._titles = ["time [s]", *(f"{name} [1]" for name in layout.commands), *self._motion]
         self._rows = array("d")
-        self._row: list[float] = []
-        self._sums = [0.0] * len(layout.commands)
-        self._since = 0.0
+        self._number_of_commands = len(layout.commands)
+        self._begin_row([])
+
+    def _begin_row(self, row: list[float]) -> None:
+        self._row, self._sums, self._since = row, [0.0] * self._number_of_commands, 0.0
 
     def add(self, h: float, fractions: list[float], time: float, motion: Mapping[str, float]) -> None:
         """Add a step of h seconds under commands from -1 to 1, and the time and the motion at its end."""
@@ -100,8 +102,7 @@ class Log:
             return
         if self._row and self.rows < self._most_rows:
             self._rows.extend([self._row[0], *(total / self._since for total in self._sums), *self._row[1:]])
-        self._row = [time, *(motion[title] for title in self._motion)]
-        self._sums, self._since = [0.0] * len(fractions), 0.0
+        self._begin_row([time, *(motion[title] for title in self._motion)])
 
     @property
     def rows(self) -> int:

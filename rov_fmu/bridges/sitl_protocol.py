@@ -117,8 +117,8 @@ class Sequence:
         if ahead <= _MOST_LOST:
             self.lost += ahead - 1
         self.last, self._strange = count, None
-        return Kind.RESTART if count == 0 and ahead > _MOST_LOST and not is_next else Kind.NEW
+        return Kind.NEW if count or is_next or ahead <= _MOST_LOST else Kind.RESTART
 
     def restart(self) -> None:
         """Forget which packet is the next one."""
-        self.last, self._is_sure, self._before, self._strange = None, False, None, None
+        self.last = self._before = self._strange = None

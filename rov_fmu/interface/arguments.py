@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from math import copysign
+from math import ceil, copysign
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -35,7 +35,7 @@ _ONE_LINE = 60
 
 def result_times(stop: float, step: float) -> Array:
     """Return the times of the results, s: round multiples of the step, and the end."""
-    time = np.round(step * np.arange(int(stop / step) + 2), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
+    time = np.round(step * np.arange(ceil(stop / step)), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
     return np.append(time[time < stop - 1e-9], stop)
 
 
@@ -104,7 +104,7 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
             raise InputError(
                 f"start[{min(angles)!r}]: the attitude is also given as a quaternion. Give only one of the two"
             )
-        if np.any(sum(map(np.abs, quaternion)) == 0.0):
+        if not np.all(sum(map(np.abs, quaternion))):
             raise InputError(f"start: the quaternion {', '.join(QUATERNION)} is 0 and has no direction")
     return states
 
@@ -117,9 +117,7 @@ def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -
     """
     names = _names("inputs", inputs)
     own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
-    times = time
-    if own is not None:
-        times = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
+    times = time if own is None else np.union1d(time, np.clip(own, time[0], time[-1]))
     middles = np.append(0.5 * (times[:-1] + times[1:]), times[-1])
     given: dict[str, Array] = {}
     for name in names:

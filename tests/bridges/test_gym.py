@@ -15,7 +15,9 @@ SCALE = 1e-12
 
 
 def test_the_environment_checker_passes() -> None:
-    check_env(RovEnv(rov_fmu.load("videoray_refit")), skip_render_check=True)
+    environment = RovEnv(rov_fmu.load("videoray_refit"))
+    check_env(environment, skip_render_check=True)
+    assert environment.many.steps == 300
 
 
 @pytest.mark.parametrize(("name", "drawn_values"), [("videoray_refit", 3), ("bluerov2_heavy", 0)])
@@ -51,6 +53,7 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
     assert not states[:, : many.states.index("x")].any(), "a new episode begins at rest"
     over = [many.step(actions[n])[3].any() for n in range(5)]
     assert over == [False] * 4 + [True]
+    assert np.array_equal(many.reset(seed=[1, 2, 3])[0], start)
 
 
 def test_an_episode_ends_where_a_state_leaves_its_bound_and_the_others_go_on() -> None:

@@ -5,11 +5,12 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from io import BytesIO
-from math import cos, pi, sin
+from math import pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -24,6 +25,7 @@ from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
+from tests.bridges.test_sdf import turned_in_gazebo
 from tests.folders import small_folder
 from tests.report.results import example
 from tests.tank.logs import channel, commands, log
@@ -68,6 +70,9 @@ def test_numbers_and_units(heavy: VehicleModel) -> None:
         (0, 0.2, 0.3),
         (1_000_000_000, -0.1, 0.3),
     ]
+    (stamp,) = (tf.timestamp for tf in found["/tf"][-1][1].transforms)
+    assert (stamp.seconds, stamp.nanos) == (2, 0)
+    assert heavy.to_mcap(pd.DataFrame({**result, "t": result.time, "run": 7})) == content
     summary = make_reader(BytesIO(content)).get_summary()
     assert summary
     schemas = {c.topic: summary.schemas[c.schema_id] for c in summary.channels.values()}
@@ -87,15 +92,6 @@ def turned(pose: Any) -> NDArray[np.float64]:
     return np.asarray(Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix())
 
 
-def by_hand(phi: float, theta: float, psi: float) -> NDArray[np.float64]:
-    """The same from Euler's angles, by the unit vectors of the body (Fossen 2021, (2.31)) with east, north, up."""
-    forward = np.array([cos(theta) * sin(psi), cos(theta) * cos(psi), sin(theta)])
-    down_n = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
-    down_e = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
-    up = np.array([-down_e, -down_n, cos(phi) * cos(theta)])
-    return np.stack([forward, np.cross(up, forward), up], axis=1)
-
-
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.0, 0.0, pi / 2), (0.3, -0.4, 2.5), (3.0, 1.2, -1.0)])
 def test_frames(heavy: VehicleModel, angles: tuple[float, float, float]) -> None:
     """In `map`, x is east, y north and z up; the vehicle's x points forward, y to port and z up."""
@@ -104,14 +100,15 @@ def test_frames(heavy: VehicleModel, angles: tuple[float, float, float]) -> None
     assert first.frame_id == "map"
     at = first.pose.position
     assert (at.x, at.y, at.z) == (2.0, 1.0, -3.0)
-    np.testing.assert_allclose(turned(first.pose), by_hand(*angles), atol=1e-12)
+    np.testing.assert_allclose(turned(first.pose), turned_in_gazebo(*angles), atol=1e-12)
 
 
 def test_level_frames_and_the_picture_with_the_jets(heavy: VehicleModel) -> None:
     """A jet leaves its thruster against the force; the longest one has 1.5 times the length of the hull."""
     videoray = rov_fmu.load("videoray")
-    (_, first), *_ = messages(videoray.to_mcap(recorded(videoray, 0.1, {}, x=1.0, z=3.0, psi=2.5)))["/pose"]
-    np.testing.assert_allclose(turned(first.pose), by_hand(0.0, 0.0, 2.5), atol=1e-12)
+    at_rest = messages(videoray.to_mcap(recorded(videoray, 0.1, {}, x=1.0, z=3.0, psi=2.5)))
+    np.testing.assert_allclose(turned(at_rest["/pose"][0][1].pose), turned_in_gazebo(0.0, 0.0, 2.5), atol=1e-12)
+    assert not at_rest["/scene"][0][1].entities[0].arrows
     found = messages(heavy.to_mcap(recorded(heavy, 0.1, {"u_5": 0.5, "u_1": -0.2}, x=1.0, z=3.0)))
     ((_, moved),) = found["/tf"][-1:]
     (tf,) = moved.transforms
@@ -194,7 +191,7 @@ def test_a_log_with_a_heading_has_its_pose_and_begins_at_0() -> None:
         found["/dive_csv/pose"], (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.0, 0.0, 0.0), (3.0, -3.0, -2.5), strict=True
     ):
         assert of.pose.position.z == pytest.approx(-depth)
-        np.testing.assert_allclose(turned(of.pose), by_hand(*angles), atol=1e-12)
+        np.testing.assert_allclose(turned(of.pose), turned_in_gazebo(*angles), atol=1e-12)
 
 
 def test_identify_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

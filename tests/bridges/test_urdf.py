@@ -14,14 +14,8 @@ from numpy.typing import NDArray
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, ROOT
-from tests.vehicles import EVERYTHING
+from tests.bridges.test_sdf import LOADED
 
-REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
-FILES = {**SHIPPED, "bare": BARE, "everything": EVERYTHING, "remus100": REMUS}
-LOADED = {name: load_vehicle(path) for name, path in FILES.items()}
 SIX = ("Xu", "Yv", "Zw", "Kp", "Mq", "Nr")
 
 
@@ -49,6 +43,11 @@ def test_each_axis_accelerates_as_the_vehicle_does(name: str) -> None:
     linear, quadratic = (six(element, f"{n}_damping", f) for n, f in (("linear", "{0}{1}"), ("quadratic", "{0}{1}{1}")))
     level = rov.layout.at_rest
     weight, buoyancy = (float(element.find(tag).text) for tag in ("weight", "buoyancy"))
+    own = [rov.coefficients.get(moment, 0.0) for moment in ("I_p", "I_q", "I_r")]
+    for n in (n for n, v in enumerate("uvwpqr") if v not in rov.layout.by_velocity):
+        assert (M[n], linear[n], quadratic[n]) == (rigid[n], 0.0, 0.0)
+        assert n < 3 or name == "bare" or rigid[n] == max(own)
+    assert weight == pytest.approx(rov.coefficients.get("W", rov["m_rov"] * 9.8))
     for form in rov.layout.axes:
         v = form.axis.velocity
         n = "uvwpqr".index(v)
@@ -98,4 +97,4 @@ def test_the_command_writes_it_by_the_name_of_the_file(
     assert Path("rov.urdf").read_text(encoding="utf-8") == urdf_model(LOADED["bluerov2"]).text
     assert capsys.readouterr().out.endswith("Wrote rov.urdf.\n")
     assert main(["sdf", "bluerov2", "-o", "rov.urdf", "--world"]) == 2
-    assert "URDF has no world" in capsys.readouterr().err
+    assert capsys.readouterr().err.endswith("leave out --world\n")

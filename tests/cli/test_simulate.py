@@ -19,7 +19,7 @@ from tests.commands import BARE
 from tests.vehicles import EVERYTHING, THRUST_EFFECTS, VIDEORAY
 
 Capsys = pytest.CaptureFixture[str]
-COMMANDS = "time,u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
+COMMANDS = "time [s],u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
 
 
 @pytest.fixture
@@ -115,13 +115,21 @@ def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys)
     assert (here / name).read_bytes().startswith(begins)
 
 
-@pytest.mark.parametrize("command", [["simulate", str(BARE), "--plot"], ["fly", str(BARE), "--against", "bare.toml"]])
+SEEN = {
+    f"simulate '{BARE}' --plot": "Bare: no commands",
+    f"fly '{BARE}' --against bare.toml": f"Bare ({BARE}) beside Bare (bare.toml)",
+    f"fly '{BARE}' --against twin.toml": "Bare (bare.toml) beside Bare (twin.toml)",
+}
+
+
+@pytest.mark.parametrize("command", SEEN)
 @pytest.mark.parametrize("opens", [True, False])
 def test_what_is_to_be_seen_opens_in_a_browser(
-    command: list[str], opens: bool, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+    command: str, opens: bool, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     opened: list[str] = []
-    shutil.copy(BARE, here)
+    for name in ("bare.toml", "twin.toml"):
+        shutil.copy(BARE, here / name)
 
     def browse(address: str) -> bool:
         opened.append(address)
@@ -129,12 +137,11 @@ def test_what_is_to_be_seen_opens_in_a_browser(
 
     monkeypatch.setattr(webbrowser, "open", browse)
     monkeypatch.setattr("tempfile.tempdir", str(here))
-    assert main(command) == 0
+    assert main(shlex.split(command)) == 0
     out, err = capsys.readouterr()
     path = Path(out.splitlines()[0])
     assert opened == [path.as_uri()]
-    shown = "Bare: no commands" if command[0] == "simulate" else f"Bare ({BARE}) beside Bare (bare.toml)"
-    assert shown in path.read_text(encoding="utf-8")
+    assert SEEN[command] in path.read_text(encoding="utf-8")
     assert err.count("\n") == (not opens)
     assert err.startswith("" if opens else "rov-fmu: no browser could be opened. Open this file in a browser, ")
 

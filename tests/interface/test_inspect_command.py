@@ -231,11 +231,12 @@ def test_a_table_of_any_name_is_recognised_by_its_units_and_told_its_name(
         (["H1", "H2", "H3", "H4", "V1", "V2"], ""),
         ([f"Leg{n} (mbar)" for n in range(1, 7)], "?"),
         ([f"RC{n}" for n in range(1, 7)], "?"),
+        (["T1"], "?"),
     ],
 )
 def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp_path: Path, inspect: Inspect) -> None:
     """A vehicle that ships is the base where the names are numbers; each number is that of its thruster."""
-    pulses = [np.where(TIME < 6.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS]
+    pulses = [np.where(TIME < 6.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS[: len(titles)]]
     table(tmp_path / "dive.csv", ",".join(["time [s]", *titles, "depth [m]"]), TIME, *pulses, DEPTH)
     _, text = inspect()
     assert [*re.findall(r'^base = "(.*)"', text, re.M)] == [base] * bool(base)
@@ -270,6 +271,7 @@ def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, caps
     lines = pool_run(tmp_path, OWN)
     document = parsed("\n".join(lines))
     assert [*document["curves"]] == ["main", "side", "vert"]
+    assert "dives" not in document, "tables have no times"
     assert lines.count('curve = "?"   # main or side or vert') == 2
     assert document["columns"] == {
         "turning speed (deg/s)": "velocity [deg/s]",
@@ -353,7 +355,7 @@ def test_headers_with_control_characters(tmp_path: Path, inspect: Inspect) -> No
 
 
 def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: Path, capsys: Capsys) -> None:
-    folder = tmp_path / "My ROV (2)"
+    folder = tmp_path / "A ROV (2)"
     folder.mkdir()
     one_file(folder)
     draft = folder / "rov.toml"
@@ -372,8 +374,9 @@ def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: P
     )
     assert main(["identify", str(folder), "--draft"]) == 0
     document = parsed(draft.read_text(encoding="utf-8"))
-    assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("My ROV (2)", "my_rov_2")
+    assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("A ROV (2)", "a_rov_2")
     assert (document["base"], document["against"]) == ("bluerov2", "bluerov2")
+    assert "dives" not in document, "its log is one file"
     written = draft.read_bytes()
     capsys.readouterr()
     assert main(["identify", str(folder), "--draft"]) == 2

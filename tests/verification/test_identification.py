@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -19,17 +18,14 @@ from verification.identification.data import Recorded, Recording, Split, load
 from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH, TINY, Simulated
 from verification.identification.methods.identified import Identified
-from verification.identification.methods.least_squares import LeastSquares
 from verification.identification.methods.unchanged import ConstantVelocity, Unchanged
-from verification.identification.protocol import BEGIN, Method, Outcome, Predicted, ahead, run
+from verification.identification.protocol import BEGIN, Outcome, Predicted, ahead, run
 from verification.identification.scores import bands, numbers, relative_errors, scores
 
-NEEDS = {"_gaussian_process": "sklearn"}
-"""The package of an extra that a method needs."""
 HERE = [
-    pytest.param(make, marks=pytest.mark.long if make.__name__ == "_gaussian_process" else ())
-    for make in command.METHODS
-    if make.__name__ != "_neural_ode"
+    pytest.param(name, marks=pytest.mark.long if "Gaussian" in name else ())
+    for name in command.METHODS
+    if "Neural" not in name
 ]
 """The methods that are tested in this process. Of these, the Gaussian process takes longest."""
 
@@ -39,12 +35,11 @@ def split(tmp_path_factory: pytest.TempPathFactory) -> Split:
     return load(TINY, None, tmp_path_factory.mktemp("tiny"))
 
 
-@pytest.fixture(scope="module", params=HERE, ids=lambda make: make.__name__.strip("_"))
+@pytest.fixture(scope="module", params=HERE)
 def outcome(request: pytest.FixtureRequest, split: Split) -> Outcome:
-    make: Callable[[], Method] = request.param
-    if package := NEEDS.get(make.__name__):
-        pytest.importorskip(package, reason=f"this method needs the extra [identification] with {package}")
-    return run(make(), split)
+    if "Gaussian" in request.param:
+        pytest.importorskip("sklearn", reason="this method needs the extra [identification] with sklearn")
+    return run(command.make(request.param), split)
 
 
 # ---- Scores ----------------------------------------------------------------------------------------------------------
@@ -212,7 +207,7 @@ def test_the_command_writes_the_scores(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr(command, "DATA_SETS", [TINY, EXJOBB])
-    monkeypatch.setattr(command, "METHODS", [Unchanged, LeastSquares])
+    monkeypatch.setattr(command, "METHODS", ["unchanged:Unchanged", "least_squares:LeastSquares"])
     monkeypatch.delenv("ROV_FMU_DATA", raising=False)
     assert command.main(["-o", str(tmp_path)]) == 0
     out, err = capsys.readouterr()
@@ -221,7 +216,7 @@ def test_the_command_writes_the_scores(
     written = pd.read_csv(tmp_path / "scores.csv")
     assert {*written.method} == {"no change", "least squares"}
     assert "<svg" in (tmp_path / "scores.svg").read_text(encoding="utf-8")
-    monkeypatch.setattr(command, "METHODS", [Unchanged])
+    monkeypatch.setattr(command, "METHODS", ["unchanged:Unchanged"])
     assert command.main(["--only", "tiny", "-o", str(tmp_path)]) == 0, "its rows are replaced"
     pd.testing.assert_frame_equal(
         pd.read_csv(tmp_path / "scores.csv").drop(columns="seconds"),

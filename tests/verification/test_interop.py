@@ -1,6 +1,5 @@
 """Independent importers agree with the step in Python, and the comparison notices when one does not."""
 
-import csv
 import re
 import subprocess
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from itertools import pairwise
 from math import nan
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from tests.commands import ROOT
@@ -80,10 +80,7 @@ def test_a_vehicle_with_every_option_joins_the_importers_that_set_inputs_in_even
 
 
 def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
+    pd.DataFrame(rows).to_csv(path, index=False)
     return path
 
 

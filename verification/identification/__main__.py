@@ -6,8 +6,9 @@ folder with your copies of the repositories; without it, only what is simulated 
 
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from pkgutil import resolve_name
 
 import click
 import pandas as pd
@@ -19,10 +20,6 @@ from rov_fmu.process import exit_code
 from verification.identification.data import DataSet, Recorded, load
 from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH
-from verification.identification.methods.identified import Identified
-from verification.identification.methods.least_squares import LeastSquares
-from verification.identification.methods.output_error import OutputError
-from verification.identification.methods.unchanged import ConstantVelocity, Unchanged
 from verification.identification.protocol import Method, run
 from verification.identification.scores import Table, numbers, scores
 from verification.identification.show import picture, print_scores
@@ -30,28 +27,21 @@ from verification.identification.show import picture, print_scores
 DATA_SETS: Sequence[DataSet] = (EXJOBB, TAUV, CALM, ROUGH)
 
 
-def _gaussian_process() -> Method:
-    from verification.identification.methods.gaussian_process import GaussianProcess
-
-    return GaussianProcess()
-
-
-def _neural_ode() -> Method:
-    from verification.identification.methods.neural_ode import NeuralODE
-
-    return NeuralODE()
-
-
-METHODS: Sequence[Callable[[], Method]] = (
-    Unchanged,
-    ConstantVelocity,
-    LeastSquares,
-    OutputError,
-    _gaussian_process,
-    _neural_ode,
-    Identified,
+METHODS = (
+    "unchanged:Unchanged",
+    "unchanged:ConstantVelocity",
+    "least_squares:LeastSquares",
+    "output_error:OutputError",
+    "gaussian_process:GaussianProcess",
+    "neural_ode:NeuralODE",
+    "identified:Identified",
 )
-"""Each makes a method. Those that need a package of an extra import it first when they are made."""
+"""The modules and classes of the methods. They are imported when they are made, because some need an extra."""
+
+
+def make(name: str) -> Method:
+    """Return a new method."""
+    return resolve_name(f"verification.identification.methods.{name}")()  # type: ignore[no-any-return]
 
 
 @click.command(help=__doc__)
@@ -73,8 +63,8 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
                 log.print(f"{one.name}: not run" + ("" if only else ", because --data is not given"))
                 continue
             split = load(one, data, Path(folder))
-            for make in METHODS:
-                outcome = run(make(), split)
+            for name in METHODS:
+                outcome = run(make(name), split)
                 log.print(f"{one.name}: {outcome.method.name}, {outcome.seconds:.1f} s")
                 rows.append(scores(outcome))
                 found.append(numbers(outcome))

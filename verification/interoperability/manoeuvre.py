@@ -14,12 +14,14 @@ several rows for one time the first counts; rows between communication points ar
 """
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import cycle
-from math import isfinite
 from pathlib import Path
+
+import numpy as np
+import pandas as pd
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.messages import FileError
@@ -115,25 +117,19 @@ class Manoeuvre:
     def difference(self, result: Path) -> float:
         """Return the largest difference of any output at any communication point (SI units). Raises ResultError."""
         try:
-            with result.open(newline="") as file:
-                return max(self._differences(filter(None, csv.reader(file)), result.name))
-        except (OSError, ValueError, IndexError) as error:
+            table = pd.read_csv(result, dtype=float)
+        except (OSError, ValueError) as error:
             raise ResultError(f"{result.name} cannot be read: {error}") from error
-
-    def _differences(self, rows: Iterator[list[str]], file: str) -> Iterator[float]:
-        """Yield the largest difference of any output at each communication point. Raises ResultError."""
-        header = next(rows, [])
-        if missing := [name for name in ("time", *self.outputs) if name not in header]:
-            raise ResultError(f"{file} has no column {missing[0]}")
-        time, columns = header.index("time"), [header.index(name) for name in self.outputs]
-        for point in self.reference:
-            row = next((row for row in rows if float(row[time]) > point["time"] - 1e-6), None)
-            if row is None or float(row[time]) > point["time"] + 1e-6:
-                raise ResultError(f"{file} has no row for t = {point['time']}")
-            values = {name: float(row[column]) for name, column in zip(self.outputs, columns, strict=True)}
-            if strange := [name for name, value in values.items() if not isfinite(value)]:
-                raise ResultError(f"{file} has {strange[0]} = {values[strange[0]]} at t = {point['time']}")
-            yield max(abs(value - point[name]) for name, value in values.items())
+        if missing := [name for name in ("time", *self.outputs) if name not in table]:
+            raise ResultError(f"{result.name} has no column {missing[0]}")
+        expected = pd.DataFrame(self.reference, index=TIMES)[[*self.outputs]]
+        rows = table.reindex(table.time.searchsorted(expected.index - 1e-6)).set_index(expected.index)
+        if not (is_there := (rows.time - expected.index).abs() < 1e-6).all():
+            raise ResultError(f"{result.name} has no row for t = {is_there.idxmin()}")
+        values = rows[expected.columns].to_numpy()
+        for n, k in np.argwhere(~np.isfinite(values)):
+            raise ResultError(f"{result.name} has {self.outputs[k]} = {values[n, k]} at t = {TIMES[n]}")
+        return float(np.abs(values - expected.to_numpy()).max())
 
 
 def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:

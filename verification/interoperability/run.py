@@ -12,12 +12,12 @@ from pathlib import Path
 
 from rov_fmu.build import build
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.checkouts import ROOT
 from verification.references.limited import run_limited
 
-from .importers import HERE, Importer
+from .importers import Importer
 from .manoeuvre import VEHICLES, Manoeuvre, ResultError
 
-ROOT = HERE.parents[1]
 TIMEOUT = 300.0
 """Seconds for one importer; the slowest takes 5."""
 

@@ -22,7 +22,7 @@ from .equations import thrust as thrust_of
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
-Rates = Callable[[float, Array], list[float]]
+Rates = Callable[[float, Array], Array | list[float]]
 
 _PRECISION = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
 

@@ -4,8 +4,10 @@ Commands and conditions are those of pool.py. A tilt has no meaning here, becaus
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -26,40 +28,25 @@ def motion(k: Vehicle, commands: Commands, time: Array, conditions: Conditions =
     assert not k.layout.mix
     assert not conditions.tilt
 
-    def rates(command: Array) -> pool.Rates:
-        return _rates(k, command, conditions)
-
     fine = np.union1d(time, np.arange(time[0], time[-1], _FINEST))
     start = np.zeros(13 + len(k.layout.lagging))
     start[6] = 1.0
-    y = pool.piecewise(rates, k.layout, commands, fine, conditions, start, _PRECISION)
-    R = np.array([rigid_body.rotation(column) for column in y[6:10].T.tolist()])
-    found = dict(zip((*rigid_body.VELOCITIES, *"xyz"), (*y[:6], *y[10:13]), strict=True))
-    found["phi"] = np.arctan2(R[:, 2, 1], R[:, 2, 2])
-    found["theta"] = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 2, 1], R[:, 2, 2]))
-    found["psi"] = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
-    asked = np.searchsorted(fine, time)
-    return {name: values[asked] for name, values in found.items()}
+    y = pool.piecewise(partial(_rates, k, conditions), k.layout, commands, fine, conditions, start, _PRECISION)
+    psi, theta, phi = Rotation.from_quat(y[6:10].T, scalar_first=True).as_euler("ZYX").T
+    names = (*rigid_body.VELOCITIES, "x", "y", "z", "phi", "theta", "psi")
+    found = np.stack([*y[:6], *y[10:13], phi, theta, np.unwrap(psi)])
+    return dict(zip(names, found[:, np.searchsorted(fine, time)], strict=True))
 
 
-def _rates(k: Vehicle, command: Array, conditions: Conditions) -> pool.Rates:
+def _rates(k: Vehicle, conditions: Conditions, command: Array) -> pool.Rates:
     inputs = {f"u_{t.name}": c for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)}
     held = rigid_vehicle.body(k, inputs | dict(zip(("V_N", "V_E"), conditions.current, strict=True)))
-    held = replace(held, propellers=[replace(p, target=float(p.target)) for p in held.propellers])
-    inverse = [[float(x) for x in row] for row in held.inverse]
-    changes = conditions.thrust is not None or any(conditions.tether)
 
-    def rates(time: float, state: Array) -> list[float]:
-        y = state.tolist()
-        return rigid_body.rates(_changed(held, conditions, time, y) if changes else held, inverse, y)
+    def rates(time: float, y: Array) -> Array:
+        """The thrust changes with the time, and the tether pulls at the place of the vehicle."""
+        thrust = conditions.thrust(time) if conditions.thrust else 1.0
+        pull = -rigid_body.rotation(y[6:10]).T @ (np.array(conditions.tether) * y[10:13])
+        now = replace(held, load=held.load + np.append(pull, np.zeros(3)), targets=thrust * held.targets)
+        return rigid_body.rates(now, held.inverse, y)
 
     return rates
-
-
-def _changed(held: rigid_body.Body, conditions: Conditions, time: float, y: list[float]) -> rigid_body.Body:
-    """Return the rigid body with its thrust at a time, and the pull of the tether at its place."""
-    thrust, R = conditions.thrust(time) if conditions.thrust else 1.0, rigid_body.rotation(y[6:10])
-    earth = [-stiffness * x for stiffness, x in zip(conditions.tether, y[10:13], strict=True)]
-    pull = [sum(R[row][column] * earth[row] for row in range(3)) for column in range(3)]
-    load = [*(x + F for x, F in zip(held.load[:3], pull, strict=True)), *held.load[3:]]
-    return replace(held, load=load, propellers=[replace(p, target=thrust * p.target) for p in held.propellers])

@@ -6,6 +6,7 @@ Like equations.py, it uses a vehicle's declarations and numbers, but no formula 
 from collections.abc import Callable, Mapping, Sequence
 
 import gmpy2
+import numpy as np
 from gmpy2 import mpfr
 from mpmath import mp
 
@@ -15,18 +16,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 from . import equations, rigid_body
 from .equations import commands, steady_forces
 from .extrapolation import BITS, growth, leap, plain, real
-from .rigid_body import (
-    VELOCITIES,
-    Body,
-    Floats,
-    Number,
-    Propeller,
-    cross,
-    euler_angles,
-    rigid_body_mass,
-    rotation,
-    zeros,
-)
+from .rigid_body import VELOCITIES, Array, Body, Floats, Number, euler_angles, rigid_body_mass, rotation, skew
 
 Values = Mapping[str, Number]
 QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
@@ -42,82 +32,80 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
     def get(name: str, otherwise: str = "", default: float = 0.0) -> Number:
         return held.get(name, held.get(otherwise, number(mp.mpf(default))))
 
-    def six(stem: str, default: float) -> list[Number]:
-        return [get(f"{stem}_{v}", default=default) for v in VELOCITIES]
+    def six(stem: str, default: float = 0.0) -> Array:
+        return np.array([get(f"{stem}_{v}", default=default) for v in VELOCITIES])
 
-    gravity, buoyancy = ([get(f"{axis}_{point}") for axis in "xyz"] for point in "GB")
-    inertia = [[get(f"I_{v}", default=1.0) if v == other else get("") for v in "pqr"] for other in "pqr"]
-    mass = rigid_body_mass(get("m_rov", default=1.0), inertia, gravity)
-    linear, back, ahead, astern, added = zeros(), zeros(), zeros(), zeros(), six("m_a", 0.0)
-    for i, v in enumerate(VELOCITIES):
-        mass[i][i] += added[i]
-        linear[i][i], ahead[i][i] = get(f"b_d_{v}"), get(f"a_d_{v}")
-        back[i][i], astern[i][i] = get(f"b_d_{v}_reverse", f"b_d_{v}"), get(f"a_d_{v}_reverse", f"a_d_{v}")
+    def astern_of(key: str) -> Array:
+        return np.diag([get(f"{key}_{v}_reverse", f"{key}_{v}") for v in VELOCITIES])
+
+    gravity, buoyancy = (np.array([get(f"{axis}_{point}") for axis in "xyz"]) for point in "GB")
+    inertia = np.diag([get(f"I_{v}", default=1.0) for v in "pqr"])
+    mass = rigid_body_mass(get("m_rov", default=1.0), inertia, gravity) + np.diag(six("m_a"))
+    linear, back, ahead, astern = np.diag(six("b_d")), astern_of("b_d"), np.diag(six("a_d")), astern_of("a_d")
     lift = {}
     for key, first, *others in layout.cross:
         value, i, j = held[cross_name(key, first, *others)], VELOCITIES.index(first), VELOCITIES.index(others[0])
         if key == "m_a":
-            mass[i][j] += value
-            mass[j][i] += value
+            mass[i, j] += value
+            mass[j, i] += value
         elif key == "b_d":
-            linear[i][j] = back[i][j] = value
+            linear[i, j] = back[i, j] = value
         elif key == "a_d":
-            ahead[i][j] = astern[i][j] = value
+            ahead[i, j] = astern[i, j] = value
         else:
-            lift[first, others[0], others[1]] = value
-    beta = six("beta", 1.0)
-    tuned = [[m / (a * b) ** 0.5 for m, b in zip(row, beta, strict=True)] for row, a in zip(mass, beta, strict=True)]
-    loads = [get(name) + get(f"F_0_{v}") for name, v in zip(LOADS, VELOCITIES, strict=True)]
-    current = [get(name) for name in ("V_N", "V_E", "V_D")]
+            lift[i, j, VELOCITIES.index(others[1])] = value
+    beta, thrusters = six("beta", 1.0), _thrusters(rov, inputs, number)
     return Body(
         "".join(layout.velocities),
-        tuned,
+        mass / np.outer(beta, beta) ** 0.5,
         linear,
         back,
         ahead,
         astern,
         lift,
-        _fins(rov, inputs, number),
-        _propellers(rov, inputs, number),
+        np.array([number(x) for x in _fins(rov, inputs)]),
+        *thrusters,
         six("alpha", 1.0),
-        loads,
+        np.array([get(name) for name in LOADS]) + six("F_0"),
         get("W"),
         get("B"),
         gravity,
         buoyancy,
-        current,
+        np.array([get(name) for name in ("V_N", "V_E", "V_D")]),
     )
 
 
-def _propellers(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> list[Propeller]:
-    forces, found = steady_forces(rov, inputs), []
-    for name, command in commands(rov, inputs).items():
+def _wrench(place: Sequence[Number], force: Sequence[Number]) -> Array:
+    """Return a force at a place, with its moment."""
+    at, F = (np.array([mp.mpf(x) for x in vector]) for vector in (place, force))
+    return np.concatenate([F, skew(at) @ F])
+
+
+def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> tuple[Array, Array, Array, Array]:
+    """Return the wrenches, the steady forces, the losses and the lags of all thrusters."""
+    forces, rows = steady_forces(rov, inputs), []
+    for thruster, (name, command) in zip(rov.layout.thrusters, commands(rov, inputs).items(), strict=True):
         curve = rov.layout.curve_of[name]
-        thruster = next(t for t in rov.layout.thrusters if t.name == name)
         assert thruster.position
-        position, direction = (
-            [number(mp.mpf(x)) for x in vector] for vector in (thruster.place, thruster.direction.value)
-        )
         reverse = "_reverse" if command < 0 and "d_reverse" in curve.keys else ""
         loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
         lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
-        numbers = (forces[name], loss * abs(command) / curve.together, lag)
-        found.append(Propeller(position, direction, *map(number, numbers)))
-    return found
+        wrench = _wrench(thruster.place, thruster.direction.value)
+        rows.append([*wrench, forces[name], loss * abs(command) / curve.together, lag])
+    table = np.array([[number(x) for x in row] for row in rows]).reshape(-1, 9)
+    return table[:, :6], table[:, 6], table[:, 7], table[:, 8]
 
 
-def _fins(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> dict[tuple[str, str], Number]:
+def _fins(rov: Vehicle, inputs: Values) -> Array:
     """Return the forces of the fins along each axis as factors of |u| u, at the angles for the commands."""
-    found: dict[tuple[str, str], Number] = {}
+    found = np.full(6, mp.zero)
     for fin in rov.layout.fins:
         command = min(mp.one, max(-mp.one, mp.mpf(inputs[f"u_{fin.name}"])))
         k = {key: mp.mpf(rov.coefficients.get(f"{key}_{fin.name}", 0.0)) for key in ("lift", "drag", "angle_max")}
         angle = k["angle_max"] * command
         force = [k["lift"] * angle * mp.mpf(x) for x in fin.direction.value]
         force[0] -= k["drag"] * angle**2
-        moment = cross([mp.mpf(x) for x in fin.place], force)
-        for axis, value in zip(VELOCITIES, [*force, *moment], strict=True):
-            found[axis, "u"] = found.get((axis, "u"), number(mp.zero)) + number(value)
+        found = found + _wrench(fin.place, force)
     return found
 
 
@@ -135,8 +123,7 @@ def places(rov: Vehicle, state: Values) -> list[Number]:
 def compared(rov: Vehicle, y: Sequence[Number]) -> list[Number]:
     """Return what two states of a rigid body are compared by: the quaternion as a rotation, only the axes there are."""
     pose = [x for name, x in zip("xyz", y[10:13], strict=True) if name in rov.layout.pose]
-    attitude = [x for row in rotation(y[6:10]) for x in row]
-    return [*(y[VELOCITIES.index(v)] for v in rov.layout.velocities), *attitude, *pose, *y[13:]]
+    return [*(y[VELOCITIES.index(v)] for v in rov.layout.velocities), *rotation(y[6:10]).flat, *pose, *y[13:]]
 
 
 def integrate(rov: Vehicle, inputs: Values, y: Sequence[Number], h: float) -> Floats:
@@ -154,11 +141,11 @@ def end(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
 def step(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
     """Return the state of the rigid body after h seconds, to some 20 digits."""
     with mp.workdps(70), gmpy2.context(gmpy2.get_context(), precision=BITS):
-        inverse = [[real(x) for x in row] for row in body(rov, inputs, mp.mpf).inverse]
+        inverse = np.array([[real(x) for x in row] for row in body(rov, inputs, mp.mpf).inverse])
         of_step = body(rov, inputs, real)
 
         def rates(y: Sequence[Number]) -> list[Number]:
-            return rigid_body.rates(of_step, inverse, y)
+            return rigid_body.rates(of_step, inverse, np.array(y)).tolist()  # type: ignore[no-any-return]
 
         y, rest, size = [real(mp.mpf(x)) for x in places(rov, state)], mpfr(h), mpfr(h)
         while rest > 0:
@@ -181,7 +168,7 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
         return equations.calculated(rov, values)
     k = Vehicle(layout, {name: values[name] for name in rov.coefficients})
     of_vehicle = body(k, {name: values[name] for name in layout.inputs}, number)
-    y = [number(x) for x in places(k, values)]
+    y = np.array([number(x) for x in places(k, values)])
     rates = rigid_body.rates(of_vehicle, of_vehicle.inverse, y)
     names = [*VELOCITIES, *QUATERNION, *"xyz", *layout.lagging]
     found = {name: x for name, x in zip(names, y, strict=True) if name in layout.state}
@@ -189,7 +176,6 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     forces = {name: values.get(f"F_{name}", force) for name, force in steady_forces(k, values).items()}
     found |= {f"F_{name}": mp.mpf(F) for name, F in forces.items()}
     for curve in layout.turning_curves:
-        arms = {t.name: cross(t.place, t.direction.value)[2] for t in layout.thrusters if t.curve == curve.name}
-        turning = (arm * forces[name] for name, arm in arms.items())
-        found[f"tau_{curve.name}"] = mp.fsum(turning)
+        own = [t for t in layout.thrusters if t.curve == curve.name]
+        found[f"tau_{curve.name}"] = mp.fsum(_wrench(t.place, t.direction.value)[5] * forces[t.name] for t in own)
     return found | dict(zip(("phi", "theta", "psi"), euler_angles(rotation(y[6:10])), strict=True))
