@@ -12,6 +12,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.identify.likelihood.parameters import PLACED
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -378,6 +379,13 @@ def driven_aside(identification: Identification) -> list[str]:
     return lines
 
 
+def extrapolated(vehicle: Vehicle) -> list[str]:
+    """Return a sentence if the tests had no full command, for which there is an answer, too."""
+    low, high = vehicle.command_range
+    words = f"The tests had commands of {low:.0%} to {high:.0%}: the speed at {SHARES[-1]:.0%} is extrapolated."
+    return [words] if SHARES[-1] > high else []
+
+
 def with_error(known: tuple[float, Interval], unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`."""
     value, interval = known
@@ -594,6 +602,8 @@ def _effect(identification: Identification, effect: Effect) -> Finding:
     names["value"] = in_words(effect.value, effect.interval, effect.unit)
     if effect.kind == "current":
         names["note"] = ". It belongs to the water, so the vehicle file does not have it"
+    elif effect.kind in PLACED.values():
+        names["note"] = ". The vehicle file does not have it, because it tells the motion of the origin"
     elif effect.kind == "dead time" and not identification.vehicle.layout.has_dead_time:
         names["note"] = ". The vehicle file does not have it; T_d in [commands] would add it"
     axis = of if of in AXES else ""

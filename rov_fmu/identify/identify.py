@@ -62,7 +62,8 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
         one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out)
         if pushes := assess.pushes_of_thrusters(vehicle, of_file, axis):
-            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes))
+            strongest = fit.command_range[1]
+            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes, strongest))
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
@@ -100,7 +101,7 @@ def _axis(
     held_out: HeldOut,
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
-    answers = assess.answers(fit.averaged, axis, vehicle)
+    answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1])
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
