@@ -20,6 +20,7 @@ from rov_fmu.identify.result import (
     MOST_UNKNOWN,
     Answer,
     Disturbance,
+    Effect,
     Point,
     Prediction,
     Slip,
@@ -359,11 +360,12 @@ def verdict(
     difference: float,
     slips: Sequence[Slip] = (),
     steady: Sequence[Point] = (),
+    effects: Sequence[Effect] = (),
 ) -> Verdict:
     """Return whether the model of an axis may be trusted.
 
-    It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, and
-    the steady velocities of its tables, each predicted without the rows of the same command.
+    It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, the
+    steady velocities of its tables, each predicted without the rows of the same command, and the sizes of effects.
     """
     word, reasons = "good", []
 
@@ -402,6 +404,9 @@ def verdict(
     off = relative_error(steady, "held_out")
     if exceeded := _exceeded(off, _FARTHEST):
         lower(exceeded[0], f"The other commands predict a V_ss of the tables with an error of {off:.0%} (RMS).")
+    for effect in effects:
+        if effect.is_unusual:
+            lower("usable", f"The {effect.name} is unusual.")
     for slip in slips:
         wrong = f"The {slip.quantity} in {slip.file} seems to have another unit or sign"
         lower("do not use", f"{wrong}, and all axes are fitted to this log.")

@@ -33,7 +33,8 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if p.kind in ("reverse thrust", "dead band astern", "drag astern"):
             value, low, high = np.exp([value, low, high]).tolist()
         name = _WORDS[p.kind] + (f" {p.part}" if p.part else "")
-        yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n))
+        beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
+        yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n), float(beyond))
 
 
 _WORDS = {
