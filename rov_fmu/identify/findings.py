@@ -125,8 +125,8 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         ),
         "outliers": "{axes}: {share:.0%} of the samples of the {quantity} are outliers, which hardly count in the fit",
         "unusual effect": (
-            "{of}the {name} of {value} is unusual. Something else may act in its place, such as a filter of a sensor or "
-            "a limit of the commands. [priors] in rov.toml says what is usual"
+            "{of}the {name} of {value} is unusual. Something else may act in its place, such as a filter of a sensor "
+            "or a limit of the commands. [priors] in rov.toml says what is usual"
         ),
         "clock": (
             "{files}: the commands act {time} s {beside} their rows, although the rows are {interval} s apart. Is the "
