@@ -5,7 +5,8 @@
  *     x' = f(x, exp(g) thrust, force)      the states of the vehicle
  *     force_i, g, drift_i                  a slow force along each axis, a slow change of all thrust, and a slow velocity over ground:
  *                                          Ornstein-Uhlenbeck processes, each with a size and a time constant
- *     y = h(x, drift) + n + e              a sample: n is the sensor's coloured noise, also such a process, and e is white
+ *     y = h(x, drift) + n + e              a sample: n is the sensor's coloured noise, also such a process, and e is white; h knows
+ *                                          the place of the sensor
  *
  * A change of the commands happens at an unknown time within a window. The mean uses the expected command, and the state `lateness`
  * has the deviation of the integral of the command from its mean. The mean takes fourth-order Runge-Kutta steps; the covariance
@@ -62,6 +63,7 @@ enum { STATE, OVER_GROUND, ANGLE };
 typedef struct {
     int external[N_AXES];    /* the inputs of force or torque along each axis */
     int direction[N_AXES];   /* 0 for a velocity ahead, 1 to starboard, 2 down, -1 for a turn */
+    int turn[N_AXES];        /* 0 for roll, 1 for pitch, 2 for yaw, -1 for a velocity along an axis */
     int current[N_DRIFTS];   /* the inputs of the current: north, east, down */
     int position[N_DRIFTS];  /* the states of the position: north, east, down */
     int quaternion, heading; /* the first state of the quaternion, or the state of the heading */
@@ -88,6 +90,7 @@ typedef struct {
     real at[N_VARIABLES];                   /* the coefficients, and the inputs besides the commands */
     real size[N_SLOW], time_constant[N_SLOW]; /* of the slow processes */
     real white[MOST_SENSORS];               /* the standard deviation of each sensor's white noise */
+    real lever[MOST_SENSORS][N_DRIFTS];     /* the place of each sensor of velocity or position: ahead, to starboard, down, m */
     real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
     real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
                                                  the time between two rows */
@@ -543,13 +546,58 @@ static void pass_rows(filter *f, double time)
     }
 }
 
+/* Return the direction of the velocity that a sensor measures: 0 ahead, 1 to starboard, 2 down; -1 for any other sensor. */
+static int direction_of(const filter *f, ptrdiff_t sensor)
+{
+    const int place = f->log->place[sensor], axis = place - FIRST_STATE;
+    if (f->log->kind[sensor] == OVER_GROUND) {
+        return place;
+    }
+    return f->log->kind[sensor] == STATE && axis < N_AXES ? f->where->direction[axis] : -1;
+}
+
+/* Return the velocity at the place of a sensor, relative to the origin, for a turn of 1 rad/s. */
+static real arm(const filter *f, ptrdiff_t sensor, int axis)
+{
+    const int about = f->where->turn[axis], along = direction_of(f, sensor), across = 3 - about - along;
+    real found = 0.0;
+    if (about >= 0 && along >= 0 && about != along) {
+        found = across == (about + 1) % 3 ? f->set->lever[sensor][across] : -f->set->lever[sensor][across];
+    }
+    return found;
+}
+
+/* Return true for a sensor of the position along an axis of the earth. */
+static bool locates(const filter *f, ptrdiff_t sensor, int axis)
+{
+    return f->log->kind[sensor] == STATE && f->log->place[sensor] == f->where->position[axis];
+}
+
+/* Return what a sensor measures more than it would at the origin. */
+static real beside_origin(const filter *f, const real x[N_X], ptrdiff_t sensor)
+{
+    real R[3][3], found = 0.0;
+    for (int i = 0; i < N_AXES; i++) {
+        found += arm(f, sensor, i) * x[i];
+    }
+    for (int axis = 0; axis < N_DRIFTS; axis++) {
+        if (locates(f, sensor, axis)) {
+            rotation(f, x, R);
+            for (int i = 0; i < N_DRIFTS; i++) {
+                found += R[axis][i] * f->set->lever[sensor][i];
+            }
+        }
+    }
+    return found;
+}
+
 /* Return what a sensor measures without noise. */
 static real measured(const filter *f, const real x[N_X], ptrdiff_t sensor)
 {
     const int place = f->log->place[sensor];
     real R[3][3], value;
     if (f->log->kind[sensor] == STATE) {
-        return x[place - FIRST_STATE];
+        return x[place - FIRST_STATE] + beside_origin(f, x, sensor);
     }
     rotation(f, x, R);
     if (f->log->kind[sensor] == ANGLE) { /* the place is 0 for roll, 1 for pitch, 2 for the heading */
@@ -558,7 +606,7 @@ static real measured(const filter *f, const real x[N_X], ptrdiff_t sensor)
         }
         return place == 0 ? atan2(R[2][1], R[2][2]) : atan2(R[1][0], R[0][0]);
     }
-    value = 0.0; /* the place is the number of the direction: ahead, to starboard, down */
+    value = beside_origin(f, x, sensor); /* the place is the number of the direction: ahead, to starboard, down */
     for (int i = 0; i < N_DRIFTS; i++) {
         value += R[i][place] * (x[DRIFT + i] + current(f, i));
     }
@@ -581,8 +629,9 @@ static bool turns(const filter *f, int state)
 static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real H[N_X])
 {
     const int kind = f->log->kind[sensor], place = f->log->place[sensor];
+    const bool is_rate = kind == STATE && !locates(f, sensor, 0) && !locates(f, sensor, 1) && !locates(f, sensor, 2);
     real y[N_X], R[3][3], base = 0.0;
-    if (kind != STATE) {
+    if (!is_rate) {
         memcpy(y, x, sizeof y);
         rotation(f, x, R);
         base = measured(f, x, sensor);
@@ -590,9 +639,11 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
     for (int c = 0; c < f->count; c++) {
         const int j = f->listed[c];
         H[c] = j == NOISE + sensor ? 1.0 : 0.0;
-        if (kind == STATE) {
-            H[c] += j == place - FIRST_STATE ? 1.0 : 0.0;
-        } else if (turns(f, j)) {
+        if (kind == STATE && j == place - FIRST_STATE) {
+            H[c] += 1.0;
+        } else if (j < N_AXES && f->where->turn[j] >= 0) {
+            H[c] += arm(f, sensor, j);
+        } else if (turns(f, j) && !is_rate) {
             y[j] = x[j] + 1e-6;
             H[c] = remainder(measured(f, y, sensor) - base, TURN) / 1e-6;
             y[j] = x[j];

@@ -28,6 +28,8 @@ STATE, OVER_GROUND, ANGLE = range(3)
 """What a sensor measures: a state, a velocity over ground along an axis of the body, or an angle of the attitude."""
 DRIFTS = ("x", "y", "z")
 MOST_SENSORS = 16
+AT_ORIGIN = (0.0, 0.0, 0.0)
+"""The place of a sensor at the origin."""
 _CURRENT = ("V_N", "V_E", "V_D")
 
 
@@ -90,6 +92,8 @@ class Parameters:
     """The standard deviation of the white noise of each sensor."""
     noise: tuple[Slow, ...]
     """The coloured noise of each sensor."""
+    levers: tuple[tuple[float, ...], ...] = ()
+    """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
     offset: float = 0.0
     """How much later than its row a command acts, s."""
     width: float = 0.0
@@ -253,11 +257,15 @@ class Filter:
         idle = [Slow()] * (MOST_SENSORS - len(parameters.noise))
         slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise, *idle]
         white = [*parameters.white, *(1.0 for _ in idle)]
+        levers = np.zeros((MOST_SENSORS, len(DRIFTS)))
+        levers[: len(parameters.levers)] = parameters.levers or AT_ORIGIN
         sizes, constants = [one.size for one in slow], [one.time_constant for one in slow]
         units = np.ones(self.states)
         names = [*self.vehicle_states, *(form.axis.name for form in self.layout.axes)]
         units[: len(names)] = [parameters.units.get(name, 1.0) for name in names]
-        return np.concatenate([at, sizes, constants, white, units, [parameters.offset, parameters.width]])
+        return np.concatenate(
+            [at, sizes, constants, white, levers.ravel(), units, [parameters.offset, parameters.width]]
+        )
 
     def _record(self, record: Record, parameters: Parameters) -> _Record:
         """Return the struct `record`, which is made once for each log and set of states with a covariance."""
@@ -320,6 +328,7 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
     return [
         *of([axis.external for axis in axes], layout.inputs),
         *(-1 if axis.is_rotation else axis.place for axis in axes),
+        *(axis.place if axis.is_rotation else -1 for axis in axes),
         *of(_CURRENT, layout.inputs),
         *of(DRIFTS, layout.state),
         *of([QUATERNION[0], "psi"], layout.state),

@@ -12,7 +12,7 @@ from itertools import chain
 from .attitude import entry
 from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
 from .expression import Expression, Name, Names, call, directed, product, scaled, total
-from .layout import FAINT, Curve, Layout, effect_along
+from .layout import FAINT, Curve, Layout, Thruster, effect_along
 
 
 @dataclass(frozen=True)
@@ -131,11 +131,13 @@ def thrusts(
     for t in layout.drivers(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
-            force = force_of(t.name, own)
-            if axis is YAW and t.position is None and t.arm:
-                force = names("arm") * force
-            parts.append(scaled(t.effect(axis), force))
+            parts.append(scaled(t.effect(axis), _with_arm(t, axis, force_of(t.name, own), names)))
     return parts
+
+
+def _with_arm(thruster: Thruster, axis: Axis, force: Expression, names: Names) -> Expression:
+    """Return the force of a thruster, or its moment where the effect of the thruster is in units of R sin γ."""
+    return names("arm") * force if axis is YAW and thruster.position is None and thruster.arm else force
 
 
 def _drag(layout: Layout) -> Iterator[Force]:
@@ -182,7 +184,8 @@ def _advance(layout: Layout, names: Names) -> Iterator[Force]:
             for t in layout.thrusters:
                 effect = t.effect(vehicle_axis.axis) * t.effect(other.axis)
                 if "d" in layout.curve_of[t.name].keys and abs(effect) > FAINT:
-                    parts.append(scaled(effect, names("loss", t.name)))
+                    loss = _with_arm(t, vehicle_axis.axis, names("loss", t.name), names)
+                    parts.append(scaled(effect, _with_arm(t, other.axis, loss, names)))
             if parts:
                 lost = Name(vehicle_axis.axis.coefficient("alpha")), total(parts)
                 yield Force(ADVANCE, vehicle_axis.axis.velocity, -1, lost, (other.axis.velocity,))

@@ -20,6 +20,7 @@ from rov_fmu.identify.result import (
     MOST_UNKNOWN,
     Answer,
     Disturbance,
+    Effect,
     Point,
     Prediction,
     Slip,
@@ -46,6 +47,9 @@ _LOST = 1.8
 """The largest standard deviation of a heading, rad: that of a direction about which nothing is known."""
 _OF_THRUST = 0.7
 """The relative change of V_ss by that of the thrust: between 0.5, if drag is quadratic, and 1, if it is linear."""
+_EXPONENT = 0.15
+"""The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust and drag grow with powers
+of the command and the velocity that are known to about a tenth each."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %."""
 _REFIT_STEPS = 6
@@ -245,20 +249,24 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 # ---- Answers ---------------------------------------------------------------------------------------------------------
 
 
-def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle, pushes: Sequence[float] = ()) -> tuple[Answer, ...]:
+def answers(
+    posterior: Posterior, axis: Axis, vehicle: Vehicle, pushes: Sequence[float] = (), strongest: float = 1.0
+) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
     `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit. The values are
     those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit, whose curves
-    bend freely, the intervals are wider by the difference.
+    bend freely, the intervals are wider by the difference. They are also wider for commands beyond the strongest one of
+    the tests.
     """
     table = posterior.table
 
     def values(vehicle: Vehicle, shapes: Shapes) -> Array:
+        rest = shapes.motion(vehicle, axis, 0.0)
         if not pushes:
-            return np.array([_response(shapes.motion(vehicle, axis, c)) for c in ANSWERED])
-        rest, full = (shapes.motion(vehicle, axis, c) for c in (0.0, 1.0))
-        return np.array([_response(replace(full, C=rest.C + push * (full.C - rest.C))) for push in pushes])
+            return np.array([_response(shapes.motion(vehicle, axis, c), rest) for c in ANSWERED])
+        full = shapes.motion(vehicle, axis, 1.0)
+        return np.array([_response(replace(full, C=rest.C + push * (full.C - rest.C)), rest) for push in pushes])
 
     def logarithms(z: Array) -> Array:
         fitted = values(Vehicle(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
@@ -271,6 +279,8 @@ def answers(posterior: Posterior, axis: Axis, vehicle: Vehicle, pushes: Sequence
     variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
     # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
     variances[:, :2] += (_OF_THRUST * table.get(posterior.z.tolist(), "slow gain")) ** 2
+    sizes = np.abs(pushes or ANSWERED)
+    variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
     of_file = values(vehicle, NO_SHAPES)
     with np.errstate(divide="ignore", invalid="ignore"):
         beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z).reshape(of_file.shape)) / QUANTILE
@@ -317,7 +327,8 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     rovs = [vehicle, *(vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
     found = []
     for command in ANSWERED:
-        values = np.array([_response(NO_SHAPES.motion(vehicle, axis, command)) for vehicle in rovs])
+        motions = ([NO_SHAPES.motion(rov, axis, c) for c in (command, 0.0)] for rov in rovs)
+        values = np.array([_response(pushed, rest) for pushed, rest in motions])
         low, high = np.quantile(values[1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=0).tolist()
         if not known.names:
             low = high = values[0].tolist()
@@ -326,10 +337,10 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 
-def _response(motion: AxisAlone) -> tuple[float, float, float]:
+def _response(motion: AxisAlone, rest: AxisAlone) -> tuple[float, float, float]:
     """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force."""
     V = motion.steady_velocity()
-    return V, motion.time_constant(), motion.stopping_way(V, _STOPPED)
+    return V, motion.time_constant(), rest.stopping_way(V, _STOPPED)
 
 
 # ---- Verdicts --------------------------------------------------------------------------------------------------------
@@ -349,11 +360,12 @@ def verdict(
     difference: float,
     slips: Sequence[Slip] = (),
     steady: Sequence[Point] = (),
+    effects: Sequence[Effect] = (),
 ) -> Verdict:
     """Return whether the model of an axis may be trusted.
 
-    It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, and
-    the steady velocities of its tables, each predicted without the rows of the same command.
+    It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, the
+    steady velocities of its tables, each predicted without the rows of the same command, and the sizes of effects.
     """
     word, reasons = "good", []
 
@@ -392,6 +404,9 @@ def verdict(
     off = relative_error(steady, "held_out")
     if exceeded := _exceeded(off, _FARTHEST):
         lower(exceeded[0], f"The other commands predict a V_ss of the tables with an error of {off:.0%} (RMS).")
+    for effect in effects:
+        if effect.is_unusual:
+            lower("usable", f"The {effect.name} is unusual.")
     for slip in slips:
         wrong = f"The {slip.quantity} in {slip.file} seems to have another unit or sign"
         lower("do not use", f"{wrong}, and all axes are fitted to this log.")

@@ -294,6 +294,8 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests) -> V
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
         if logged:
             more[curve.coefficient("T")] = LEAST_LAG
+            if not (layout.has_wrench or curve.tables):
+                more[curve.coefficient("d")] = 0.0
     more = {name: base.get(name, value) for name, value in more.items()}
     return vehicle.extended(more | values)
 

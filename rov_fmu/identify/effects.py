@@ -7,6 +7,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.parameters import PLACED
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, Sensor
@@ -31,19 +32,22 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         low, high = around(value, error)
         if p.kind in ("reverse thrust", "dead band astern", "drag astern"):
             value, low, high = np.exp([value, low, high]).tolist()
-        name = _WORDS[p.kind] + (f" to the {p.part}" if p.part else "")
-        yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n))
+        name = _WORDS[p.kind] + (f" {p.part}" if p.part else "")
+        beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
+        yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n), float(beyond))
 
 
 _WORDS = {
     "reverse thrust": "thrust astern relative to thrust ahead",
     "dead band": "dead band",
     "dead band astern": "dead band astern relative to dead band ahead",
+    "advance": "share of the full thrust lost per speed of advance",
     "lag": "time constant of the thrusters",
     "dead time": "dead time of the commands",
     "drag astern": "drag astern relative to drag ahead",
     "load": "constant load",
     "current": "current",
+    **{kind: f"place of the {kind}" for kind in PLACED.values()},
     "voltage": "exponent of thrust over voltage",
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.identify.likelihood.parameters import PLACED
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -123,6 +124,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "less than the model says"
         ),
         "outliers": "{axes}: {share:.0%} of the samples of the {quantity} are outliers, which hardly count in the fit",
+        "unusual effect": (
+            "{of}the {name} of {value} is unusual. Something else may act in its place, such as a filter of a sensor "
+            "or a limit of the commands. [priors] in rov.toml says what is usual"
+        ),
         "clock": (
             "{files}: the commands act {time} s {beside} their rows, although the rows are {interval} s apart. Is the "
             "clock of the commands another one?"
@@ -264,7 +269,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         if sensor.outliers > _MOST_OUTLIERS:
             numbers = {"share": sensor.outliers}
             found.append(Finding("outliers", sensor.axis.name, names={"quantity": sensor.quantity}, numbers=numbers))
-    found += [_effect(identification, effect) for effect in identification.effects if effect.kept]
+    found += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     for slip in identification.slips:
         found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
     return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
@@ -376,6 +381,13 @@ def driven_aside(identification: Identification) -> list[str]:
                 "These numbers hold only if something prevents that."
             )
     return lines
+
+
+def extrapolated(vehicle: Vehicle) -> list[str]:
+    """Return a sentence if the tests had no full command, for which there is an answer, too."""
+    low, high = vehicle.command_range
+    words = f"The tests had commands of {low:.0%} to {high:.0%}: the speed at {SHARES[-1]:.0%} is extrapolated."
+    return [words] if SHARES[-1] > high else []
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:
@@ -587,14 +599,18 @@ def _rounded(time: float) -> float:
     return float(significant(abs(time), 2))
 
 
-def _effect(identification: Identification, effect: Effect) -> Finding:
-    """Return the fact about an effect that is kept."""
+def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]:
+    """Yield the fact about an effect that is kept, after the doubt about one of an unusual size."""
     of, is_curve = effect.of, effect.of in identification.vehicle.layout.curves_by_name
     names = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name, "note": ""}
     names["value"] = in_words(effect.value, effect.interval, effect.unit)
+    if effect.is_unusual:
+        yield Finding("unusual effect", "", "", "", names)
     if effect.kind == "current":
         names["note"] = ". It belongs to the water, so the vehicle file does not have it"
+    elif effect.kind in PLACED.values():
+        names["note"] = ". The vehicle file does not have it, because it tells the motion of the origin"
     elif effect.kind == "dead time" and not identification.vehicle.layout.has_dead_time:
         names["note"] = ". The vehicle file does not have it; T_d in [commands] would add it"
     axis = of if of in AXES else ""
-    return Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)
+    yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)

@@ -215,6 +215,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
             return key in part.keys
         value = coefficients[name]
         by_value = {"V_0": with_voltage, "n_V": with_voltage, "F_0": value != 0.0, "T": value != LEAST_LAG}
+        by_value |= dict.fromkeys(("d", f"d{REVERSE}"), value > 0.0)
         if key in by_value:
             return by_value[key]
         if isinstance(part, Curve) and key in _DEAD_BAND:

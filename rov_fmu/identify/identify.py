@@ -17,7 +17,7 @@ from rov_fmu.identify.findings import beyond_thrusters, told
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Identification, Prediction, Slip
+from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Effect, Identification, Prediction, Slip
 from rov_fmu.identify.rows import HeldOut, held_out_rows, points_of
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
@@ -56,13 +56,15 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = slips(tests, known, fit.objective, fit.best.z)
     held_out = held_out_rows(fit)
+    effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests.given)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
-        one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out)
+        one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out, effects)
         if pushes := assess.pushes_of_thrusters(vehicle, of_file, axis):
-            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes))
+            strongest = fit.command_range[1]
+            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes, strongest))
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
@@ -75,7 +77,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
         forces=tuple(points_of(tests, held_out, vehicle, "thrust")),
-        effects=tuple(effects_of(fit)),
+        effects=effects,
         disturbances=tuple(slow),
         logging=tuple(loggers_of(fit)),
         sensors=tuple(sensors_of(fit)),
@@ -98,15 +100,20 @@ def _axis(
     slow: Sequence[Disturbance],
     wrong: Sequence[Slip],
     held_out: HeldOut,
+    effects: Sequence[Effect],
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
-    answers = assess.answers(fit.averaged, axis, vehicle)
+    answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1])
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
+    drivers = {thruster.curve for thruster in vehicle.layout.drivers(axis)}
+    acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     return AxisResult(
         axis=axis,
-        verdict=assess.verdict(own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady),
+        verdict=assess.verdict(
+            own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting
+        ),
         answers=answers,
         known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),
         predictions=own,

@@ -21,6 +21,8 @@ Word = Literal["good", "usable", "do not use"]
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
+_UNUSUAL = 2.5
+"""An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 
 MOST_UNKNOWN = 0.05
 """A model must not be used if unknown slow forces, changes of the thrust and velocities over ground together exceed
@@ -122,6 +124,13 @@ class Effect:
     unit: str
     evidence: float
     """2 ln of the Bayes factor of the model with it against the model without it."""
+    beyond: float = 0.0
+    """How many deviations of its prior it is from the usual size; 0 for what a single log has."""
+
+    @property
+    def is_unusual(self) -> bool:
+        """True if it is so large that something else may act in its place."""
+        return self.kept and self.beyond > _UNUSUAL
 
     @property
     def kept(self) -> bool:

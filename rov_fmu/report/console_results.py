@@ -10,6 +10,7 @@ from rov_fmu.identify.findings import (
     answer_at,
     by_heading,
     driven_aside,
+    extrapolated,
     name_of,
     next_tests,
     repairs,
@@ -35,7 +36,7 @@ def print_identification(identification: Identification) -> None:
         paragraph(out, f"First: {words}")
     for result in identification.axes:
         paragraph(out, f"- {verdict_in_words(result)}")
-    asides = driven_aside(identification)
+    asides = [*extrapolated(vehicle), *driven_aside(identification)]
     for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:
             out.print()

@@ -70,6 +70,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         script=inline_script("plots.js"),
         card=card(results.vehicle),
         asides=findings.driven_aside(results),
+        extrapolated=findings.extrapolated(results.vehicle),
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,

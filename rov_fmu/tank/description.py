@@ -451,11 +451,10 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
 _UNKNOWN_EFFECTS = {
     "table": "identification fits a_t and b_t in place of a table",
     "V_0": "identification fits the effect of the voltage if [fit] has `voltage`",
-    "d": "identification cannot take into account that thrust decreases with the speed of advance",
 }
 """Keys of a thrust curve, and what identification does instead of using them."""
-_FITTED = {"a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse", "T", "k_t", "n_V", "d_reverse"}
-"""The keys of a thrust curve that identification fits, or that another key of _UNKNOWN_EFFECTS comes with."""
+_FITTED = {"a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse", "T", "k_t", "n_V", "d", "d_reverse"}
+"""The keys of a thrust curve that identification fits."""
 
 
 def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:

@@ -37,25 +37,22 @@ def check_layout(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
 
 def check_thruster_places(layout: Layout) -> Iterator[str]:
     """Check that each thruster has either a position or an arm, where the vehicle turns."""
-    losing = {curve.name for curve in layout.curves if "d" in curve.keys}
     turning = [axis.name for axis in (ROLL, PITCH, YAW) if layout.has(axis)]
     for thruster in layout.thrusters:
         key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction.value
         if thruster.arm:
-            if reason := _why_no_arm(thruster, losing):
+            if reason := _why_no_arm(thruster):
                 yield key_line(f"{key}.arm", reason)
         elif thruster.position is None and (layout.has_attitude or (turning and hypot(x, y) > _PARALLEL)):
             yield key_line(f"{key}.position", f"this key, or arm, is missing, and the vehicle has {turning[0]}")
 
 
-def _why_no_arm(thruster: Thruster, losing: Collection[str]) -> str | None:
-    """Return why a thruster cannot have the key arm, or None. `losing` are the curves that lose thrust with speed."""
+def _why_no_arm(thruster: Thruster) -> str | None:
+    """Return why a thruster cannot have the key arm, or None."""
     if thruster.position:
         return "must not be given together with position"
     if thruster.direction.value[0] <= 0.0:
         return "must be of a thruster that pushes ahead; give its position instead"
-    if thruster.curve in losing:
-        return f"d of the curve {thruster.curve} needs a place: give the thruster's position"
     return None
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.given import with_axis_alone
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -183,6 +184,43 @@ def test_a_turning_vehicle_measures_its_velocity_over_ground() -> None:
     off, variances = run(belief, [Sample(t, y, measure[n], white[n]) for t, y, n in told], rates, diffusion)
     assert found.variances == pytest.approx(variances, rel=5e-4)
     assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < 5e-4
+
+
+def test_a_sensor_beside_the_origin_measures_the_turn() -> None:
+    """A velocity at a place is that of the origin plus the turn times the place, and a position is beside it.
+
+    The variances are those of errors of one state at a time.
+    """
+    k, place, psi = load_vehicle(SHIPPED["bluerov2_heavy"]), np.array([0.4, -0.2, 0.3]), 0.9
+    layout = replace(k.layout, mix={}, pulse=None, has_dead_time=False)
+    k = Vehicle(layout, {name: k[name] for name in layout.coefficients})
+    velocity, turn = {"u": 0.2, "v": -0.1, "w": 0.1}, {"p": -0.3, "q": 0.2, "r": 0.5}
+    state = {**velocity, **turn, QUATERNION[0]: cos(0.5 * psi), QUATERNION[3]: sin(0.5 * psi)}
+    kinds = ((True, False), (True, True), (False, True))
+    sensors = [Sensor(axis, moves, ground) for moves, ground in kinds for axis in (SURGE, SWAY, HEAVE)]
+    white, told, filter = 0.01, (np.zeros(1), np.zeros(1)), Filter(k)
+    levers = (tuple(place.tolist()),) * len(sensors)
+    known = parameters(k, len(sensors), levers=levers)
+
+    def predicted(changed: dict[str, float], errors: dict[str, float]) -> tuple[Array, Array]:
+        """Return what the sensors measure of a state, and the variances of the first sample of each sensor alone."""
+        off, variances = np.zeros(len(sensors)), np.zeros(len(sensors))
+        for n in range(len(sensors)):
+            log = record(sensors, [(0.0, n)], rows=told, start=state | changed, errors=errors, inputs=[*layout.inputs])
+            run = filter.run(log, known)
+            off[n], variances[n] = -run.innovations[0], run.variances[0]
+        return off, variances
+
+    found, _ = predicted({}, {})
+    moved = np.array([*velocity.values()]) + np.cross([*turn.values()], place)
+    c, s = cos(psi), sin(psi)
+    assert found == pytest.approx(
+        np.concatenate([moved, moved, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ place])
+    )
+    for name in ("p", "q", "r", QUATERNION[2], QUATERNION[3]):
+        slope = (predicted({name: state.get(name, 0.0) + 1e-5}, {})[0] - found) / 1e-5
+        _, variances = predicted({}, {name: 0.1})
+        assert variances == pytest.approx(white**2 + (0.1 * slope) ** 2, rel=1e-3), name
 
 
 INPUTS = [*VIDEORAY.layout.inputs]

@@ -1,6 +1,7 @@
 """Thrust by tables, by the voltage, with a dead time, and fins: compared with equations written out separately."""
 
 import csv
+import math
 import random
 from dataclasses import replace
 from itertools import pairwise
@@ -11,11 +12,22 @@ from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.equation.layout import Position
 from rov_fmu.equation.step import Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_engine
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, at_rest, fin, numbered, random_inputs, random_state
+from tests.vehicles import (
+    EVERYTHING,
+    SIX,
+    THRUST_EFFECTS,
+    VIDEORAY,
+    at_rest,
+    fin,
+    numbered,
+    random_inputs,
+    random_state,
+)
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces
 from verification.references.rigid_vehicle import compared, places
@@ -106,6 +118,24 @@ def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_bal
         V_ss, _ = rov.response(axis, command)
         moved = rov.step(rov.held_inputs(axis, command), at_rest(rov), 100.0)
         assert moved[axis.velocity] == pytest.approx(V_ss, rel=1e-9)
+
+
+def test_the_speed_of_advance_of_an_arm_is_that_of_its_place() -> None:
+    """The arm R sin γ of the VideoRay is the distance of its thrusters from the middle."""
+    rov = VIDEORAY.extended({"d_rear": 5.0, "d_top": 2.0})
+    distance = rov["R"] * math.sin(rov["gamma"])
+    thrusters = [
+        t.model_copy(
+            update={"arm": None, "position": Position(value=(0.0, -t.side * distance, 0.0), unit="m", source="drawn")}
+        )
+        for t in rov.layout.thrusters
+    ]
+    layout = replace(rov.layout, thrusters=tuple(thrusters))
+    placed = Vehicle(layout, {name: rov[name] for name in layout.coefficients})
+    rng = random.Random(4)
+    for _ in range(20):
+        inputs, state = random_inputs(rng, rov), random_state(rng, rov)
+        assert rov.step(inputs, state, 0.5) == pytest.approx(placed.step(inputs, state, 0.5), rel=1e-12, abs=1e-12)
 
 
 # ---- Motion ----

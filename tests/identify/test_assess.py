@@ -128,6 +128,23 @@ def test_answers_are_as_uncertain_as_the_drag_the_thrust_and_the_vehicle_file() 
             assert sorted((low / value, high / value)) == pytest.approx([np.exp(-0.01), np.exp(0.01)])
 
 
+def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:
+    losing, exact = VIDEORAY.extended({"d_rear": 3.0}), of_drag(0.0, 1e-9)
+    table = replace(exact.table, layout=losing.layout, base=losing.coefficients)
+    half, full = (
+        next(a for a in answers(replace(exact, table=table), SURGE, losing, strongest=0.5) if a.command == command)
+        for command in (0.5, 1.0)
+    )
+    V, _ = losing.response(SURGE, 0.5)
+    assert VIDEORAY.response(SURGE, 0.5)[0] > V
+    coasting = VIDEORAY.alone(SURGE, VIDEORAY.layout.usual_inputs)
+    assert half.stop[0] == pytest.approx(coasting.stopping_way(V, 0.1))
+    assert half.steady[1][1] / half.steady[0] == pytest.approx(np.exp(0.01))
+    for value, (_, high) in (full.steady, full.rise, full.stop):
+        assert np.log(high / value) == pytest.approx(t.ppf(0.975, 10) * 0.15 * np.log(2.0))
+    assert answers_of_file(losing, SURGE)[2].stop[0] == pytest.approx(half.stop[0])
+
+
 def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
     """A file without estimates has no intervals: both ends are the value."""
     rov = load_vehicle(REFIT)

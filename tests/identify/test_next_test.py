@@ -68,7 +68,7 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
     places = [fit.posterior.table.place(p.kind, p.of, p.part) for p in objective.table.parameters]
     z = np.array([usual if n is None else fit.kept.z[n] for n, usual in zip(places, objective.mean, strict=True)])
     _, information = total(objective, z, objective.data(z, objective.runs(z)))
-    after = next_test(objective, Posterior.of(objective.table, z, information), HEAVE, TankLimits(), ())
+    after = next_test(objective, Posterior.of(objective.table, z, information).averaged, HEAVE, TankLimits(), ())
     assert after
     assert after.now == pytest.approx(test.then, rel=0.3)
     assert after.now < 0.8 * test.now

@@ -211,14 +211,6 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
         "body.I_q: only pitch needs it\n"
         "body.z_B: acts only in roll and pitch: remove it, or add an axis",
     ),
-    "a loss of thrust of an arm": (
-        {
-            "thruster.l.position": GONE,
-            "thruster.l.arm": "port",
-            "arm": {"R": quantity(0.2, "m"), "gamma": quantity(0.5, "rad")},
-        },
-        "thruster.l.arm: d of the curve one needs a place: give the thruster's position",
-    ),
     "a thruster without its place": ({"thruster.t.position": GONE}, "thruster.t.position … the vehicle has roll"),
     # cross terms
     "a cross term of an axis that is not there": (

@@ -10,11 +10,12 @@ deviations ahead and astern are correlated by one half.
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from math import exp, inf, isfinite
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from rov_fmu.equation.alone import AxisAlone
+from rov_fmu.equation.alone import RISE, AxisAlone
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.tank.arrays import Array
@@ -99,6 +100,33 @@ class Shapes:
 
 
 NO_SHAPES = Shapes({})
+
+
+def measured_time_constant(motion: AxisAlone, load: float, T: float) -> float:
+    """Return the time from rest to (1 - 1/e) V_ss, s, if all acceleration by C but a constant load lags by T, s.
+
+    There is no closed form: the motion takes Runge-Kutta steps whose length is proportional to Tau + T. The result is
+    infinite if V_ss is not reached.
+    """
+    Tau, goal = motion.time_constant(), RISE * motion.steady_velocity()
+    if T <= 0.0 or not isfinite(Tau):
+        return Tau
+    h, v = (Tau + T) / 50.0, 0.0
+
+    def rate(t: float, v: float) -> float:
+        return motion.acceleration(v) - (motion.C - load) * exp(-t / T)
+
+    for n in range(1000):
+        t = n * h
+        k_1 = rate(t, v)
+        k_2 = rate(t + 0.5 * h, v + 0.5 * h * k_1)
+        k_3 = rate(t + 0.5 * h, v + 0.5 * h * k_2)
+        after = v + h / 6.0 * (k_1 + 2.0 * (k_2 + k_3) + rate(t + h, v + h * k_3))
+        if abs(after) >= abs(goal) and after * goal > 0.0:
+            between = CubicHermiteSpline([t, t + h], [v, after], [k_1, rate(t + h, after)])
+            return float(between.solve(goal, extrapolate=False)[0])
+        v = after
+    return inf
 
 
 @dataclass(frozen=True, eq=False)

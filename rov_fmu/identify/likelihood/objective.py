@@ -26,8 +26,8 @@ from rov_fmu.c.filter import DivergedError, Filter, Run
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Curve, Layout
-from rov_fmu.identify.likelihood.curves import Shapes
-from rov_fmu.identify.likelihood.parameters import Parameter, Table
+from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
+from rov_fmu.identify.likelihood.parameters import LEAST_LAG, Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -64,8 +64,11 @@ class TableRow:
         return parameter.of in {"", self.subject.name, *curves}
 
 
-def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes) -> Array:
-    """Return the values of some rows by the model, in the unit of each row."""
+def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_lag: float = 0.0) -> Array:
+    """Return the values of some rows by the model, in the unit of each row.
+
+    A measured time constant contains the lag of the thrusters. `least_lag` is the lag of a vehicle without one.
+    """
     found = np.zeros(len(rows))
     forces: dict[Curve, list[int]] = {}
     for n, row in enumerate(rows):
@@ -73,7 +76,13 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes) -> Arra
             forces.setdefault(row.subject, []).append(n)
             continue
         motion = shapes.motion(vehicle, row.subject, row.command)
-        found[n] = motion.steady_velocity() if row.quantity == "V_ss" else motion.time_constant()
+        if row.quantity == "V_ss":
+            found[n] = motion.steady_velocity()
+        else:
+            curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(row.subject)}
+            T = max((vehicle[curve.coefficient("T")] for curve in curves if curve.has_lag), default=least_lag)
+            load = shapes.motion(vehicle, row.subject, 0.0).C
+            found[n] = measured_time_constant(motion, load, T - least_lag)
     for curve, places in forces.items():
         found[places] = shapes.forces(vehicle, curve, np.array([rows[n].command for n in places]))
     return found
@@ -169,7 +178,9 @@ class Objective:
         rows = self.rows if rows is None else rows
         vehicle = Vehicle(self.table.layout, self.table.coefficients(z.tolist()))
         shapes = self.table.shapes(z.tolist())
-        off = np.array([row.measured for row in rows]) - modelled(rows, vehicle, shapes)
+        off = np.array([row.measured for row in rows]) - modelled(
+            rows, vehicle, shapes, LEAST_LAG if self.logs else 0.0
+        )
         noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
         return off, noise**2
 

@@ -12,8 +12,8 @@ from math import exp, inf, log
 
 import numpy as np
 
-from rov_fmu.c.filter import Parameters, Slow
-from rov_fmu.equation.catalogue import HEAVE, REVERSE, Axis
+from rov_fmu.c.filter import AT_ORIGIN, Parameters, Sensor, Slow
+from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
@@ -35,6 +35,7 @@ PRIORS = {
     "thrust_reverse": Prior(0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"),
     "dead_band": Prior(0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
     "dead_band_astern": Prior(0.3, "ln of the dead band astern to that ahead", "propellers are made for one direction"),
+    "advance": Prior(0.2, "the share of full thrust lost per m/s ahead", "propellers give no thrust at 3 to 10 m/s"),
     "lag": Prior(0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
     "dead_time": Prior(0.05, "the time from a command to its effect, s", "links of one or two control periods"),
     "inertia": Prior(0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
@@ -43,6 +44,7 @@ PRIORS = {
     "drag_astern": Prior(0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
     "load": Prior(0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
     "current": Prior(0.1, "the current, m/s", "tests are made in calm water"),
+    "sensor_place": Prior(0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"),
     "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
     "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
     "slow_gain": Prior(2.0, "ln of the size of a slow change of thrust", "1 %, within a factor of 7"),
@@ -63,6 +65,12 @@ _QUIETER = 2.0
 """The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
 _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
+CURRENT = ("to the north", "to the east")
+"""The parts of a current."""
+PLACED = {True: "velocity sensor", False: "position sensor"}
+"""The sensors that may be beside the origin: those of velocities, and those of positions."""
+_PLACES = ("forward", "to starboard", "down")
+"""The parts of the place of a sensor."""
 USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
@@ -120,6 +128,11 @@ class Parameter:
         if not self.of_motion:
             return 1e-2 if self.is_log else 1e-3
         return _MOTION_STEP * (1.0 if self.is_log else self.deviation)
+
+
+def has_place(sensor: Sensor) -> bool:
+    """Return True for a sensor of a velocity or a horizontal position. Its place changes what it measures of a turn."""
+    return not sensor.axis.is_rotation and (sensor.is_velocity or sensor.axis is not HEAVE)
 
 
 _noise = partial(Parameter, is_log=True, of_motion=False)
@@ -199,6 +212,12 @@ class Table:
             if other != band:
                 ratio = self.base[other] / self.base[band] if self.base[band] else 1.0
                 found[other] = found[band] * ratio * exp(self.get(z, "dead band astern", curve.name))
+        if "d" in curve.keys and not curve.tables:
+            lost = self.get(z, "advance", curve.name, default=_lost(curve, self.base))
+            names = [curve.coefficient(key) for key in ("d", f"d{REVERSE}")]
+            ratio = self.base[names[1]] / self.base[names[0]] if self.base[names[0]] else 1.0
+            full = found[curve.coefficient("a_t")] + found[curve.coefficient("b_t")]
+            found |= {names[1]: ratio * lost * full, names[0]: lost * full}
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)
@@ -227,7 +246,7 @@ class Table:
         """Return the parameters of the filter for a log."""
         file, layout = one.log.file, one.layout
         found = self.coefficients(z)
-        for part, name in (("north", "V_N"), ("east", "V_E")):
+        for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
             found[name] = self.get(z, "current", file, part)
         whole = self.get(z, "slow gain", default=0.0)
         axes = [form.axis for form in layout.axes]
@@ -248,6 +267,7 @@ class Table:
             white.append(sigma)
             coloured = self.get(z, "coloured noise", quantity) * sigma
             noise.append(Slow(coloured, self.get(z, "correlation time", quantity, default=1.0)))
+        levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
         is_inside = HEAVE.name in layout.kinds
         return Parameters(
             coefficients=found,
@@ -257,6 +277,7 @@ class Table:
             drifts=(along, along, down if is_inside else Slow()),
             white=tuple(white),
             noise=tuple(noise),
+            levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
             offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
             width=self.get(z, "logging width", file),
             inputs=self.shapes(z).inputs(layout, one.record.inputs),
@@ -304,7 +325,7 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         is_exact = key.startswith(("thrust_", "dead_band")) and prior("thrust") == 0.0
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
-    found = [*_of_curves(known, prior), *_of_axes(known, prior)]
+    found = [*_of_curves(known, prior), *_advance(known, prior("advance")), *_of_axes(known, prior)]
     if logs:
         if prior("lag"):
             T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
@@ -314,6 +335,7 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
             yield Parameter("dead time", "", deviation=prior("dead_time"), low=0.0, null=0.0, unit="s")
         if prior("voltage") and any("n_V" in c.keys for c in known.curves):
             yield Parameter("voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=0.0, high=4.0, null=0.0)
+        yield from _of_sensors(logs, prior("sensor_place"))
     yield from (p for p in found if p.deviation > 0.0)
     for number, one in enumerate(logs):
         yield from _of_one_log(one, number, prior)
@@ -352,6 +374,19 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
             astern = curve.coefficient(f"c_0{REVERSE}")
             if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
                 yield Parameter("dead band astern", name, deviation=prior("dead_band_astern"), null=0.0)
+
+
+def _advance(known: Beginning, deviation: float) -> Iterator[Parameter]:
+    """Yield the loss of thrust with speed of each curve. Forces at rest, even exact ones, do not tell it."""
+    for curve in known.layout.curves:
+        if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
+            mean = _lost(curve, known.coefficients)
+            yield Parameter("advance", curve.name, mean=mean, deviation=deviation, low=0.0, null=0.0, unit="s/m")
+
+
+def _lost(curve: Curve, c: Mapping[str, float]) -> float:
+    """Return the share of the full thrust of a curve that is lost per speed of advance, s/m."""
+    return c[curve.coefficient("d")] / (c[curve.coefficient("a_t")] + c[curve.coefficient("b_t")])
 
 
 def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:
@@ -395,8 +430,22 @@ def _of_one_log(one: SampledLog, number: int, prior: Callable[[str], float]) -> 
     yield Parameter("logging offset", file, mean=-half, deviation=least, log=number, unit="s")
     yield Parameter("logging width", file, mean=0.5, deviation=0.5, low=0.0, high=1.0, of_motion=False, log=number)
     if (one.has_positions or one.has_velocities) and prior("current"):
-        for part in ("north", "east") if "psi" in one.layout.state or one.layout.has_attitude else ("north",):
+        for part in CURRENT if "psi" in one.layout.state or one.layout.has_attitude else CURRENT[:1]:
             yield Parameter("current", file, part, deviation=prior("current"), null=0.0, log=number, unit="m/s")
+
+
+def _of_sensors(logs: Sequence[SampledLog], deviation: float) -> Iterator[Parameter]:
+    """Yield the places of the sensors whose velocity or position changes as the vehicle turns."""
+    for is_velocity, kind in PLACED.items():
+        turns = {
+            form.axis
+            for one in logs
+            for form in one.layout.axes
+            if form.axis.is_rotation and any(s.is_velocity == is_velocity and has_place(s) for s in one.record.sensors)
+        }
+        parts = _PLACES if turns - {YAW} else _PLACES[:2] if turns else ()
+        for part in parts if deviation else ():
+            yield Parameter(kind, "", part, deviation=deviation, null=0.0, unit="m")
 
 
 def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str], float]) -> Iterator[Parameter]:

@@ -61,7 +61,9 @@ logging offset log_heave_0.csv: -0.05 ± 0.05, -inf to inf
 logging width log_heave_0.csv: 0.5 ± 0.5, 0 to 1
 logging offset log_surge_0.csv: -0.1 ± 0.1, -inf to inf
 logging width log_surge_0.csv: 0.5 ± 0.5, 0 to 1
-current log_surge_0.csv north: 0 ± 0.1, -inf to inf, absent at 0
+current log_surge_0.csv to the north: 0 ± 0.1, -inf to inf, absent at 0
+advance rear: 0 ± 0.2, 0 to inf, absent at 0
+advance top: 0 ± 0.2, 0 to inf, absent at 0
 slow force surge: ln 0.001 ± 2.5, 1e-07 to 0.1
 slow force heave: ln 0.001 ± 2.5, 1e-07 to 0.1
 slow gain: ln 0.01 ± 2, 1e-06 to 0.2
@@ -106,10 +108,11 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
             full, more = sum(base[name] for name in names), of("linear thrust", curve, part)
             linear = base[names[1]] + more * full
             assert [c[name] for name in names] == pytest.approx([ratio * (full - linear), ratio * linear])
-        assert [c[f"{key}_{curve}"] for key in ("c_0", "T", "n_V")] == [
+        assert [c[f"{key}_{curve}"] for key in ("c_0", "T", "n_V", "d")] == [
             of("dead band", curve),
             of("lag"),
             of("voltage"),
+            pytest.approx(of("advance", curve) * (c[f"a_t_{curve}"] + c[f"b_t_{curve}"])),
         ]
     assert c["c_0_top_reverse"] == pytest.approx(of("dead band", "top") * exp(of("dead band astern", "top")))
     assert "c_0_rear_reverse" not in c, "no force of it was measured astern"
@@ -133,4 +136,4 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     sideways = of("slow velocity", "horizontal")
     drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
-    assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "north")]
+    assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "to the north")]
