@@ -40,14 +40,9 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {"made.toml", "report.html"}
 
 
-def test_the_first_words_of_a_file_say_what_it_was_made_from(vehicle: Vehicle) -> None:
-    made = Provenance(tool="tool", method="by thought", inputs={})
-    text = vehicle_text(
-        replace(vehicle, data=None, pictures=None, provenance=made, measured_from="tank tests and 2 dive logs")
-    )
-    assert "\n# Made from tank tests and 2 dive logs: [provenance] tells how" in text
-    assert "warnings" not in text
-    assert "facts" not in text
+def test_a_file_that_was_made_is_written_as_it_stands() -> None:
+    refit = replace(load_vehicle(REFIT), measured_from="tank tests")
+    assert vehicle_text(refit, REFIT.parent) == TEXT
 
 
 @pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY], ids=lambda path: path.stem)
