@@ -54,8 +54,20 @@ def written(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...
     return load_tests(path)
 
 
+def add_voltage(log: Path, fall: float = 0.03) -> None:
+    """Give a log a voltage that falls from 16 V by so much in each row."""
+    header, *rows = log.read_text(encoding="utf-8").splitlines()
+    volts = [f"{row},{16.0 - fall * n:.4f}" for n, row in enumerate(rows)]
+    log.write_text("\n".join([f"{header},voltage [V]", *volts, ""]), encoding="utf-8")
+
+
 @pytest.fixture(scope="session")
-def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
-    """Fit a short log of heave and one of yaw."""
-    folder = tmp_path_factory.mktemp("tests")
-    return fit_all(folder, *begin(written(folder, (HEAVE, "a", SHORT), (YAW, "a", SHORT))))
+def short(tmp_path_factory: pytest.TempPathFactory) -> Tests:
+    """Write a short log of heave and one of yaw."""
+    return written(tmp_path_factory.mktemp("tests"), (HEAVE, "a", SHORT), (YAW, "a", SHORT))
+
+
+@pytest.fixture(scope="session")
+def fit(short: Tests) -> Fit:
+    """Fit the short logs."""
+    return fit_all(short.folder.path, *begin(short))

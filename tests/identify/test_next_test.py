@@ -45,6 +45,9 @@ def test_the_vehicle_stays_in_the_tank(fit: Fit) -> None:
     assert within
     covered = [float(np.ptp(run(TRUTH, HEAVE, [*plan(t), (0.0, 60.0)], 10.0).position)) for t in (free, within)]
     assert covered[1] <= 1.0 < covered[0]
+    brief = proposed(fit, duration=12.0)
+    assert brief
+    assert [plan(test)[0][1] for test in (free, brief)] == [8.0, 4.0], "a third of the duration, and at most 8 s"
     turn = proposed(fit, YAW, tank_length=0.1)
     assert turn
     assert (turn.axis, turn.then < turn.now) == (YAW, True), "a turn needs no length"

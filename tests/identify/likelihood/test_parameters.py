@@ -11,6 +11,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, table_of
 from rov_fmu.identify.likelihood.records import SampledLog
 from tests.folders import HEAD, folder_of, pulled
+from tests.identify.conftest import add_voltage
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
@@ -25,9 +26,7 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
     for axis, rate, quantity in ((HEAVE, 10.0, "depth"), (SURGE, 5.0, "distance")):
         recording = run(VIDEORAY, axis, ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0)), rate)
         file = write_log(path, "0", recording.noisy(np.random.default_rng(0), quantity))
-        header, *rows = file.read_text(encoding="utf-8").splitlines()
-        volts = [f"{row},{16.0 - 0.03 * n:.2f}" for n, row in enumerate(rows)]
-        file.write_text("\n".join([f"{header},voltage [V]", *volts, ""]), encoding="utf-8")
+        add_voltage(file)
     beginning, logs, rows_of_tables = begin(load_tests(path))
     return table_of(beginning, logs, sorted({row.noise for row in rows_of_tables})), logs
 
