@@ -38,6 +38,8 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.report.results import FILES, TIME, axis_result, example, log, prediction, without_findings
 
+BLUEROV = load_vehicle(SHIPPED["bluerov2"])
+
 
 def quiet(**changes: Any) -> Identification:
     """A result with one good axis and nothing to tell but its coverage, with some changes."""
@@ -67,8 +69,7 @@ def disturbance(kind: Any = "force", **changes: Any) -> Identification:
 
 def with_channels(*names: str) -> Identification:
     channels = tuple(Channel(QUANTITIES[name], Source(name), TIME, TIME) for name in names)
-    base = load_vehicle(SHIPPED["bluerov2"])
-    vehicle = replace(base, layout=replace(base.layout, coupled=False))
+    vehicle = replace(BLUEROV, layout=replace(BLUEROV.layout, coupled=False))
     one = replace(log("dive.csv"), channels=channels)
     return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)
 
@@ -108,6 +109,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         surge(known=(replace(BETA, value=1.2, interval=(1.0, 1.4)),)),
     ),
     (
+        "implausible inertia",
+        replace(surge(known=(replace(BETA, value=0.2, interval=(0.1, 0.29)),)), vehicle=BLUEROV),
+        "inertia were 5.0 times m_rov with the added one.",
+        replace(surge(known=(replace(BETA, value=0.2, interval=(0.1, 0.31)),)), vehicle=BLUEROV),
+    ),
+    (
         "thrust tables",
         quiet(forces=forces(2.0, 2.1, 2.2)),
         "the forces in thrust_top.csv are 2.1 times those that fit the logs. Check their unit",
@@ -120,8 +127,19 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         disturbance(evidence=5.0),
     ),
     ("change of thrust", disturbance("gain", since=None), "the thrust changes slowly by 12% (RMS) in log_3", quiet()),
-    ("velocity over ground", disturbance("velocity"), "surge: an unknown slow velocity over ground of 0.11 m/s", None),
-    ("explained disturbance", disturbance("gain", cause="the pitch"), "It follows the pitch", disturbance("gain")),
+    (
+        "velocity over ground",
+        disturbance("velocity", axis=None, since=0.9),
+        "surge and sway: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
+        None,
+    ),
+    (
+        "explained disturbance",
+        disturbance(cause="the distance", since=1.1),
+        "surge: a slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 1 s on. It follows the distance"
+        ", as when a tether pulls",
+        disturbance("gain"),
+    ),
     (
         "coupling left out",
         with_channels("heading", "surge velocity"),
@@ -187,6 +205,23 @@ def test_each_kind_is_told_for_its_reason_alone(
     assert beside is None or not said(beside, kind)
 
 
+@pytest.mark.parametrize(
+    ("interval", "kind"),
+    [
+        ((-0.2, -0.149), "logging"),
+        ((-0.2, -0.151), "clock"),
+        ((0.049, 0.1), "logging"),
+        ((0.051, 0.1), "clock"),
+        ((-0.1, 0.0), ""),
+        ((0.0, 0.1), ""),
+    ],
+)
+def test_commands_that_act_up_to_one_row_early_are_usual(interval: tuple[float, float], kind: str) -> None:
+    """Half an interval of 0.1 s more is allowed at both ends."""
+    result = quiet(logging=(replace(LATE, offset_interval=interval),))
+    assert [one.kind for one in findings_of(result)] == [kind] * bool(kind)
+
+
 def test_every_own_kind_has_a_sentence_here() -> None:
     own = {*SENTENCES} - {*reading.SENTENCES}
     of_tuning = {kind for kind in own if kind.startswith("implausible tuned")}
@@ -230,8 +265,10 @@ def test_the_next_tests_begin_with_the_widest_interval() -> None:
     ]
     only = three(), replace(three(), slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),))
     fine, odd = (replace(one, axes=(replace(one.axes[0], next_test=tests[2]),)) for one in only)
-    widest = "no single test would make an interval a tenth narrower. The widest is that of yaw: V_ss at 50%, ±10%."
-    assert next_tests(fine) == [widest]
+    widest = "no single test would make an interval a tenth narrower. The widest is that of {}: V_ss at 50%, ±{}%."
+    useless = [replace(axis, next_test=replace(test, then=test.now)) for axis, test in zip(axes, tests, strict=True)]
+    assert next_tests(replace(example(), axes=tuple(useless))) == [widest.format("heave", 50)]
+    assert next_tests(fine) == [widest.format("yaw", 10)]
     assert next_tests(odd)[0].startswith("first repair what disagrees, and identify again")
     assert next_tests(three()) == []
 
@@ -242,6 +279,12 @@ def three(**changes: Any) -> Identification:
     (axis,) = surge(predictions=tuple(prediction(SURGE, "surge velocity", file) for file in files)).axes
     folder = replace(quiet().folder, logs=[*map(log, files)])
     return quiet(**{"axes": (replace(axis, next_test=None),), "folder": folder, **changes})
+
+
+def two() -> Identification:
+    """The same of the first two logs."""
+    (axis,) = three().axes
+    return three(axes=(replace(axis, predictions=axis.predictions[:2]),))
 
 
 def worse(result: Identification, *files: str) -> Identification:
@@ -265,6 +308,7 @@ def slow_forces(*sizes: float) -> dict[str, Any]:
 
 
 ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the other 2 logs. "
+SLIPS = [Slip(file, "surge velocity", "is it in cm", 20.0) for file in (*FILES, "log_3.csv")]
 
 
 @pytest.mark.parametrize(
@@ -276,9 +320,25 @@ ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the othe
         ),
         (worse(three(), "log_2.csv", "log_3.csv"), []),
         (
-            worse(three(slips=(Slip("log_3.csv", "surge velocity", "is it in cm", 20.0),)), "log_3.csv"),
+            worse(three(slips=(SLIPS[2],)), "log_3.csv"),
             [f"{ODD}Check the surge velocity: is it in cm?"],
         ),
+        (
+            three(slips=tuple(SLIPS[:2])),
+            [
+                f"Repair {file} or take it out of the folder: it disagrees with the other log. "
+                "Check the surge velocity: is it in cm?"
+                for file in FILES
+            ],
+        ),
+        (
+            three(slips=tuple(SLIPS)),
+            [
+                f"Repair {slip.file} or take it out of the folder. Check the surge velocity: is it in cm?"
+                for slip in SLIPS
+            ],
+        ),
+        (worse(two(), "log_2.csv"), []),
         (
             three(**slow_forces(0.5, 0.4, 1.6)),
             [

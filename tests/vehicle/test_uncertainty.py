@@ -46,7 +46,8 @@ def test_estimates_read_back_as_they_were_written(refit: Vehicle, tmp_path: Path
         "beta_w": Estimated(error=0.5, correlation={"a_d_u": 0.123456, "b_d_u": -0.123456}),
     }
     rounded_to_0 = {"b_d_w": Estimated(error=4.0, correlation={"a_d_u": -4e-7})}
-    write_vehicle(replace(refit, estimates=rows | rounded_to_0), tmp_path / "made.toml")
+    exact = {**rows, "b_d_u": rows["b_d_u"].model_copy(update={"error": 1234.5049})}
+    write_vehicle(replace(refit, estimates=exact | rounded_to_0), tmp_path / "made.toml")
     assert load_vehicle(tmp_path / "made.toml").estimates == rows | {"b_d_w": Estimated(error=4.0)}
     write_vehicle(replace(refit, estimates={}), tmp_path / "none.toml")
     assert "estimates" not in (tmp_path / "none.toml").read_text(encoding="utf-8")
@@ -137,6 +138,10 @@ def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path
     found = load_vehicle(path).uncertainty
     assert found.names == ("m_rov", "b_d_w", "alpha_u")
     assert found.errors == pytest.approx([0.1, 0.2, 1.1 * log(1.331) / 3.92], rel=1e-4)
+    vehicle = load_vehicle(path)
+    gamma = vehicle.layout.coefficients["gamma"]
+    between_bounds = replace(vehicle, intervals={"gamma": (gamma.minimum, gamma.maximum)}).uncertainty
+    assert between_bounds.errors == pytest.approx([(gamma.maximum - vehicle["gamma"]) / 1.96], rel=1e-4)
     drawn = found.drawn(qmc.Sobol(3, scramble=False).random(1024))
     assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002
     assert np.isfinite(drawn).all(), "the first number of Sobol's sequence is 0"

@@ -3,12 +3,14 @@
 import re
 import shutil
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.c.compile import BuildError
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import SURGE, YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
@@ -61,6 +63,17 @@ def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
     assert {one.name: [*sources_of(one)] for one in vehicle.layout.thrusters} == {n: ["direction"] for n in "lrt"}
     assert [a.values for a in vehicle.alternatives.values()] == [{"a_t_rear": 100.3, "b_t_rear": -27.09}]
     assert vehicle.command_range == (0.2, 0.7)
+
+
+def test_a_turn_pushes_ahead_where_thrust_astern_is_weaker(vehicle: Vehicle) -> None:
+    def weaker(share: float) -> Vehicle:
+        return vehicle.extended({f"{key}_rear_reverse": share * vehicle[f"{key}_rear"] for key in ("a_t", "b_t")})
+
+    ((axis, push),) = weaker(0.5).side_effects(YAW, 0.5)
+    assert axis is SURGE
+    assert push == pytest.approx(0.25 * vehicle.force(SURGE, 0.5))
+    assert [*weaker(0.999).side_effects(YAW, 0.5), *vehicle.side_effects(SURGE, 0.5)] == []
+    assert vehicle.replaced({"beta_w": 0.0}).effective_inertia(vehicle.layout.kinds["heave"]) == inf
 
 
 def edit(pattern: str, replacement: str) -> Callable[[str], str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -43,6 +44,13 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
 def test_a_file_that_was_made_is_written_as_it_stands() -> None:
     refit = replace(load_vehicle(REFIT), measured_from="tank tests")
     assert vehicle_text(refit, REFIT.parent) == TEXT
+
+
+def test_ranges_and_alternatives_are_tables_with_headings(vehicle: Vehicle) -> None:
+    layout = replace(vehicle.layout, identified=(Range(EVERY_COMMAND, 0.0, 0.7), Range("u", -0.5, 1.0)))
+    text = vehicle_text(replace(vehicle, layout=layout), VIDEORAY.parent)
+    assert '\n\n[validity.identified]\nu = { range = [-0.5, 1.0], unit = "m/s" }\n' in text
+    assert "\n\n[alternatives.unweighted_rear_thrust]\n" in text
 
 
 @pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY], ids=lambda path: path.stem)
