@@ -43,12 +43,14 @@ def identified(made_once: Made) -> Identified:
 
 TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
 FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("top", "rear")}
+KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
+"""A rov.toml of the VideoRay's mass, inertia and arm."""
 SHORT = ((0.0, 2.0), (0.3, 8.0), (0.0, 4.0), (-0.2, 6.0))
 
 
 def written(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Tests:
     """Write logs at 10 Hz by their axes, names and plans."""
-    path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
+    path, random = folder_of(folder, KNOWN, FORCES), np.random.default_rng(0)
     for axis, name, plan in logs:
         write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
     return load_tests(path)

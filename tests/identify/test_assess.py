@@ -64,11 +64,6 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "The other commands predict a V_ss of the tables with an error of 25% (RMS).",
         ),
         (
-            {"steady": [point(0.5)]},
-            "do not use",
-            "The other commands predict a V_ss of the tables with an error of 50% (RMS).",
-        ),
-        (
             {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)]},
             "do not use",
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",

@@ -20,15 +20,13 @@ from rov_fmu.identify.result import AxisResult, Identification
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
-from tests.folders import ARM, DOWN, FORCE, HEAD, MASS, SPEED, TURNS, folder_of, pulled, read, responses
-from tests.identify.conftest import Identified, add_voltage
+from tests.folders import DOWN, FORCE, HEAD, SPEED, folder_of, read, responses
+from tests.identify.conftest import FORCES, KNOWN, Identified, add_voltage
 from tests.recordings import PLANS, Measured, run, with_more, write_log
 from tests.vehicles import VIDEORAY
 
 TRUTH = VIDEORAY.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta_u": 0.8})
 """The true vehicle. Its forces are those of a scale in a tank, so that every α is 1."""
-KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
-FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("rear", "top")}
 COMMANDS = (0.3, -0.3, 0.5, -0.5)
 STILL = "time [s],command [%],depth [m]\n" + "".join(f"{n / 10},{30 * (n > 9)},1.5\n" for n in range(50))
 
@@ -175,34 +173,6 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
                 covered.setdefault(f"{name} {answer.command}", []).append(low <= true <= high)
     assert len(covered) == 3 + 2 * 6
     assert min(map(sum, covered.values())) >= binom.ppf(0.001, 20, 0.95), {k: sum(v) for k, v in covered.items()}
-
-
-@pytest.mark.long
-def test_intervals_of_a_measured_curve_with_a_dead_band_cover_the_truth(tmp_path: Path) -> None:
-    """Forces scatter by 0.1 N and velocities by 1 %; of 8 vehicles, fewer than the limit miss once in 1,000 cases."""
-    names = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
-    random, true = np.random.default_rng(0), (40.0, 6.0, 28.0, 4.2, 0.06)
-    covered: dict[str, list[bool]] = {}
-
-    def force(c: float) -> float:
-        (a, b), beyond = true[:2] if c > 0.0 else true[2:4], max(abs(c) - true[4], 0.0)
-        return float(np.sign(c)) * (a * beyond + b) * beyond
-
-    for n in range(8):
-        forces, speeds = f"{FORCE}\n", f"{SPEED}\n"
-        for c in (sign * size for size in (0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0) for sign in (1.0, -1.0)):
-            forces += "".join(f"{c},{force(c) + 0.1 * random.standard_normal():.4f}\n" for _ in range(2))
-            V = np.sign(c) * (np.sqrt(36.0 + 180.0 * abs(force(c))) - 6.0) / 90.0  # 45 V² + 6 V = F
-            speeds += f"{c},{V * (1.0 + 0.01 * random.standard_normal()):.5f}\n"
-        found = identify(read(tmp_path / str(n), DOWN, {"thrust_t200.csv": forces, "steady_heave.csv": speeds})).vehicle
-        for name, value in zip(names, true, strict=True):
-            low, high = found.intervals[name]
-            covered.setdefault(name, []).append(low <= value <= high)
-        for c in (0.3, 0.5, 1.0, -0.3, -0.5, -1.0):
-            assert found.curve_force(found.layout.curves[0], c) == pytest.approx(force(c), rel=0.03), (n, c)
-        low, high = found.intervals["c_0_t200"]
-        assert high - low < 0.06, "an interval is not just wide"
-    assert min(map(sum, covered.values())) >= binom.ppf(0.001, 8, 0.95), covered
 
 
 @pytest.mark.long

@@ -18,8 +18,8 @@ from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.vehicle import VehicleFileError
-from tests.folders import ARM, HEAD, MASS, TURNS, folder_of
-from tests.identify.conftest import FORCES
+from tests.folders import HEAD, folder_of
+from tests.identify.conftest import FORCES, KNOWN
 from tests.identify.scenarios.catalogue import COMPLETE
 from tests.recordings import PLANS, Measured, run
 from tests.vehicles import VIDEORAY
@@ -127,7 +127,7 @@ QUESTIONS = {
 
 
 def asked(folder: Path, *logs: Measured, rov: str) -> dict[tuple[str, str], str]:
-    """Return what is asked about the first 30 s of some logs, by file and quantity. Without a base, forces are known."""
+    """Return what is asked about the first 30 s of some logs, by file and quantity. Forces replace a base."""
     some = [replace(r, **{key: getattr(r, key)[:150] for key in ("time", "command", "values")}) for r in logs]
     tests = load_tests(folder_of(write_folder(folder, some), rov, FORCES if "base" not in rov else {}))
     known, recorded, rows = begin(tests)
@@ -140,11 +140,11 @@ def asked(folder: Path, *logs: Measured, rov: str) -> dict[tuple[str, str], str]
 @pytest.mark.parametrize("kind", QUESTIONS)
 def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
     """Nothing tells the drag but the log and the mass. Nothing is asked of the log without the slip."""
-    slip, rov = SLIPS[kind], f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
+    slip = SLIPS[kind]
     (log, *_), sensor = recordings(slip.axis), SENSOR[slip.axis.name]
     quantity = "surge distance" if slip.axis is SURGE else sensor
-    assert asked(tmp_path, slipped(log, slip), rov=rov) == {(log.file, quantity): QUESTIONS[kind]}
-    assert not asked(tmp_path, log, rov=rov)
+    assert asked(tmp_path, slipped(log, slip), rov=KNOWN) == {(log.file, quantity): QUESTIONS[kind]}
+    assert not asked(tmp_path, log, rov=KNOWN)
 
 
 def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:

@@ -88,6 +88,37 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         + "\n".join(f"thruster.{n}.curve … there is no such curve, only '', {'x' * 193}..." for n in "12345lr"),
     ),
     "a curve of no thruster": ({"curves.spare": _CURVE}, "curves.spare: no thruster has this curve"),
+    **{
+        f"identifier {name}, which Windows reserves": (
+            {"vehicle.identifier": name},
+            f"vehicle.identifier = '{name}': must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0",
+        )
+        for name in ("CON", "Prn", "com1")
+    },
+    # forms of keys and values
+    "an unknown coefficient": (
+        {"arm.mass": quantity(6.57, "kg")},
+        "arm.mass: there is no such key, only R, gamma",
+    ),
+    "a number without unit and source": (
+        {"arm.R": 0.22},
+        'arm.R = 0.22: must be { value = ..., unit = "m", source = ... }',
+    ),
+    "an angle in degrees": ({"arm.gamma.value": 24.2}, "arm.gamma.value = 24.2 … 1.57"),
+    "a wrong unit": ({"body.m_rov.unit": "lb"}, "body.m_rov.unit = 'lb' … 'kg'"),
+    "an interval without ends": ({"body.m_rov.interval": []}, "body.m_rov.interval = []: must have 2 entries"),
+    "a missing folder": ({"vehicle.data": "nowhere"}, "vehicle.data = 'nowhere' … no such folder"),
+    "a number in a list of texts": (
+        {"validity.limits": [3, "It does not roll."]},
+        "validity.limits = [3,  … entry 1 must be text in quotes",
+    ),
+    "no format": ({"format": GONE}, "format: this key is missing: write format = 2"),
+    "another format": ({"format": 3}, "format = 3 … must be 2"),
+    "a command below 0": ({"validity.command_min": -0.1}, "validity.command_min = -0.1 … or equal to 0"),
+    "no range of commands": (
+        {"validity.command_max": 0.1},
+        "validity.command_min = 0.1: must be less than command_max = 0.1",
+    ),
     # keys that need others, or have no use
     "a dead band in reverse only": ({"curves.frame.c_0": GONE}, "curves.frame.c_0 … missing … c_0_reverse"),
     "no mass": ({"body.m_rov": GONE}, "body.m_rov … missing … surge"),
