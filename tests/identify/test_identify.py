@@ -351,64 +351,6 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
 
 
-def renamed(vehicle: Vehicle, curves: Mapping[str, str], thrusters: Mapping[str, str]) -> Vehicle:
-    """Return the vehicle with other names of some curves and thrusters."""
-    layout = replace(
-        vehicle.layout,
-        curves=tuple(replace(curve, name=curves.get(curve.name, curve.name)) for curve in vehicle.layout.curves),
-        thrusters=tuple(
-            t.model_copy(update={"name": thrusters.get(t.name, t.name), "curve": curves.get(t.curve, t.curve)})
-            for t in vehicle.layout.thrusters
-        ),
-    )
-    new = dict(zip(vehicle.layout.coefficients, layout.coefficients, strict=True))
-    values = {new[name]: value for name, value in vehicle.coefficients.items()}
-    sources = {new[name]: source for name, source in vehicle.sources.items()}
-    return replace(vehicle, layout=layout, coefficients=values, sources=sources)
-
-
-@pytest.mark.long
-def test_names_of_curves_and_thrusters_are_free(tmp_path: Path) -> None:
-    """Where curves are named main and main_reverse, and a thruster 0_w, the names of coefficients collide.
-
-    They do so only beside effects that come and go during the identification. The vehicle to compare with has its
-    curves in the other order, so that other coefficients get a number there.
-    """
-    effects = {"a_t_{}_reverse": 5.0, "b_t_{}_reverse": 0.1, "c_0_{}": 0.04, "c_0_{}_reverse": 0.05, "T_{}": 0.1}
-    more = {key.format(curve): value for curve in ("rear", "top") for key, value in effects.items()}
-    full = TRUTH.extended(more | {"F_0_w": -0.1})
-    full = replace(full, sources=dict.fromkeys(full.coefficients, "-"), data=None, pictures=None, alternatives={})
-    turned = replace(full.layout, axes=full.layout.axes[:2], curves=full.layout.curves[::-1])
-    turned = turned.with_keys(lambda part, key: key in part.keys and key != "c_0_reverse")  # no fit has it
-    given = 'T_{} = {{ value = 0.12, unit = "s", source = "seen" }}\n'
-    found = []
-    for rear, top, t in (("rear", "top", "t"), ("main", "main_reverse", "0_w")):
-        rov = f'base = "base.toml"\nagainst = "against.toml"\n{HEAD}[fit]\nlag = ["{top}"]\n'
-        for axis in (SURGE, HEAVE):
-            forces = {f"thrust_{top}.csv": FORCES["thrust_top.csv"]}
-            folder = with_logs(tmp_path / rear, axis, 1, f"{rov}[known]\n{given.format(rear)}", forces)
-        for name, vehicle in (("base", full), ("against", full.in_layout(turned))):
-            names = {"rear": rear, "top": top}
-            write_vehicle(renamed(vehicle, names, {"t": t}), folder / f"{name}.toml")
-        found.append(identify(load_tests(folder)))
-    plain, other = found
-    check_file(other, tmp_path / "made.toml")
-    expected = renamed(plain.vehicle, {"rear": "main", "top": "main_reverse"}, {"t": "0_w"})
-    assert other.vehicle.layout == expected.layout
-    assert other.vehicle.coefficients == expected.coefficients
-    assert {*other.vehicle.coefficients} >= {"a_t_main_reverse", "a_t_main_reverse_2"}
-    assert [*other.vehicle.intervals.values()] == [*plain.vehicle.intervals.values()]
-    assert other.vehicle.sources == expected.sources
-    for one, two in zip(other.axes, plain.axes, strict=True):
-        assert [known.value for known in one.known] == [known.value for known in two.known]
-        assert (one.answers, one.compared) == (two.answers, two.compared)
-        for p, q in zip(one.predictions, two.predictions, strict=True):
-            assert np.array_equal(p.predicted, q.predicted)
-            assert p.compared is not None
-            assert q.compared is not None
-            assert np.array_equal(p.compared, q.compared)
-
-
 # ---- Tests that cannot be used ---------------------------------------------------------------------------------------
 
 
