@@ -312,7 +312,10 @@ def with_gaps(log: Measured, random: np.random.Generator) -> Measured:
 def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_path: Path) -> None:
     path, random = folder_of(tmp_path / "tests", KNOWN, FORCES), np.random.default_rng(3)
     write_log(path, "0", change(run(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
-    (heave,) = identify(load_tests(path)).axes
+    shares: list[float] = []
+    (heave,) = identify(load_tests(path), lambda _, share: shares.append(share)).axes
+    assert shares == sorted(shares), "progress"
+    assert (shares[0], 0.85 <= shares[-1] <= 1.0) == (0.0, True)
     check_answers(heave, near)
     by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
     assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.cli import main
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
-from tests.commands import REFIT, TESTS
+from tests.commands import REFIT
 from tests.vehicles import EVERYTHING, SIX_AXES
 
 TEXT = REFIT.read_text(encoding="utf-8")
@@ -76,14 +75,3 @@ def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path
     assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
-
-
-@pytest.mark.parametrize("name", ["nowhere/out.toml", "."])
-def test_nowhere_to_write(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["identify", str(TESTS), "-o", str(tmp_path / name)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert str(tmp_path) in err
-    assert "folder" in err
-    assert not any(tmp_path.iterdir())
