@@ -36,15 +36,18 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     """A number is determined where its error is at most 0.8 times that of its prior, which is 0.5 for the inertia."""
     clear = found(fit, dead_band_astern=0.0)
     inertia = {"heave": 0.79 * 0.5, "yaw": 0.81 * 0.5}
-    of = [inertia.get(p.of, 0.0) * (p.kind == "inertia") for p in fit.posterior.table.parameters]
+    table = fit.posterior.table
+    of = [inertia.get(p.of, 0.0) * (p.kind == "inertia") for p in table.parameters]
     covariance = clear.averaged.covariance + np.diag(np.square(of))
+    pair = [n for n, p in enumerate(table.parameters) if p.of == "yaw" and p.kind in ("inertia", "quadratic drag")]
+    covariance[pair, pair[::-1]] = 0.6 * np.sqrt(np.prod(np.diag(covariance)[pair]))
     clear = replace(clear, averaged=replace(clear.averaged, covariance=covariance))
     vehicle, numbers = identified_vehicle(short, clear)
     assert [numbers[f"beta_{v}"].narrowed for v in "wr"] == pytest.approx([0.79, 0.81], abs=1e-3)
     assert ("beta_w" in vehicle.intervals, "beta_r" in vehicle.intervals) == (True, False)
     assert vehicle.sources["beta_r"] == "Assumed: the tests do not determine it"
     z, full = clear.kept.z, fit.known.full["heave"]
-    drag = fit.posterior.table.coefficients(z.tolist())["a_d_w"]
+    drag = table.coefficients(z.tolist())["a_d_w"]
     expected = {
         "c_0_top": (0.05, 0.04, 0.06),
         "T_top": (0.2, 0.2 - HALF, 0.2 + HALF),
@@ -58,6 +61,10 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
         assert vehicle.sources[name] == "Identified from the tests, as the method says"
     assert vehicle.estimates["a_d_w_reverse"].correlation["a_d_w"] == pytest.approx(0.5**0.5, abs=1e-3)
     assert vehicle.estimates["F_0_w"].error * 1.96 == pytest.approx(HALF * full, rel=1e-3)
+    low, high = vehicle.intervals["a_d_r"]
+    assert np.log(high / low) == pytest.approx(2.0 * HALF)
+    given_inertia = vehicle.estimates["a_d_r"].error * 1.96 / vehicle["a_d_r"]
+    assert given_inertia == pytest.approx(0.8 * HALF, rel=1e-3), "beta_r, with which it is correlated, has no error"
     assert [numbers[name].began for name in ("T_top", "c_0_top")] == ["0.05 ± 0.15 s", "0 ± 0.05"]
     assert numbers["T_top"].narrowed == pytest.approx(ERROR / 0.15)
     assert (vehicle.command_range, vehicle.measured_from) == ((0.2, 0.8), "tank tests")
