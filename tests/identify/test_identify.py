@@ -93,7 +93,7 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
     left_out = {("axis left out", "surge"), ("axis left out", "yaw"), ("unused curve", "rear")}
     assert kinds(of_tables) == {("nothing predicted", "heave"), *left_out}
     used = [p for p in (*heave.points, *of_tables.forces) if p.counts]
-    assert {p.quantity for p in used} == {"V_ss", "Tau", "force"}
+    assert {(p.quantity, p.unit) for p in used} == {("V_ss", "m/s"), ("Tau", "s"), ("force", "N")}
     for p in used:
         assert p.model == pytest.approx(p.measured, rel=1e-3)
         assert p.held_out == pytest.approx(p.measured, rel=0.01)

@@ -136,8 +136,12 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     assert (written.layout, written.coefficients) == (vehicle.layout, dict(vehicle.coefficients))
     assert written.sources == vehicle.sources
     assert carried(written) == carried(load_vehicle(here))
-    files = [[table.path.name for table in curve.tables if table.path] for curve in written.layout.curves]
-    assert files == [["thrust_12_v.csv", "thrust_16_v.csv"], ["thrust_16_v.csv"], []]
+    main, bow, lift = (
+        [(table.name, table.voltage, table.path and table.path.name) for table in curve.tables]
+        for curve in written.layout.curves
+    )
+    assert main == [("1_main", 12.0, "thrust_12_v.csv"), ("2_main", 16.0, "thrust_16_v.csv")]
+    assert (bow, lift) == ([("0_bow", 0.0, "thrust_16_v.csv")], [])
     assert [sources_of(fin).keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(
         written.layout.fins
     )
