@@ -70,6 +70,9 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     assert (vehicle.command_range, vehicle.measured_from) == ((0.2, 0.8), "tank tests")
     keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "T"]
     assert [[*curve.keys] for curve in vehicle.layout.curves] == [[key for key in CURVE if key in keys]] * 2
+
+
+def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: beginning.Tests) -> None:
     bare = dict.fromkeys(("dead_time", "dead_band", "drag_astern", "load"), 0.0)
     plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, lag=0.02, **bare))
     assert [[*curve.keys] for curve in plain.layout.curves] == [["a_t", "b_t", "a_t_reverse", "b_t_reverse"]] * 2

@@ -146,20 +146,6 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
     assert not said or LOG in said
 
 
-@often("examples", 10, 40, 1000)
-def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
-    points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
-    content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
-
-    def check(data: st.DataObject) -> None:
-        change = data.draw(st.sampled_from([changed_cells, changed_course, changed_lines, changed_bytes]))
-        points.write_bytes(change(content, data))
-        options = ["tune", str(VIDEORAY), "--axis", "heave", "--points", str(points), "-o"]
-        assert len(output_or_one_line(options, tuned, points, capsys).splitlines()) <= 11
-
-    fuzz(check, examples)
-
-
 HARDLY = ("20,-0.001;50,0.01;70,3", "20,1;50,1;70,0.5;100,-0.02", "20,0;50,0;-50,-1.6", "20,0;50,1e-200")
 
 
