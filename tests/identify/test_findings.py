@@ -18,6 +18,7 @@ from rov_fmu.identify.findings import (
     repairs,
     sentences,
     told,
+    with_error,
 )
 from rov_fmu.identify.result import (
     Coefficient,
@@ -366,3 +367,20 @@ def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     result = without_findings()
     late = told(replace(result, folder=replace(result.folder, findings=[lost])))
     assert [finding.kind for finding in late.findings].index("missing column") == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "unit", "words"),
+    [
+        (0.62, 0.5, 0.64, "m/s", "0.62 m/s ±19%"),
+        (0.5, 0.001, 0.7, "rad/s", "29 deg/s ±100%"),
+        (0.5, 0.0, 0.7, "rad", "29 deg ±>100%"),
+        (-0.5, -0.6, -0.4, "1", "-0.50 ±20%"),
+        (0.0, 0.0, 0.0, "m", "-"),
+        (np.inf, 0.0, np.inf, "m", "-"),
+    ],
+)
+def test_an_error_is_the_larger_half_of_the_interval(
+    value: float, low: float, high: float, unit: str, words: str
+) -> None:
+    assert with_error((value, (low, high)), unit) == words
