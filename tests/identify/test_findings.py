@@ -245,6 +245,18 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
     )
 
 
+def test_the_main_prediction_is_that_of_a_position_over_10_s_with_the_largest_error_beside_its_noise() -> None:
+    one = prediction(SURGE, "distance", span=10.0, error=0.05)
+    noisy, whole = replace(one, error=0.08, noise=0.02), prediction(SURGE, "distance", error=2.0)
+    velocity = prediction(SURGE, "surge velocity", error=0.9)
+    (axis,) = surge(predictions=(velocity, replace(one, error=0.04), whole, one, noisy)).axes
+    assert axis.main is one
+    short = replace(one, time=TIME[:60], coverage=0.5)
+    (axis,) = surge(predictions=(whole, short, one)).axes
+    assert axis.coverage == pytest.approx((0.5 * 60 + 0.95 * 600) / 660)
+    assert quiet().seconds == pytest.approx(2 * 60.0, rel=0.01)
+
+
 def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
     """They are those of commands, of the measured V_ss and of the depths, of which 0.5 % at each end do not count."""
     values = np.where(TIME > 59.8, 99.0, np.where(TIME < 0.1, 0.0, 1.0 + TIME / 6.0))

@@ -60,6 +60,13 @@ def test_no_command_is_above_the_strongest(fit: Fit) -> None:
     assert proposed(fit, command_max=0.1) is None
 
 
+def test_a_command_is_held_for_2_s_or_not_at_all(fit: Fit) -> None:
+    test = proposed(fit, duration=6.0)
+    assert test
+    assert plan(test)[0][1] == 2.0
+    assert proposed(fit, duration=5.9) is None
+
+
 def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path: Path) -> None:
     """A log of the proposed test joins the others, and the interval becomes as narrow as was said."""
     test = proposed(fit)
