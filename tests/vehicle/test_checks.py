@@ -297,16 +297,10 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], str]] = {
         "axes.heave.beta.value = 0.0: must be at least 0.001 where axes are coupled",
     ),
     # Fossen's notation
-    **{
-        f"{key} for {wanted}": (
-            {f"axes.surge.{key}": quantity(-6.36, "kg")},
-            f"axes.surge.{key}: there is no such key; give {wanted}",
-        )
-        for key, wanted in {
-            "X_uu": "-X_u|u|, which is positive, as a_d of [axes.surge]",
-            "N_v|v|": "its negative as a_d_rv in [cross]",
-        }.items()
-    },
+    "a drag by its derivative": (
+        {"axes.surge.X_uu": quantity(-6.36, "kg")},
+        "axes.surge.X_uu: there is no such key; give -X_u|u|, which is positive, as a_d of [axes.surge]",
+    ),
     "entries that are too large together": (
         {"cross.m_a_uq.value": 1.7, "cross.m_a_ur": quantity(1.7, "kg.m"), "cross.m_a_qr": quantity(-0.3, "kg.m2")},
         "cross: the mass matrix of … must be positive definite: reduce m_a_uq, m_a_pr, m_a_ur, m_a_qr",
