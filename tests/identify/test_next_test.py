@@ -54,9 +54,11 @@ def test_the_vehicle_stays_in_the_tank(fit: Fit) -> None:
 
 
 def test_no_command_is_above_the_strongest(fit: Fit) -> None:
-    test = proposed(fit, command_max=0.25)
+    test, best = proposed(fit, command_max=0.25), proposed(fit)
     assert test
+    assert best
     assert max(abs(command) for command, _ in plan(test)) <= 0.25
+    assert best.then < test.then, "the best one is proposed"
     assert proposed(fit, command_max=0.1) is None
 
 
