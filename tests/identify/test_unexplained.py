@@ -98,7 +98,8 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> No
         filter_of.gain: 1.1 * since,
         filter_of.drift: 0.7 + 0.0 * TIME,
     }
-    moving = {filter_of.drift + 1: 1.2 * since, 0: 0.8 + 0.0 * TIME}
+    speeds = {0: 0.8 + 0.0 * TIME, 1: 0.3 + 0.0 * TIME, 2: 2.0 + 0.0 * TIME}  # of surge, heave and yaw
+    moving = {filter_of.drift + 1: 1.2 * since, **speeds}
     run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
     posterior = Posterior(objective.table, z, np.diag(0.3 * objective.deviation) ** 2)
     best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)))
