@@ -1,5 +1,6 @@
 """The parameters: their priors, and how they enter the model."""
 
+from dataclasses import replace
 from functools import partial
 from math import exp
 
@@ -8,6 +9,7 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, table_of
 from rov_fmu.identify.likelihood.records import SampledLog
 from tests.folders import HEAD, folder_of, pulled
@@ -133,3 +135,10 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
     assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "north")]
+
+
+def test_a_linear_drag_of_0_has_a_prior_next_to_0(fit: Fit) -> None:
+    known = replace(fit.known, coefficients={**fit.known.coefficients, "b_d_w": 0.0})
+    table = table_of(known, fit.objective.logs, [])
+    (drag,) = (p for p in table.parameters if (p.kind, p.of) == ("linear drag", "heave"))
+    assert exp(drag.mean) == pytest.approx(1e-9)
