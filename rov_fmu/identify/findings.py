@@ -531,19 +531,14 @@ _REMEDIES = {
 def _disturbance(d: Disturbance) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
     axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    of = "torque" if d.axis and d.axis.is_rotation else "thrust"
-    size = size_in_words(d.size, d.unit)
-    if d.kind == "gain":
-        kind, what = "change of thrust", f"the thrust changes slowly by {d.size:.0%} (RMS)"
-    elif d.kind == "velocity":
-        kind, what = (
-            "velocity over ground",
-            f"{axis or 'surge and sway'}: {unknown} slow velocity over ground of {size} (RMS) acts",
-        )
-    else:
-        push = "torque" if d.axis and d.axis.is_rotation else "force"
-        kind = "unknown force"
-        what = f"{axis}: {unknown} slow {push} of {size} (RMS), {d.share:.0%} of the {of}, acts"
+    size, share = size_in_words(d.size, d.unit), f"{d.share:.0%}"
+    push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
+    where = axis or "surge and sway"
+    kind, what = {
+        "gain": ("change of thrust", f"the thrust changes slowly by {d.size:.0%} (RMS)"),
+        "velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
+        "force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
+    }[d.kind]
     if d.cause:
         kind = "explained disturbance"
     elif d.share < MOST_UNKNOWN:

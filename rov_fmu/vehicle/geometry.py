@@ -253,8 +253,7 @@ def _doubts_of_weight(k: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the weight does not fit the mass, and one if the buoyancy turns the vehicle upside down."""
     if "W" not in k:
         return
-    mass = k.get("m_rov", 0.0)
-    if mass and abs(k["W"] / (_GRAVITY * mass) - 1.0) > _TOLERANCE:
+    if (mass := k.get("m_rov")) and abs(k["W"] / (_GRAVITY * mass) - 1.0) > _TOLERANCE:
         weighs = f"m_rov = {mass:g} kg weighs {_GRAVITY * mass:.4g} N: one of the two is probably wrong"
         yield key_line("body.W.value", weighs, k["W"])
     z_G, z_B = (k.get(name, 0.0) for name in ("z_G", "z_B"))

@@ -98,6 +98,7 @@ def _why_no_curve(commands: Sequence[float], forces: Sequence[float]) -> str | N
     """Return the reason why the forces are not a thrust curve, or None."""
     if not forces[0] < 0.0 < forces[-1]:
         return "must give a force in reverse below 0 N, and one ahead above 0 N"
-    if forces[bisect_right(commands, 0.0) - 1] != 0.0 or forces[bisect_left(commands, 0.0)] != 0.0:
+    nearest = forces[bisect_right(commands, 0.0) - 1], forces[bisect_left(commands, 0.0)]
+    if any(nearest):
         return "must give 0 N at the command 0"
     return None

@@ -239,11 +239,10 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
 
 
 def _quantity(vehicle: Vehicle, name: str) -> dict[str, Any]:
-    """Return the table of a coefficient, with rounded numbers, and an interval that includes the rounded value."""
-    value, interval = _rounded(vehicle[name]), vehicle.intervals.get(name)
-    ends = (min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)) if interval else None
-    unit = vehicle.layout.coefficients[name].unit
-    return {"value": value, "unit": unit, "interval": ends, "source": vehicle.sources[name]}
+    """Return the table of a coefficient, with rounded numbers. Rounding keeps the value within its interval."""
+    interval, unit = vehicle.intervals.get(name, ()), vehicle.layout.coefficients[name].unit
+    ends = tuple(map(_rounded, interval))
+    return {"value": _rounded(vehicle[name]), "unit": unit, "interval": ends, "source": vehicle.sources[name]}
 
 
 def _estimated(row: Estimated) -> dict[str, Any]:

@@ -43,19 +43,33 @@ def identified(made_once: Made) -> Identified:
 
 TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
 FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("top", "rear")}
+KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
+"""A rov.toml of the VideoRay's mass, inertia and arm."""
 SHORT = ((0.0, 2.0), (0.3, 8.0), (0.0, 4.0), (-0.2, 6.0))
 
 
 def written(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Tests:
     """Write logs at 10 Hz by their axes, names and plans."""
-    path, random = folder_of(folder, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", FORCES), np.random.default_rng(0)
+    path, random = folder_of(folder, KNOWN, FORCES), np.random.default_rng(0)
     for axis, name, plan in logs:
         write_log(path, name, run(TRUTH, axis, plan, 10.0).noisy(random))
     return load_tests(path)
 
 
+def add_voltage(log: Path, fall: float = 0.03) -> None:
+    """Give a log a voltage that falls from 16 V by so much in each row."""
+    header, *rows = log.read_text(encoding="utf-8").splitlines()
+    volts = [f"{row},{16.0 - fall * n:.4f}" for n, row in enumerate(rows)]
+    log.write_text("\n".join([f"{header},voltage [V]", *volts, ""]), encoding="utf-8")
+
+
 @pytest.fixture(scope="session")
-def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
-    """Fit a short log of heave and one of yaw."""
-    folder = tmp_path_factory.mktemp("tests")
-    return fit_all(folder, *begin(written(folder, (HEAVE, "a", SHORT), (YAW, "a", SHORT))))
+def short(tmp_path_factory: pytest.TempPathFactory) -> Tests:
+    """Write a short log of heave and one of yaw."""
+    return written(tmp_path_factory.mktemp("tests"), (HEAVE, "a", SHORT), (YAW, "a", SHORT))
+
+
+@pytest.fixture(scope="session")
+def fit(short: Tests) -> Fit:
+    """Fit the short logs."""
+    return fit_all(short.folder.path, *begin(short))

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.identify.assess import answers, answers_of_file, verdict
+from rov_fmu.identify.assess import answers, answers_of_file, unseen_current, verdict
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.result import Disturbance, Point, Slip
@@ -64,11 +64,6 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "The other commands predict a V_ss of the tables with an error of 25% (RMS).",
         ),
         (
-            {"steady": [point(0.5)]},
-            "do not use",
-            "The other commands predict a V_ss of the tables with an error of 50% (RMS).",
-        ),
-        (
             {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)]},
             "do not use",
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
@@ -81,6 +76,29 @@ def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: st
     usual: dict[str, Any] = {"found": [DEPTH], "given": results.answers(1.0, 0.02), "slow": [], "difference": 0.0}
     judged = verdict(**(usual | changes))
     assert (judged.word, judged.reasons) == (word, tuple(filter(None, [COVERED, reason])))
+
+
+def test_the_limits_of_a_verdict() -> None:
+    """The coverage, half the width of the best interval of V_ss, and the error of a table of V_ss without its row."""
+    limits: list[tuple[str, Any, tuple[float, ...]]] = [
+        ("found", lambda x: [replace(DEPTH, coverage=x)], (0.8, 0.799, 0.6, 0.599)),
+        ("given", lambda x: results.answers(1.0, x), (0.149, 0.151, 0.299, 0.301)),
+        ("steady", lambda x: [point(x)], (0.199, 0.201, 0.399, 0.401)),
+    ]
+    usual: dict[str, Any] = {"found": [DEPTH], "given": results.answers(1.0, 0.02), "slow": [], "difference": 0.0}
+    for key, made, numbers in limits:
+        words = [verdict(**{**usual, key: made(x)}).word for x in numbers]
+        assert words == ["good", "usable", "usable", "do not use"], key
+
+
+def test_the_current_of_an_unseen_log_is_about_that_of_the_others() -> None:
+    """Its variance is at least that of 2 cm/s and at most that of the prior."""
+    currents = tuple(Parameter("current", file, deviation=0.1, log=n) for n, file in enumerate("abc"))
+    table = Table(VIDEORAY.layout, VIDEORAY.coefficients, {}, currents)
+    covariance = np.diag([9.0, 0.01**2, 0.02**2])
+    usual = 0.02**2 + (0.03**2 + 0.01**2 + 0.04**2 + 0.02**2) / 2.0
+    assert unseen_current(table, np.array([5.0, 0.03, -0.04]), covariance, "a") == pytest.approx(usual)
+    assert unseen_current(table, np.array([5.0, 0.3, -0.4]), covariance, "a") == pytest.approx(0.1**2)
 
 
 def test_a_verdict_without_predictions_rests_on_the_tables() -> None:

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.catalogue import CURVE, HEAVE
+from rov_fmu.identify import beginning
 from rov_fmu.identify.assess import ahead, cautious
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
+from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.posterior import Posterior
 
@@ -21,9 +23,60 @@ FOUND = {"lag": 0.2, "dead time": 0.1, "dead band": 0.05, "drag astern": log(1.3
 
 def found(fit: Fit, **others: float) -> Fit:
     """Return the fit with these effects and independent parameters."""
-    parameters, z = fit.posterior.table.parameters, {**FOUND, **others}
+    parameters, z = fit.posterior.table.parameters, {**FOUND, **{k.replace("_", " "): v for k, v in others.items()}}
     at = np.array([z.get(p.kind, old) for p, old in zip(parameters, fit.posterior.z, strict=True)])
-    return replace(fit, posterior=Posterior(fit.posterior.table, at, ERROR**2 * np.eye(len(at))))
+    posterior = Posterior(fit.posterior.table, at, ERROR**2 * np.eye(len(at)))
+    kept = posterior.without(posterior.absent)
+    return replace(fit, posterior=posterior, kept=kept, averaged=replace(posterior.averaged, z=kept.z))
+
+
+def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
+    fit: Fit, short: beginning.Tests
+) -> None:
+    """A number is determined where its error is at most 0.8 times that of its prior, which is 0.5 for the inertia."""
+    clear = found(fit, dead_band_astern=0.0)
+    inertia = {"heave": 0.79 * 0.5, "yaw": 0.81 * 0.5}
+    table = fit.posterior.table
+    of = [inertia.get(p.of, 0.0) * (p.kind == "inertia") for p in table.parameters]
+    covariance = clear.averaged.covariance + np.diag(np.square(of))
+    pair = [n for n, p in enumerate(table.parameters) if p.of == "yaw" and p.kind in ("inertia", "quadratic drag")]
+    covariance[pair, pair[::-1]] = 0.6 * np.sqrt(np.prod(np.diag(covariance)[pair]))
+    clear = replace(clear, averaged=replace(clear.averaged, covariance=covariance))
+    vehicle, numbers = identified_vehicle(short, clear)
+    assert [numbers[f"beta_{v}"].narrowed for v in "wr"] == pytest.approx([0.79, 0.81], abs=1e-3)
+    assert ("beta_w" in vehicle.intervals, "beta_r" in vehicle.intervals) == (True, False)
+    assert vehicle.sources["beta_r"] == "Assumed: the tests do not determine it"
+    z, full = clear.kept.z, fit.known.full["heave"]
+    drag = table.coefficients(z.tolist())["a_d_w"]
+    expected = {
+        "c_0_top": (0.05, 0.04, 0.06),
+        "T_top": (0.2, 0.2 - HALF, 0.2 + HALF),
+        "F_0_w": (0.03 * full, (0.03 - HALF) * full, (0.03 + HALF) * full),
+        "a_d_w": (drag, drag * np.exp(-HALF), drag * np.exp(HALF)),
+        "a_d_w_reverse": (1.3 * drag, 1.3 * drag * np.exp(-(2.0**0.5) * HALF), 1.3 * drag * np.exp(2.0**0.5 * HALF)),
+    }
+    for name, (value, *ends) in expected.items():
+        assert vehicle[name] == numbers[name].value == pytest.approx(value), name
+        assert vehicle.intervals[name] == numbers[name].interval == pytest.approx(ends), name
+        assert vehicle.sources[name] == "Identified from the tests, as the method says"
+    assert vehicle.estimates["a_d_w_reverse"].correlation["a_d_w"] == pytest.approx(0.5**0.5, abs=1e-3)
+    assert vehicle.estimates["F_0_w"].error * 1.96 == pytest.approx(HALF * full, rel=1e-3)
+    low, high = vehicle.intervals["a_d_r"]
+    assert np.log(high / low) == pytest.approx(2.0 * HALF)
+    given_inertia = vehicle.estimates["a_d_r"].error * 1.96 / vehicle["a_d_r"]
+    assert given_inertia == pytest.approx(0.8 * HALF, rel=1e-3), "beta_r, with which it is correlated, has no error"
+    assert [numbers[name].began for name in ("T_top", "c_0_top")] == ["0.05 ± 0.15 s", "0 ± 0.05"]
+    assert numbers["T_top"].narrowed == pytest.approx(ERROR / 0.15)
+    assert (vehicle.command_range, vehicle.measured_from) == ((0.2, 0.8), "tank tests")
+    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "T"]
+    assert [[*curve.keys] for curve in vehicle.layout.curves] == [[key for key in CURVE if key in keys]] * 2
+
+
+def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: beginning.Tests) -> None:
+    bare = dict.fromkeys(("dead_time", "dead_band", "drag_astern", "load"), 0.0)
+    plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, lag=0.02, **bare))
+    assert [[*curve.keys] for curve in plain.layout.curves] == [["a_t", "b_t", "a_t_reverse", "b_t_reverse"]] * 2
+    assert [form.keys for form in plain.layout.axes] == [("a_d", "b_d")] * 2
 
 
 def test_effects_are_told_in_their_units(fit: Fit) -> None:
@@ -48,8 +101,7 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
 def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(
     dead_time: float, offset: float, half: float, fit: Fit
 ) -> None:
-    numbers = {"logging offset": -0.05, "logging width": 0.6, "dead time": dead_time}
-    one, other = loggers_of(found(fit, **numbers))
+    one, other = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, dead_time=dead_time))
     assert (one.file, other.file) == ("log_heave_a.csv", "log_yaw_a.csv")
     assert (one.interval, one.offset, one.width) == pytest.approx((0.1, offset, 0.06))
     assert one.offset_interval == pytest.approx((offset - half, offset + half))

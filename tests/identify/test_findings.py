@@ -18,6 +18,7 @@ from rov_fmu.identify.findings import (
     repairs,
     sentences,
     told,
+    with_error,
 )
 from rov_fmu.identify.result import (
     Coefficient,
@@ -36,7 +37,9 @@ from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.report.results import FILES, TIME, axis_result, example, log, prediction, without_findings
+from tests.report.results import FILES, TIME, example, log, prediction, without_findings
+
+BLUEROV = load_vehicle(SHIPPED["bluerov2"])
 
 
 def quiet(**changes: Any) -> Identification:
@@ -67,8 +70,7 @@ def disturbance(kind: Any = "force", **changes: Any) -> Identification:
 
 def with_channels(*names: str) -> Identification:
     channels = tuple(Channel(QUANTITIES[name], Source(name), TIME, TIME) for name in names)
-    base = load_vehicle(SHIPPED["bluerov2"])
-    vehicle = replace(base, layout=replace(base.layout, coupled=False))
+    vehicle = replace(BLUEROV, layout=replace(BLUEROV.layout, coupled=False))
     one = replace(log("dive.csv"), channels=channels)
     return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)
 
@@ -94,6 +96,7 @@ def forces(*ratios: float) -> tuple[Point, ...]:
 
 BETA = Coefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
 DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
+DRIFTING = prediction(YAW, "heading", error=0.9)
 OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
 LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
 
@@ -108,6 +111,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         surge(known=(replace(BETA, value=1.2, interval=(1.0, 1.4)),)),
     ),
     (
+        "implausible inertia",
+        replace(surge(known=(replace(BETA, value=0.2, interval=(0.1, 0.29)),)), vehicle=BLUEROV),
+        "inertia were 5.0 times m_rov with the added one.",
+        replace(surge(known=(replace(BETA, value=0.2, interval=(0.1, 0.31)),)), vehicle=BLUEROV),
+    ),
+    (
         "thrust tables",
         quiet(forces=forces(2.0, 2.1, 2.2)),
         "the forces in thrust_top.csv are 2.1 times those that fit the logs. Check their unit",
@@ -120,8 +129,19 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         disturbance(evidence=5.0),
     ),
     ("change of thrust", disturbance("gain", since=None), "the thrust changes slowly by 12% (RMS) in log_3", quiet()),
-    ("velocity over ground", disturbance("velocity"), "surge: an unknown slow velocity over ground of 0.11 m/s", None),
-    ("explained disturbance", disturbance("gain", cause="the pitch"), "It follows the pitch", disturbance("gain")),
+    (
+        "velocity over ground",
+        disturbance("velocity", axis=None, since=0.9),
+        "surge and sway: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
+        None,
+    ),
+    (
+        "explained disturbance",
+        disturbance(cause="the distance", since=1.1),
+        "surge: a slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 1 s on. It follows the distance"
+        ", as when a tether pulls",
+        disturbance("gain"),
+    ),
     (
         "coupling left out",
         with_channels("heading", "surge velocity"),
@@ -151,9 +171,9 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     (
         "drift",
-        surge(predictions=(prediction(YAW, "heading", error=0.9),)),
+        surge(predictions=(DRIFTING,)),
         "surge: over all of log_2.csv, the predicted heading drifts away by 52 deg (RMS), and a prediction of no",
-        quiet(),
+        surge(predictions=(replace(DRIFTING, span=10.0), DRIFTING)),
     ),
     (
         "effect",
@@ -187,6 +207,23 @@ def test_each_kind_is_told_for_its_reason_alone(
     assert beside is None or not said(beside, kind)
 
 
+@pytest.mark.parametrize(
+    ("interval", "kind"),
+    [
+        ((-0.2, -0.149), "logging"),
+        ((-0.2, -0.151), "clock"),
+        ((0.049, 0.1), "logging"),
+        ((0.051, 0.1), "clock"),
+        ((-0.1, 0.0), ""),
+        ((0.0, 0.1), ""),
+    ],
+)
+def test_commands_that_act_up_to_one_row_early_are_usual(interval: tuple[float, float], kind: str) -> None:
+    """Half an interval of 0.1 s more is allowed at both ends."""
+    result = quiet(logging=(replace(LATE, offset_interval=interval),))
+    assert [one.kind for one in findings_of(result)] == [kind] * bool(kind)
+
+
 def test_every_own_kind_has_a_sentence_here() -> None:
     own = {*SENTENCES} - {*reading.SENTENCES}
     of_tuning = {kind for kind in own if kind.startswith("implausible tuned")}
@@ -206,6 +243,18 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
         "surge distance, 10 s ahead: off by 0.050 m (RMS) in log_2.csv, and a prediction of no change by 0.70 m; 95% "
         "of the samples are inside the 95% band"
     )
+
+
+def test_the_main_prediction_is_that_of_a_position_over_10_s_with_the_largest_error_beside_its_noise() -> None:
+    one = prediction(SURGE, "distance", span=10.0, error=0.05)
+    noisy, whole = replace(one, error=0.08, noise=0.02), prediction(SURGE, "distance", error=2.0)
+    velocity = prediction(SURGE, "surge velocity", error=0.9)
+    (axis,) = surge(predictions=(velocity, replace(one, error=0.04), whole, one, noisy)).axes
+    assert axis.main is one
+    short = replace(one, time=TIME[:60], coverage=0.5)
+    (axis,) = surge(predictions=(whole, short, one)).axes
+    assert axis.coverage == pytest.approx((0.5 * 60 + 0.95 * 600) / 660)
+    assert quiet().seconds == pytest.approx(2 * 60.0, rel=0.01)
 
 
 def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
@@ -230,8 +279,10 @@ def test_the_next_tests_begin_with_the_widest_interval() -> None:
     ]
     only = three(), replace(three(), slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),))
     fine, odd = (replace(one, axes=(replace(one.axes[0], next_test=tests[2]),)) for one in only)
-    widest = "no single test would make an interval a tenth narrower. The widest is that of yaw: V_ss at 50%, ±10%."
-    assert next_tests(fine) == [widest]
+    widest = "no single test would make an interval a tenth narrower. The widest is that of {}: V_ss at 50%, ±{}%."
+    useless = [replace(axis, next_test=replace(test, then=test.now)) for axis, test in zip(axes, tests, strict=True)]
+    assert next_tests(replace(example(), axes=tuple(useless))) == [widest.format("heave", 50)]
+    assert next_tests(fine) == [widest.format("yaw", 10)]
     assert next_tests(odd)[0].startswith("first repair what disagrees, and identify again")
     assert next_tests(three()) == []
 
@@ -242,6 +293,12 @@ def three(**changes: Any) -> Identification:
     (axis,) = surge(predictions=tuple(prediction(SURGE, "surge velocity", file) for file in files)).axes
     folder = replace(quiet().folder, logs=[*map(log, files)])
     return quiet(**{"axes": (replace(axis, next_test=None),), "folder": folder, **changes})
+
+
+def two() -> Identification:
+    """The same of the first two logs."""
+    (axis,) = three().axes
+    return three(axes=(replace(axis, predictions=axis.predictions[:2]),))
 
 
 def worse(result: Identification, *files: str) -> Identification:
@@ -265,6 +322,7 @@ def slow_forces(*sizes: float) -> dict[str, Any]:
 
 
 ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the other 2 logs. "
+SLIPS = [Slip(file, "surge velocity", "is it in cm", 20.0) for file in (*FILES, "log_3.csv")]
 
 
 @pytest.mark.parametrize(
@@ -276,9 +334,25 @@ ODD = "Repair log_3.csv or take it out of the folder: it disagrees with the othe
         ),
         (worse(three(), "log_2.csv", "log_3.csv"), []),
         (
-            worse(three(slips=(Slip("log_3.csv", "surge velocity", "is it in cm", 20.0),)), "log_3.csv"),
+            worse(three(slips=(SLIPS[2],)), "log_3.csv"),
             [f"{ODD}Check the surge velocity: is it in cm?"],
         ),
+        (
+            three(slips=tuple(SLIPS[:2])),
+            [
+                f"Repair {file} or take it out of the folder: it disagrees with the other log. "
+                "Check the surge velocity: is it in cm?"
+                for file in FILES
+            ],
+        ),
+        (
+            three(slips=tuple(SLIPS)),
+            [
+                f"Repair {slip.file} or take it out of the folder. Check the surge velocity: is it in cm?"
+                for slip in SLIPS
+            ],
+        ),
+        (worse(two(), "log_2.csv"), []),
         (
             three(**slow_forces(0.5, 0.4, 1.6)),
             [
@@ -296,14 +370,6 @@ def test_a_log_that_disagrees_with_the_others_is_repaired_before_anything_is_mea
     assert repairs(result) == [f"{sentence} Then identify again." for sentence in words]
 
 
-def test_a_prediction_that_is_worse_than_no_change_is_never_silent() -> None:
-    """Neither for an axis that is not to be used, nor over a whole log, where bands are not judged. Once is enough."""
-    soon, whole = (prediction(HEAVE, "depth", error=0.8, span=span) for span in (10.0, np.inf))
-    for worse, kinds in (([soon, whole], ["worse than no change"]), ([whole], ["drift"])):
-        result = quiet(axes=(axis_result(HEAVE, without_findings().axes[2].verdict, worse),))
-        assert [one.kind for one in findings_of(result) if one.kind in ("worse than no change", "drift")] == kinds
-
-
 def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     kinds = [finding.kind for finding in example().findings]
     headings = [*map(heading, example().findings)]
@@ -313,3 +379,20 @@ def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     result = without_findings()
     late = told(replace(result, folder=replace(result.folder, findings=[lost])))
     assert [finding.kind for finding in late.findings].index("missing column") == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "unit", "words"),
+    [
+        (0.62, 0.5, 0.64, "m/s", "0.62 m/s ±19%"),
+        (0.5, 0.001, 0.7, "rad/s", "29 deg/s ±100%"),
+        (0.5, 0.0, 0.7, "rad", "29 deg ±>100%"),
+        (-0.5, -0.6, -0.4, "1", "-0.50 ±20%"),
+        (0.0, 0.0, 0.0, "m", "-"),
+        (np.inf, 0.0, np.inf, "m", "-"),
+    ],
+)
+def test_an_error_is_the_larger_half_of_the_interval(
+    value: float, low: float, high: float, unit: str, words: str
+) -> None:
+    assert with_error((value, (low, high)), unit) == words

@@ -10,13 +10,11 @@ import pytest
 from hypothesis import strategies as st
 
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import AXES, HEAVE
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
-from tests import damage
 from tests.commands import TESTS, without_progress
 from tests.damage import changed_bytes, changed_cells, changed_course, changed_lines, changed_toml, fuzz
 from tests.often import often
@@ -146,60 +144,6 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
     np.savetxt(tests / LOG, np.column_stack(STRANGE[case]), "%r", ",", header=HEADER, comments="")
     said = output_or_one_line(["identify", str(tests), "--report"], tmp_path / "report.html", tests, capsys)
     assert not said or LOG in said
-
-
-@often("examples", 10, 40, 1000)
-def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
-    points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
-    content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
-
-    def check(data: st.DataObject) -> None:
-        change = data.draw(st.sampled_from([changed_cells, changed_course, changed_lines, changed_bytes]))
-        points.write_bytes(change(content, data))
-        options = ["tune", str(VIDEORAY), "--axis", "heave", "--points", str(points), "-o"]
-        assert len(output_or_one_line(options, tuned, points, capsys).splitlines()) <= 11
-
-    fuzz(check, examples)
-
-
-@often("examples", 20, 60, 2000)
-def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
-    tuned = tmp_path / "tuned.toml"
-    words = st.one_of(damage.NUMBERS.filter(lambda x: abs(x) < 10**400), damage.CELLS, st.floats(0.0, 10.0)).map(str)
-
-    def check(data: st.DataObject) -> None:
-        axis, vehicle = data.draw(st.sampled_from(sorted(AXES))), data.draw(st.sampled_from(sorted(SHIPPED)))
-        options = [
-            f"{name}={data.draw(words)}" for name in ("--command", "--v-ss", "--tau") if data.draw(st.integers(0, 5))
-        ]
-        output_or_one_line(["tune", vehicle, "--axis", axis, *options, "-o"], tuned, Path("rov-fmu"), capsys)
-
-    fuzz(check, examples)
-
-
-@often("examples", 10, 40, 1000)
-def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
-    original = VIDEORAY.parent / "tables"
-    vehicle = tmp_path / "videoray.toml"
-    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
-    names = sorted(path.name for path in original.glob("*.csv"))
-
-    def check(data: st.DataObject) -> None:
-        folder = Path(shutil.copytree(original, tmp_path / "tables", dirs_exist_ok=True))
-        name = data.draw(st.sampled_from(names))
-        change = data.draw(st.sampled_from([changed_cells, changed_lines, changed_bytes]))
-        (folder / name).write_bytes(change((original / name).read_bytes(), data))
-        code = main(["tables", str(vehicle)])
-        printed, said = capsys.readouterr()
-        if code == 0:
-            assert "nan" not in printed
-            assert load_tables(load_vehicle(vehicle))
-        else:
-            assert (code, printed) == (2, "")
-            check_line(said.removesuffix("\n"), folder)
-            assert name in said
-
-    fuzz(check, examples)
 
 
 HARDLY = ("20,-0.001;50,0.01;70,3", "20,1;50,1;70,0.5;100,-0.02", "20,0;50,0;-50,-1.6", "20,0;50,1e-200")

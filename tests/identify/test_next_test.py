@@ -45,16 +45,28 @@ def test_the_vehicle_stays_in_the_tank(fit: Fit) -> None:
     assert within
     covered = [float(np.ptp(run(TRUTH, HEAVE, [*plan(t), (0.0, 60.0)], 10.0).position)) for t in (free, within)]
     assert covered[1] <= 1.0 < covered[0]
+    brief = proposed(fit, duration=12.0)
+    assert brief
+    assert [plan(test)[0][1] for test in (free, brief)] == [8.0, 4.0], "a third of the duration, and at most 8 s"
     turn = proposed(fit, YAW, tank_length=0.1)
     assert turn
     assert (turn.axis, turn.then < turn.now) == (YAW, True), "a turn needs no length"
 
 
 def test_no_command_is_above_the_strongest(fit: Fit) -> None:
-    test = proposed(fit, command_max=0.25)
+    test, best = proposed(fit, command_max=0.25), proposed(fit)
     assert test
+    assert best
     assert max(abs(command) for command, _ in plan(test)) <= 0.25
+    assert best.then < test.then, "the best one is proposed"
     assert proposed(fit, command_max=0.1) is None
+
+
+def test_a_command_is_held_for_2_s_or_not_at_all(fit: Fit) -> None:
+    test = proposed(fit, duration=6.0)
+    assert test
+    assert plan(test)[0][1] == 2.0
+    assert proposed(fit, duration=5.9) is None
 
 
 def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path: Path) -> None:

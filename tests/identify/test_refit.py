@@ -82,12 +82,3 @@ def test_what_is_left_out_is_predicted_and_the_refit_is_better_than_the_scaled_m
         ours, paper = relative_error(some, "model"), by_paper(vehicle, some)
         asked = (axis, quantity) in (("surge", "V_ss"), ("heave", "V_ss"), ("yaw", "Tau"))
         assert ours < (0.9 if asked else 1.02) * paper, (axis, quantity)
-
-
-def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identification) -> None:
-    k = refit.vehicle
-    assert all(k[name] >= 0.0 for name in VIDEORAY.layout.coefficients if name.startswith(("a_d", "b_d")))
-    assert k["alpha_u"] == k["alpha_w"] == k["alpha_r"] == 1.0
-    assert "beta_u" not in refit.vehicle.intervals
-    (told,) = (f for f in refit.findings if f.kind == "not identified" and f.axis == "surge")
-    assert told.names["coefficients"] == "beta_u"

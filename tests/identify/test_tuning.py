@@ -16,7 +16,6 @@ from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tu
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.recordings import AXES
 from tests.vehicles import pulsed, thruster
 
 k = load_vehicle(VIDEORAY)
@@ -39,13 +38,6 @@ def test_the_printout_names_the_inputs_that_are_held(capsys: pytest.CaptureFixtu
     assert "A command of -40% of yaw: u_l = -0.4, u_r = 0.4\n" in said
     print_tuning(tune(pulsed(k, (1100.0, 1500.0, 1900.0)), YAW, points))
     assert "A command of 30% of yaw: u_l = 1620, u_r = 1380\n" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
-@pytest.mark.parametrize(("command", "V_ss", "Tau"), [(0.2, 0.1, 0.2), (0.7, 2.0, 20.0), (-0.4, -0.5, 3.0)])
-def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: float, Tau: float) -> None:
-    tuned = tuned_to(k, axis, command, V_ss, Tau)
-    assert tuned.response(axis, command) == pytest.approx((V_ss, Tau), rel=1e-12)
 
 
 def test_steady_velocities_alone_leave_beta() -> None:

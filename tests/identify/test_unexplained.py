@@ -96,9 +96,10 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> No
     slow = {
         filter_of.force: 2.0 * since,
         filter_of.gain: 1.1 * since,
-        filter_of.drift: 0.3 + 0.0 * TIME,
+        filter_of.drift: 0.7 + 0.0 * TIME,
     }
-    moving = {filter_of.drift + 1: 1.2 * since, 0: 0.8 + 0.0 * TIME}
+    speeds = {0: 0.8 + 0.0 * TIME, 1: 0.3 + 0.0 * TIME, 2: 2.0 + 0.0 * TIME}  # of surge, heave and yaw
+    moving = {filter_of.drift + 1: 1.2 * since, **speeds}
     run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
     posterior = Posterior(objective.table, z, np.diag(0.3 * objective.deviation) ** 2)
     best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)))
@@ -108,7 +109,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> No
     sizes = {
         ("force", SURGE): (2.0 * share**0.5, np.sqrt(np.mean(thrust**2)), "N"),
         ("gain", None): (np.expm1(1.1) * share**0.5, 1.0, "1"),
-        ("velocity", None): ((0.09 + 1.44 * share) ** 0.5, 0.8, "m/s"),
+        ("velocity", None): ((0.49 + 1.44 * share) ** 0.5, 0.8, "m/s"),
         ("velocity", HEAVE): (0.0, 0.05, "m/s"),
         ("force", YAW): (0.0, 0.05 * VIDEORAY.force(YAW, 1.0), "N.m"),
     }

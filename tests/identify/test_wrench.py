@@ -135,13 +135,7 @@ def of_symbols(folder: Path, d: Dive) -> None:
     write(folder / "dive.csv", "time,X_ext,Z_ext,N_ext,u,depth,r", d.time, d.X, d.Z, 0.1 * d.X, d.u, d.z, 0.1 * d.u)
 
 
-def of_columns(folder: Path, d: Dive) -> None:
-    write(folder / "dive.csv", HEADER, d.time, d.X, d.Z, d.u, d.z)
-
-
-@pytest.mark.parametrize(
-    ("write_log", "axes"), [(of_topics, "surge heave"), (of_symbols, "surge heave yaw"), (of_columns, "surge heave")]
-)
+@pytest.mark.parametrize(("write_log", "axes"), [(of_topics, "surge heave"), (of_symbols, "surge heave yaw")])
 def test_a_draft_of_a_wrench_needs_one_edit(write_log: Callable[[Path, Dive], None], axes: str, tmp_path: Path) -> None:
     """Forces and velocities may have their symbols alone, or be topics as text."""
     d = dive(1)

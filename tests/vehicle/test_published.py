@@ -14,7 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
 from tests.fmi import OK
 from tests.fmi2 import Fmu
@@ -144,6 +144,7 @@ def test_files_hold_the_printed_cells(tables: Mapping[str, ResponseTable]) -> No
         assert [cell.rounds_to_printed for cell in cells] == [band is ROUNDED for _, band in expected]
     measured = {axis: [row.scaled.V_ss.measured for row in table.rows] for axis, table in tables.items()}
     assert [*map(str, measured["yaw"])] == ["1.34", "1.51", "2.61", "4.06"]
+    assert str(tables["heave"].steady[Decimal(50)]) == "0.28", "downward, which comes last"
     assert measured["surge"] == [*tables["surge"].steady.values()], "its table of responses has no measured V_ss"
 
 
@@ -179,6 +180,12 @@ def tables_with(tmp_path: Path, name: str, change: Callable[[str], bytes]) -> tu
     vehicle_file, folder = tmp_path / VIDEORAY.name, tmp_path / DATA.name
     (folder / name).write_bytes(change((DATA / name).read_text(encoding="utf-8")))
     return vehicle_file, folder / name
+
+
+def test_full_command_and_no_motion_are_allowed(tmp_path: Path) -> None:
+    vehicle_file, _ = tables_with(tmp_path, SURGE_STEADY, lambda text: text.replace("20,0.31", "100,0").encode())
+    (*_, surge) = load_tables(load_vehicle(vehicle_file))
+    assert surge.steady[Decimal(100)] == 0
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)

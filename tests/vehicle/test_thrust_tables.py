@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE
@@ -58,6 +59,16 @@ def test_thrust_goes_on_with_its_slope_to_full_command(tmp_path: Path) -> None:
     assert found.forces == pytest.approx((-200.0, -190.0, -100.0, 0.0, 60.0, 114.0, 120.0), rel=1e-14)
 
 
+def test_the_limits_of_a_table_are_allowed(tmp_path: Path) -> None:
+    commands = np.linspace(-1.0, 1.0, 2000)
+    rows = "\n".join(f"{c:.6f},{1e6 * c * (abs(c) > 0.1):.1f}" for c in commands)
+    assert read_thrust(table(tmp_path, f"command [1],thrust [N]\n{rows}\n")).forces[0] == -1e6
+    for line, limit in (("-1,-1000000.5", "-1e+06"), ("1,1000000.5", "1e+06")):
+        with pytest.raises(DataFileError, match=re.escape(limit)):
+            read_thrust(table(tmp_path, f"command [1],thrust [N]\n-1,-1\n0,0\n1,1\n{line}\n"))
+    assert read_current(table(tmp_path, "command [1],current [A]\n-1,10000\n0,0\n1,1\n")).current(-1.0) == 1e4
+
+
 def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_them(tmp_path: Path) -> None:
     found = read_current(table(tmp_path, "pulse [us],current [A]\n1104,24.3\n1500,0\n1896,23\n1896,25\n"))
     commands = (-1.0, -0.99, -0.5, 0.0, 0.25, 0.99, 1.0)
@@ -75,6 +86,7 @@ def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_t
             "must have the sign of its command",
         ),
         "no zero": ("command [1],thrust [N]\n-1,-1\n-0.1,-0.1\n0.1,0\n1,1\n", "must give 0 N at the command 0"),
+        "a force at no command": ("command [1],thrust [N]\n-1,-1\n0,0.1\n1,1\n", "must give 0 N at the command 0"),
         "no force in reverse": ("command [1],thrust [N]\n-1,0\n0,0\n1,1\n", "must give a force in reverse below 0 N"),
         "no force ahead": ("command [1],thrust [N]\n-1,-1\n0,0\n1,0\n", "and one ahead above 0 N"),
         "a pulse beyond full thrust": (
@@ -100,7 +112,8 @@ def test_a_table_that_is_no_thrust_curve_is_refused(text: str, wanted: str, tmp_
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("command [1],current [A]\n-1,5\n0,0\n1,-1\n", "must be at least 0"),
+        ("command [1],current [A]\n-1,5\n0,0\n1,-0.5\n", "must be at least 0"),
+        ("command [1],current [A]\n-1,5\n0,0\n1,10000.5\n", "must be at most 10000"),
         ("command [1],current [A]\n0,0\n0.5,1\n1,2\n", "must cover the commands from -1 to 1"),
         ("command [1],thrust [N]\n-1,-5\n0,0\n1,1\n", "there is no such column, but command [1], current [A]"),
     ],
@@ -123,8 +136,12 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     assert (written.layout, written.coefficients) == (vehicle.layout, dict(vehicle.coefficients))
     assert written.sources == vehicle.sources
     assert carried(written) == carried(load_vehicle(here))
-    files = [[table.path.name for table in curve.tables if table.path] for curve in written.layout.curves]
-    assert files == [["thrust_12_v.csv", "thrust_16_v.csv"], ["thrust_16_v.csv"], []]
+    main, bow, lift = (
+        [(table.name, table.voltage, table.path and table.path.name) for table in curve.tables]
+        for curve in written.layout.curves
+    )
+    assert main == [("1_main", 12.0, "thrust_12_v.csv"), ("2_main", 16.0, "thrust_16_v.csv")]
+    assert (bow, lift) == ([("0_bow", 0.0, "thrust_16_v.csv")], [])
     assert [sources_of(fin).keys() for fin in written.layout.fins] == [{"direction", "position"}] * len(
         written.layout.fins
     )
@@ -163,8 +180,12 @@ def test_a_file_with_pulse_widths_is_read_and_written(folder: Path) -> None:
 
 def test_a_voltage_far_above_that_of_the_curves_gives_a_warning(folder: Path) -> None:
     path = folder / "rov.toml"
-    higher = {"curves.main.tables": GONE, "curves.main.table": _FILES[0], "battery.voltage": quantity(24.5, "V")}
-    path.write_text(changed(higher, TEXT), encoding="utf-8")
+    higher = {"curves.main.tables": GONE, "curves.main.table": _FILES[0], "curves.lift.V_0": quantity(16.5, "V")}
+    for voltage in (24.0, 24.5):
+        text = changed({**higher, "battery.voltage": quantity(voltage, "V")}, TEXT)
+        path.write_text(text, encoding="utf-8")
+        if voltage == 24.0:
+            load_vehicle(path)
     expected = "battery.voltage.value = 24.5: is 1.53 times V_0 = 16 V of curves.bow: one of the two is probably wrong"
     with pytest.warns(UserWarning, match=re.escape(expected)) as caught:
         load_vehicle(path)
@@ -226,6 +247,21 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"curves.main.tables": [{"voltage": 16.0, "table": _FILES[1]}, {"voltage": 12.0, "table": _FILES[0]}]},
         "curves.main.tables = … must be at least two tables with rising voltages",
     ),
+    "equal voltages, beside a curve with a current": (
+        {
+            "curves.main.tables": [{"voltage": 16.0, "table": name} for name in _FILES],
+            "curves.bow.electric_current": _DRAWN,
+        },
+        "curves.main.tables = … must be at least two tables with rising voltages",
+    ),
+    "one table at a voltage, and no other curve that needs the battery": (
+        {
+            "curves.main.tables": [{"voltage": 16.0, "table": _FILES[0]}],
+            **{f"curves.{name}.{key}": GONE for name in ("bow", "lift") for key in ("V_0", "n_V")},
+        },
+        "curves.main.tables = … must be at least two tables with rising voltages",
+    ),
+    "a battery with another unit": ({"battery.voltage.unit": "mV"}, "battery.voltage.unit = 'mV': must be 'V'"),
     "no battery": ({"battery": GONE}, "battery: this table with the voltage is missing, and the thrust of a curve"),
     "a battery below the tables": ({"battery.voltage": quantity(11.9, "V")}, "battery.voltage.value = 11.9: must be"),
     "a battery beyond the tables": (

@@ -14,11 +14,13 @@ from scipy.stats import kstest, norm, qmc, spearmanr
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.layout import Curve
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
+from tests.vehicles import VIDEORAY
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
 
@@ -46,7 +48,8 @@ def test_estimates_read_back_as_they_were_written(refit: Vehicle, tmp_path: Path
         "beta_w": Estimated(error=0.5, correlation={"a_d_u": 0.123456, "b_d_u": -0.123456}),
     }
     rounded_to_0 = {"b_d_w": Estimated(error=4.0, correlation={"a_d_u": -4e-7})}
-    write_vehicle(replace(refit, estimates=rows | rounded_to_0), tmp_path / "made.toml")
+    exact = {**rows, "b_d_u": rows["b_d_u"].model_copy(update={"error": 1234.5049})}
+    write_vehicle(replace(refit, estimates=exact | rounded_to_0), tmp_path / "made.toml")
     assert load_vehicle(tmp_path / "made.toml").estimates == rows | {"b_d_w": Estimated(error=4.0)}
     write_vehicle(replace(refit, estimates={}), tmp_path / "none.toml")
     assert "estimates" not in (tmp_path / "none.toml").read_text(encoding="utf-8")
@@ -69,6 +72,19 @@ def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_pa
     assert all(row.correlation.keys() <= flat.estimates.keys() for row in flat.estimates.values())
     write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit[name] + 0.1 for name in refit.estimates}, "a test")
     assert "estimates" not in path.read_text(encoding="utf-8")
+
+
+def test_coefficients_stay_with_their_curve_where_names_collide() -> None:
+    """Thrust astern of the curve `main` has the name of the curve `main_reverse`, which then gets a number."""
+    names, keys = {"rear": "main", "top": "main_reverse"}, ("a_t", "b_t")
+    thrusters = tuple(t.model_copy(update={"curve": names[t.curve]}) for t in VIDEORAY.layout.thrusters)
+    curves = Curve("main", (*keys, "a_t_reverse", "b_t_reverse")), Curve("main_reverse", keys)
+    both = replace(VIDEORAY.layout, thrusters=thrusters, curves=curves)
+    plain = replace(both, curves=(Curve("main", keys), curves[1]))
+    vehicle = Vehicle(both, {name: float(n) for n, name in enumerate(both.coefficients)})
+    found = vehicle.in_layout(plain)
+    assert (vehicle["a_t_main_reverse_2"], found["a_t_main_reverse"]) == (8.0, 8.0)
+    assert found.in_layout(both).coefficients.items() <= vehicle.coefficients.items()
 
 
 BAD: dict[str, tuple[Callable[[str], str], str]] = {
@@ -137,6 +153,10 @@ def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path
     found = load_vehicle(path).uncertainty
     assert found.names == ("m_rov", "b_d_w", "alpha_u")
     assert found.errors == pytest.approx([0.1, 0.2, 1.1 * log(1.331) / 3.92], rel=1e-4)
+    vehicle = load_vehicle(path)
+    gamma = vehicle.layout.coefficients["gamma"]
+    between_bounds = replace(vehicle, intervals={"gamma": (gamma.minimum, gamma.maximum)}).uncertainty
+    assert between_bounds.errors == pytest.approx([(gamma.maximum - vehicle["gamma"]) / 1.96], rel=1e-4)
     drawn = found.drawn(qmc.Sobol(3, scramble=False).random(1024))
     assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002
     assert np.isfinite(drawn).all(), "the first number of Sobol's sequence is 0"

@@ -2,13 +2,12 @@
 
 import re
 import shutil
-from collections.abc import Callable
+from math import inf
 from pathlib import Path
 
 import pytest
 
-from rov_fmu.c.compile import BuildError
-from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import SURGE, YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
@@ -63,60 +62,28 @@ def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
     assert vehicle.command_range == (0.2, 0.7)
 
 
-def edit(pattern: str, replacement: str) -> Callable[[str], str]:
-    """Return a function that replaces the first match in the text of the VideoRay's file."""
+def test_a_turn_pushes_ahead_where_thrust_astern_is_weaker(vehicle: Vehicle) -> None:
+    def weaker(share: float) -> Vehicle:
+        return vehicle.extended({f"{key}_rear_reverse": share * vehicle[f"{key}_rear"] for key in ("a_t", "b_t")})
 
-    def change(text: str) -> str:
-        changed, count = re.subn(pattern, lambda _: replacement, text, count=1, flags=re.MULTILINE)
-        assert count == 1, f"nothing matches {pattern}"
-        return changed
-
-    return change
-
-
-def value(name: str, text: str) -> Callable[[str], str]:
-    """Return a function that changes the value of the first coefficient with this key."""
-    return edit(rf"(?<=^{name} = {{ value = )[^,]*", text)
+    ((axis, push),) = weaker(0.5).side_effects(YAW, 0.5)
+    assert axis is SURGE
+    assert push == pytest.approx(0.25 * vehicle.force(SURGE, 0.5))
+    assert [*weaker(0.999).side_effects(YAW, 0.5), *vehicle.side_effects(SURGE, 0.5)] == []
+    assert vehicle.replaced({"beta_w": 0.0}).effective_inertia(vehicle.layout.kinds["heave"]) == inf
 
 
 # How the file is changed, and what the one line must contain: the key, the value, what is allowed.
-BAD_FILES: dict[str, tuple[Callable[[str], str], str]] = {
-    "unknown coefficient": (
-        edit(r"(?=^R = )", 'mass = { value = 6.57, unit = "kg", source = "" }\n'),
-        "arm.mass: there is no such key, only R, gamma",
+BAD_FILES: dict[str, tuple[tuple[str, str], str]] = {
+    "a decimal comma": (
+        ("m_rov = { value = 6.57", "m_rov = { value = 6,57"),
+        "not TOML … (a number needs a decimal point)",
     ),
-    "number without unit and source": (
-        edit(r"^R = .*$", "R = 0.22"),
-        'arm.R = 0.22: must be { value = ..., unit = "m", source = ... }',
+    "not TOML": (("[body]", "[body"), "not TOML … line  … : [body"),
+    "an integer larger than a double": (
+        ("value = 2.711", f"value = {'1' + 400 * '0'}"),
+        "curves.rear.b_t … at most 308 dig",
     ),
-    "gamma in degrees": (value("gamma", "24.2"), "arm.gamma … 24.2 … 1.57"),
-    "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), "body.m_rov … 'lb' … 'kg'"),
-    **{
-        f"identifier {name}, which Windows reserves": (
-            edit(r"^identifier = .*$", f'identifier = "{name}"'),
-            f"vehicle.identifier = '{name}': must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0",
-        )
-        for name in ("CON", "Prn", "com1")
-    },
-    "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), "vehicle.data … 'nowhere' … no such folder"),
-    "a decimal comma": (value("m_rov", "6,57"), "not TOML … (a number needs a decimal point)"),
-    "not TOML": (edit(r"^\[body\]$", "[body"), "not TOML … line  … : [body"),
-    "no format": (edit("^format = 2$", ""), "format: this key is missing: write format = 2"),
-    "a number in a list of texts": (
-        edit(r"^limits = \[", "limits = [3, "),
-        "validity.limits = [3,  … entry 1 must be text in quotes",
-    ),
-    "a command below 0": (
-        edit(r"^command_min = .*$", "command_min = -0.1"),
-        "validity.command_min = -0.1 … or equal to 0",
-    ),
-    "another format": (edit("^format = 2$", "format = 3"), "format = 3 … must be 2"),
-    "no range of commands": (
-        edit(r"^command_max = .*$", "command_max = 0.2"),
-        "validity.command_min … 0.2 … less than … command_max",
-    ),
-    "integer larger than a double": (value("b_t", "1" + 400 * "0"), "curves.rear.b_t … at most 308 digits"),
-    "an interval without ends": (value("m_rov", "6.57, interval = []"), "m_rov.interval = []: must have 2 entries"),
 }
 
 
@@ -150,28 +117,15 @@ def test_every_mistake_in_a_file_is_reported(tmp_path: Path) -> None:
         assert line.startswith(f"{path}: {words}")
 
 
-def test_only_files_that_are_read_are_inputs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """In a folder with tables and pictures, a build replaces its earlier FMU but no file that it reads."""
+def test_the_tables_and_pictures_of_a_vehicle_are_its_files(tmp_path: Path) -> None:
     for folder in ("tables", "pictures"):
         shutil.copytree(VIDEORAY.parent / folder, tmp_path, dirs_exist_ok=True)
-    path, fmu = tmp_path / "here.toml", tmp_path / "here.fmu"
+    path = tmp_path / "here.toml"
     path.write_text(re.sub(r'^(data|pictures) = "\w+"', r'\1 = "."', TEXT, flags=re.M), encoding="utf-8")
-    table, picture = tmp_path / "table3_heave_steady.csv", tmp_path / "model.png"
-    fmu.write_bytes(b"an earlier FMU")
-    assert {table, picture} < set(load_vehicle(path).files)
-    assert fmu not in load_vehicle(path).files
-
-    def stop(_: Vehicle) -> None:
-        raise BuildError("the target is accepted")
-
-    monkeypatch.setattr("rov_fmu.build.reference_results", stop)
-    assert main(["build", str(path), "-o", str(fmu)]) == 1
-    assert capsys.readouterr().err == "rov-fmu: the target is accepted\n"
-    for target in (table, picture, path):
-        assert main(["build", str(path), "-o", str(target)]) == 2
-        assert f"would overwrite {target}" in capsys.readouterr().err
+    (tmp_path / "here.fmu").touch()
+    files = load_vehicle(path).files
+    assert {tmp_path / "table3_heave_steady.csv", tmp_path / "model.png"} < {*files}
+    assert {file.suffix for file in files} == {".csv", ".png", ".svg"}
 
 
 def check_line(line: str, path: Path, named: str) -> None:
@@ -182,7 +136,8 @@ def check_line(line: str, path: Path, named: str) -> None:
 
 @pytest.mark.parametrize("case", BAD_FILES)
 def test_bad_file_is_one_clear_line(case: str, tmp_path: Path) -> None:
-    change, named = BAD_FILES[case]
+    (old, new), named = BAD_FILES[case]
     path = tmp_path / "bad.toml"
-    path.write_text(change(WITH_SHIPPED_FOLDERS), encoding="utf-8")
+    assert old in WITH_SHIPPED_FOLDERS
+    path.write_text(WITH_SHIPPED_FOLDERS.replace(old, new), encoding="utf-8")
     check_line(refusal(path), path, named)

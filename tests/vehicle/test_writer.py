@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.cli import main
+from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
-from tests.commands import REFIT, TESTS
+from tests.commands import REFIT
 from tests.vehicles import EVERYTHING, SIX_AXES
 
 TEXT = REFIT.read_text(encoding="utf-8")
@@ -40,14 +40,16 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {"made.toml", "report.html"}
 
 
-def test_the_first_words_of_a_file_say_what_it_was_made_from(vehicle: Vehicle) -> None:
-    made = Provenance(tool="tool", method="by thought", inputs={})
-    text = vehicle_text(
-        replace(vehicle, data=None, pictures=None, provenance=made, measured_from="tank tests and 2 dive logs")
-    )
-    assert "\n# Made from tank tests and 2 dive logs: [provenance] tells how" in text
-    assert "warnings" not in text
-    assert "facts" not in text
+def test_a_file_that_was_made_is_written_as_it_stands() -> None:
+    refit = replace(load_vehicle(REFIT), measured_from="tank tests")
+    assert vehicle_text(refit, REFIT.parent) == TEXT
+
+
+def test_ranges_and_alternatives_are_tables_with_headings(vehicle: Vehicle) -> None:
+    layout = replace(vehicle.layout, identified=(Range(EVERY_COMMAND, 0.0, 0.7), Range("u", -0.5, 1.0)))
+    text = vehicle_text(replace(vehicle, layout=layout), VIDEORAY.parent)
+    assert '\n\n[validity.identified]\nu = { range = [-0.5, 1.0], unit = "m/s" }\n' in text
+    assert "\n\n[alternatives.unweighted_rear_thrust]\n" in text
 
 
 @pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY], ids=lambda path: path.stem)
@@ -73,14 +75,3 @@ def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path
     assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
-
-
-@pytest.mark.parametrize("name", ["nowhere/out.toml", "."])
-def test_nowhere_to_write(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["identify", str(TESTS), "-o", str(tmp_path / name)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert str(tmp_path) in err
-    assert "folder" in err
-    assert not any(tmp_path.iterdir())

@@ -56,12 +56,10 @@ class TableRow:
 
     def depends_on(self, parameter: Parameter, layout: Layout) -> bool:
         """Return True if a parameter changes the value by the model."""
-        if not parameter.of_motion or parameter.log is not None:
-            return False
-        if isinstance(self.subject, Curve):
-            return parameter.of == self.subject.name
-        curves = {thruster.curve for thruster in layout.drivers(self.subject)}
-        return parameter.of in {"", self.subject.name, *curves}
+        parts = {self.subject.name}
+        if not isinstance(self.subject, Curve):
+            parts |= {"", *(thruster.curve for thruster in layout.drivers(self.subject))}
+        return parameter.of_motion and parameter.of in parts
 
 
 def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_lag: float = 0.0) -> Array:

@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from rov_fmu.identify.beginning import begin
+from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
-from tests.folders import DOWN, FORCE, SPEED, read
+from tests.folders import DOWN, FORCE, HEAD, SPEED, folder_of, read
+from tests.identify.conftest import add_voltage
+from tests.recordings import run, write_log
+from tests.vehicles import VIDEORAY
 
 FORCES, SPEEDS = (0.2, 0.5, 0.9, -0.4), {0.3: 0.2, 0.5: 0.4, -0.8: -0.8}
 """The commands of the forces, and V_ss by command."""
@@ -45,6 +49,19 @@ def test_a_log_tells_the_drag_of_the_priors_by_its_usual_motion(fit: Fit) -> Non
     assert pytest.approx(np.quantile(np.abs(np.diff(depth.values[::10])), 0.9), rel=0.1) == V
     forces = [(6.494 * c + 0.0513) * c for c in (0.3, 0.2)]
     assert a * V**2 + b * V == pytest.approx(np.quantile(forces, 0.9), rel=0.02)
+
+
+@pytest.mark.parametrize(("fall", "depends"), [(0.029, False), (0.031, True)])
+def test_thrust_depends_on_a_voltage_that_changes_by_3_percent(fall: float, depends: bool, tmp_path: Path) -> None:
+    path = folder_of(tmp_path, f'base = "videoray"\n{HEAD}', {})
+    recording = run(VIDEORAY, HEAVE, ((0.0, 2.0), (0.3, 6.0)), 10.0)
+    add_voltage(write_log(path, "0", recording.noisy(np.random.default_rng(0))), 16.0 * fall / len(recording.time))
+    known, _, _ = begin(load_tests(path))
+    mean = pytest.approx(16.0 * (1.0 - 0.5 * fall), abs=0.01)
+    assert known.layout.voltage == (mean if depends else None)
+    assert {name: x for name, x in known.coefficients.items() if name.startswith(("V_0", "n_V"))} == (
+        {"V_0_rear": mean, "V_0_top": mean, "n_V_rear": 0.0, "n_V_top": 0.0} if depends else {}
+    )
 
 
 def test_an_interval_of_given_thrust_is_its_prior_and_a_number_without_is_exact(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, nearest
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -42,6 +43,37 @@ def test_the_prior_of_a_shape_is_that_which_is_stated() -> None:
     assert spread[:4] == pytest.approx(0.1 * np.sqrt(1.0 - to_full**2), rel=0.05)
     assert correlation[0, 1] == pytest.approx(np.exp(-0.5 * (0.15 / 0.3) ** 2), abs=0.03)
     assert correlation[0, 4] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_shape_bends_the_command_beyond_its_dead_band_and_astern_only_where_that_is_not_exact() -> None:
+    eta = {"rear": 0.1 * np.random.default_rng(5).standard_normal(COUNT)}
+    bent, at = Shapes(eta, {"rear": (0.1, 0.2)}, frozenset()), np.array([0.1, 0.6, -0.2, -0.6, -0.1, 0.05])
+    whole = Shapes(eta).commands("rear", at) - at
+    share = np.array([0.0, 0.5 / 0.6, 0.0, 0.4 / 0.6, 0.0, 0.0])
+    assert bent.commands("rear", at) == pytest.approx(at + share * whole)
+    exact = Shapes(eta, exact_astern=frozenset({"rear"}))
+    assert exact.commands("rear", at) == pytest.approx(at + whole * (at > 0.0))
+    assert Shapes({"rear": -100.0 * abs(eta["rear"])}).commands("rear", np.array([0.5, 1.0])) == pytest.approx(
+        [0.05, 1.0]
+    )
+
+
+def test_the_nearest_curve_of_a_quadratic_one_is_this_one_and_has_its_variance() -> None:
+    """Ahead and astern, each beyond its dead band, also where the tests had weaker commands alone."""
+    curve = Curve("main", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse"))
+
+    def forces(c: np.ndarray) -> np.ndarray:
+        ahead, astern = c - 0.08, -c - 0.12
+        return np.where(c > 0.0, 20.0 * ahead * abs(ahead) + 5.0 * ahead, -15.0 * astern * abs(astern) - 3.0 * astern)
+
+    names = ("a_t_main", "b_t_main"), ("a_t_main_reverse", "b_t_main_reverse")
+    for one, own, values in zip(
+        nearest(curve, forces, (0.08, 0.12), 0.05, 0.1), names, ((20, 5), (15, 3)), strict=True
+    ):
+        assert one.coefficients == pytest.approx(dict(zip(own, values, strict=True)))
+        assert np.abs(one.misfit).max() < 1e-9
+        variances = np.einsum("ni,ij,nj->n", one.terms, one.covariance(0.04), one.terms)
+        assert np.mean(variances) == pytest.approx(0.04)
 
 
 def test_a_shape_is_fitted_where_it_was_tested() -> None:

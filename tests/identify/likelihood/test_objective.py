@@ -14,7 +14,8 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, total
 from rov_fmu.tank.arrays import Array
-from tests.folders import ARM, HEAD, MASS, TURNS, folder_of, pulled, responses
+from tests.folders import folder_of, pulled, responses
+from tests.identify.conftest import KNOWN, add_voltage
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
@@ -25,7 +26,7 @@ PLAN = ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0), (0.2, 2.0))
 def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     """Return J for a short log of heave, two of yaw, and all tables of heave, of a vehicle with a curve that bends."""
     tables = {**responses(VIDEORAY, HEAVE), "thrust_top.csv": pulled(6.5, 0.05), "thrust_rear.csv": pulled(43.0, 2.7)}
-    path = folder_of(tmp_path_factory.mktemp("tests"), f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", tables)
+    path = folder_of(tmp_path_factory.mktemp("tests"), KNOWN, tables)
     random = np.random.default_rng(0)
     for n, axis in enumerate((HEAVE, YAW, YAW)):
         write_log(path, str(n), run(VIDEORAY, axis, PLAN, 5.0).noisy(random))
@@ -104,12 +105,10 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
 
     The log has a voltage and a distance over ground. With frozen gains, the gradient has other signs.
     """
-    path = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TURNS}{ARM}", {"thrust_rear.csv": pulled(43.0, 2.7)})
+    path = folder_of(tmp_path / "tests", KNOWN, {"thrust_rear.csv": pulled(43.0, 2.7)})
     stronger = VIDEORAY.replaced({name: 3.0 * VIDEORAY[name] for name in ("a_t_rear", "b_t_rear")})
     log = write_log(path, "0", run(stronger, SURGE, PLAN, 5.0).noisy(np.random.default_rng(0), "distance"))
-    head, *lines = log.read_text().splitlines()
-    volts = [f"{line},{16.0 - 0.03 * n:.2f}" for n, line in enumerate(lines)]
-    log.write_text("\n".join([f"{head},voltage [V]", *volts]) + "\n")
+    add_voltage(log)
     known, logs, rows = begin(load_tests(path))
     objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
     kinds = [p.kind for p in objective.table.parameters]

@@ -1,5 +1,6 @@
 """The parameters: their priors, and how they enter the model."""
 
+from dataclasses import replace
 from functools import partial
 from math import exp
 
@@ -8,9 +9,11 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, table_of
 from rov_fmu.identify.likelihood.records import SampledLog
 from tests.folders import HEAD, folder_of, pulled
+from tests.identify.conftest import add_voltage
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
@@ -25,9 +28,7 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
     for axis, rate, quantity in ((HEAVE, 10.0, "depth"), (SURGE, 5.0, "distance")):
         recording = run(VIDEORAY, axis, ((0.0, 2.0), (0.4, 5.0), (-0.5, 4.0)), rate)
         file = write_log(path, "0", recording.noisy(np.random.default_rng(0), quantity))
-        header, *rows = file.read_text(encoding="utf-8").splitlines()
-        volts = [f"{row},{16.0 - 0.03 * n:.2f}" for n, row in enumerate(rows)]
-        file.write_text("\n".join([f"{header},voltage [V]", *volts, ""]), encoding="utf-8")
+        add_voltage(file)
     beginning, logs, rows_of_tables = begin(load_tests(path))
     return table_of(beginning, logs, sorted({row.noise for row in rows_of_tables})), logs
 
@@ -137,3 +138,10 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
     assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "to the north")]
+
+
+def test_a_linear_drag_of_0_has_a_prior_next_to_0(fit: Fit) -> None:
+    known = replace(fit.known, coefficients={**fit.known.coefficients, "b_d_w": 0.0})
+    table = table_of(known, fit.objective.logs, [])
+    (drag,) = (p for p in table.parameters if (p.kind, p.of) == ("linear drag", "heave"))
+    assert exp(drag.mean) == pytest.approx(1e-9)
