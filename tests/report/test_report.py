@@ -123,6 +123,10 @@ def test_progress_tells_each_plot_and_the_picture_shows_the_log_that_is_predicte
     words = unfolded(report_page(replace(example(), axes=axes)))
     every = "(started again every 10 s)"
     assert f"the distance {every} and the heading {every} of log_2.csv, predicted" in words
+    unjudged = replace(surge, predictions=(prediction(SURGE, "distance", FILES[0]),))
+    assert "Unseen motion: the distance of log_1.csv, predicted" in unfolded(
+        report_page(replace(example(), axes=(unjudged,)))
+    )
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
     assert report.today() == date(1970, 1, 2)
 
