@@ -27,6 +27,14 @@ from tests.report.pages import check_is_whole
 from tests.report.plots.test_identification import bands, bars, lines
 
 
+def made(folder: Path, fmu: Path, scheduler: str, plan: str, code: int = 0) -> Path:
+    """Do a study by the command, which ends with this code, and return the folder of its results."""
+    (folder / "plan.toml").write_text(f'fmu = "{beside(fmu, folder)}"\nstop_time = 2.0\nstep = 0.1\n{plan}')
+    arguments = [str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]
+    assert main(["study", *arguments]) == code
+    return folder / "results"
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
     """The results of a study with its page, made by the command in 7 s, of which the workers need 3 s to start.
@@ -34,15 +42,12 @@ def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path],
     Some runs fail; the others lack the figure `odd`.
     """
     folder = tmp_path_factory.mktemp("page")
-    (folder / "plan.toml").write_text(f"""title = "A <foreign> study"
-fmu = "{beside(foreign(), folder)}"
-stop_time = 2.0
-step = 0.1
+    plan = """title = "A <foreign> study"
 runs = 600
 sampler = "saltelli"
 [vary]
 a.uniform = [0.0, 1.0]
-b.normal = {{ mean = 0.0, sd = 1.0 }}
+b.normal = { mean = 0.0, sd = 1.0 }
 mode.values = [0, 0, 0, 0, 0, 0, 0, 1]
 [keep]
 outputs = ["y"]
@@ -51,12 +56,12 @@ offset = "2.0 + 0*b"
 end = "y[-1]"
 twice = "2 * y[-1]"
 odd = "y[y > 1e9][0]"
-""")
+"""
     with redirect_stdout(StringIO()) as printed, redirect_stderr(printed), pytest.MonkeyPatch.context() as patched:
         patched.setattr("rov_fmu.study.run.cluster.perf_counter", iter([100.0, 103.0, 107.0]).__next__)
-        assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
+        results = made(folder, foreign(), scheduler, plan, code=1)
     (folder / "printed.txt").write_text(without_progress(printed.getvalue()), encoding="utf-8")
-    return folder / "results"
+    return results
 
 
 def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> None:
@@ -131,37 +136,23 @@ def test_a_grid_of_one_or_two_variables_has_lines(done: Path, monkeypatch: pytes
 def test_a_study_of_which_all_runs_failed_has_a_page_and_nothing_to_plot(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str
 ) -> None:
-    plan = tmp_path / "plan.toml"
-    plan.write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
-stop_time = 2.0
-step = 0.1
-sampler = "grid"
-[set]
-mode = 1
-[keep]
-outputs = ["y"]
-[figures]
-end = "y[-1]"
-""")
-    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 1
-    page = html.parse(tmp_path / "results" / "study.html")
+    plan = 'sampler = "grid"\n[set]\nmode = 1\n[keep]\noutputs = ["y"]\n[figures]\nend = "y[-1]"\n'
+    results = made(tmp_path, foreign(), scheduler, plan, code=1)
+    page = html.parse(results / "study.html")
     assert "1 of 1 runs, 1 failed, 0 incomplete." in page.xpath("string(//body)")
     assert not page.xpath("//svg")
-    assert Results(tmp_path / "results").trajectories().empty
+    assert Results(results).trajectories().empty
     assert str(statistics(np.array([2.0]), [0.5])) == "([2.0], 2.0, nan)"
 
 
 def test_a_grid_shows_figures_over_what_varies_and_says_how_many_rows_and_reasons_are_left_out(
     videoray_fmu: Path, tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(videoray_fmu, tmp_path)}"
-stop_time = 2.0
-step = 0.1
-sampler = "grid"
+    plan = """sampler = "grid"
 inputs.u_r = 0.3
 [vary]
 u_l.values = [0.3, 0.2]
-m_rov.range = {{ from = 5.0, to = 8.0, count = 31 }}
+m_rov.range = { from = 5.0, to = 8.0, count = 31 }
 [keep]
 outputs = ["u"]
 [figures]
@@ -170,14 +161,13 @@ way = "max(x)"
 sway = "1.0 * t[0]"
 T = "Tau(u)"
 far = "u[round(300*m_rov + 30*u_l)]"
-""")
-    arguments = [str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results"), "--scheduler", scheduler]
-    assert main(["study", *arguments]) == 1, "no run has all figures"
+"""
+    results = made(tmp_path, videoray_fmu, scheduler, plan, code=1)
     printed = " ".join(capsys.readouterr().out.split())
     assert re.findall(r"(\d+) runs: (\w+)", printed) == [*[("1", "far")] * 5, ("57", "other")]
     assert "57 runs: other reasons (57), which are on the page" in printed
-    text = (tmp_path / "results" / "study.html").read_text(encoding="utf-8")
-    page, runs = html.fromstring(text), Results(tmp_path / "results").runs
+    text = (results / "study.html").read_text(encoding="utf-8")
+    page, runs = html.fromstring(text), Results(results).runs
     labels = re.findall(r'aria-label="([^"]*)"', text)
     assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), "Trajectories of u"]
     head, *rows = [
@@ -201,11 +191,8 @@ def test_the_page_shows_which_sobol_indices_are_uncertain(
     monkeypatch.setattr("rov_fmu.study.results.plots.inline_svg", lambda *_, **__: "")
     pages = {}
     for runs in (60, 64, 800):
-        plan, results = tmp_path / f"{runs}.toml", tmp_path / f"{runs}"
-        plan.write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
-stop_time = 1.0
-step = 0.5
-runs = {runs}
+        (tmp_path / f"{runs}").mkdir()
+        plan = f"""runs = {runs}
 sampler = "saltelli"
 [vary]
 a.uniform = [0.0, 1.0]
@@ -214,9 +201,8 @@ u.uniform = [0.0, 1.0]
 sum = "a + u"
 up = "a + u / 1000"
 down = "a - u / 1000"
-""")
-        assert main(["study", str(plan), "-o", str(results), "--scheduler", scheduler]) == 0
-        pages[runs] = html.parse(results / "study.html")
+"""
+        pages[runs] = html.parse(made(tmp_path / f"{runs}", foreign(), scheduler, plan) / "study.html")
     few, many = (pages[runs].xpath("string(//body)") for runs in (60, 800))
     cells = "//h2[@id='sensitivity']/following::table[1]//td[@class='number same' or @class='number first same']"
     for text in (
@@ -229,9 +215,9 @@ down = "a - u / 1000"
     assert pages[60].xpath(cells)
     assert not pages[800].xpath(cells)
     assert "from 200 blocks" in many
-    small = [Results(tmp_path / "800").sensitivity(name).loc["u"].S1 for name in ("up", "down")]
+    small = [Results(tmp_path / "800" / "results").sensitivity(name).loc["u"].S1 for name in ("up", "down")]
     assert -0.0005 < min(small) < -1e-5
-    some = Results(tmp_path / "60")
+    some = Results(tmp_path / "60" / "results")
     some.runs.loc[8:, "sum"] = np.nan
     assert some.sensitivity("sum").shape == (2, 4), "of two blocks"
     some.runs.loc[7, "sum"] = np.nan

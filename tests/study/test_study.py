@@ -72,6 +72,17 @@ def _same(one: Results, other: Results) -> None:
     pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), check_exact=True)
 
 
+@pytest.fixture
+def do(foreign: Foreign, tmp_path: Path, scheduler: str) -> Callable[..., Results]:
+    """A function that does the study of a foreign FMU (`_plan`) on the shared worker, in the folder `results`."""
+
+    def done(reset: int = 0, on_progress: Any = lambda _: None, **plan: Any) -> Results:
+        path = _plan(tmp_path, foreign(reset), **plan)
+        return study(path, tmp_path / "results", scheduler=scheduler, on_progress=on_progress)
+
+    return done
+
+
 def _processes(word: str) -> set[int]:
     """The processes that this one has started, directly or not, whose command line has a word."""
     processes = psutil.Process().children(recursive=True)
@@ -111,19 +122,19 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pyte
 
 @pytest.mark.parametrize("reset", [1, 2])
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
-    reset: int, foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str
+    reset: int, do: Callable[..., Results], whole: Results
 ) -> None:
     """A reset that does nothing leaves y as it was."""
-    _same(study(_plan(tmp_path, foreign(reset)), tmp_path / "results", scheduler=scheduler), whole)
+    _same(do(reset), whole)
     assert not _processes("_serve"), "the processes of the FMU have ended"
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
-    foreign: Foreign, tmp_path: Path, scheduler: str
+    do: Callable[..., Results],
 ) -> None:
-    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1, 6, 7, 8, 9]", more='bad = "1/(mode - mode)"')
     progress: list[Progress] = []
-    results = study(plan, tmp_path / "results", scheduler=scheduler, on_progress=progress.append)
+    modes = "mode.values = [0, 1, 6, 7, 8, 9]"
+    results = do(runs=30, vary=modes, more='bad = "1/(mode - mode)"', on_progress=progress.append)
     warns = results.runs["mode"].isin([0, 9])
     failed, others = results.runs[~warns], results.runs[warns]
     assert {*others["mode"]} == {0, 9}, "an FMU that warns goes on"
@@ -136,7 +147,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
         (8, "initialization: error"),
     }
     assert failed[["end", "sooner"]].isna().all(axis=None)
-    table = pq.read_table(tmp_path / "results" / "runs")
+    table = pq.read_table(results.folder / "runs")
     assert [table[name].null_count for name in ("end", "bad")] == [len(failed), 30]
     assert {*others.status} == {"incomplete"}
     assert {*others.reason} == {"bad: ZeroDivisionError: division by zero"}
@@ -189,18 +200,18 @@ def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(foreign: Foreig
 
 
 def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
-    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, capsys: pytest.CaptureFixture[str]
+    foreign: Foreign, tmp_path: Path, whole: Results, do: Callable[..., Results], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    results = tmp_path / "results"
-    study(_plan(tmp_path, foreign(), runs=24), results, scheduler=scheduler)
+    results = do(runs=24).folder
     progress: list[Progress] = []
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
     for draft in ("trajectories/part-000000090-000000099.parquet", "runs/.part-000000090-000000099.parquet.abc.part"):
         (results / draft).write_bytes(b"of a process that was killed")
-    more = _plan(tmp_path, foreign(), runs=40, limit=99.0)
-    _same(study(more, results, scheduler=scheduler, on_progress=progress.append), whole)
+    _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
-    assert run_study(more, results, None, "tcp://nowhere", progress.append)[0] == Spent(0, 0, 0, 0.0, 0.0)
+    assert run_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent(
+        0, 0, 0, 0.0, 0.0
+    )
     assert not [*results.glob("*/*part-000000090*")]
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
@@ -356,7 +367,7 @@ def _fail(error: Exception) -> Callable[..., None]:
     return fail
 
 
-_WORKERS = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
+_VERSION = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
 
 
 @pytest.mark.parametrize(
@@ -366,44 +377,33 @@ _WORKERS = 'a script calls study under `if __name__ == "__main__":`, for each wo
         ("do_runs", ValueError(), StudyError("the workers are lost: ValueError")),
         ("do_runs", CancelledError(), StudyError("the connection to the scheduler is lost. Finished runs are kept")),
         ("Client.submit", KeyError("ours"), KeyError("ours")),
-        (
-            "Client.register_plugin",
-            TypeError("old"),
-            StudyError(
-                "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine: old"
-            ),
-        ),
-        ("LocalCluster", RuntimeError(), StudyError(f"the workers do not start; {_WORKERS}")),
+        ("Client.register_plugin", TypeError("old"), StudyError(f"{_VERSION}: old")),
     ],
 )
 def test_what_goes_wrong_on_the_workers_is_a_line(
-    patched: str,
-    error: Exception,
-    told: Exception,
-    foreign: Foreign,
-    tmp_path: Path,
-    scheduler: str,
-    monkeypatch: pytest.MonkeyPatch,
+    patched: str, error: Exception, told: Exception, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(f"rov_fmu.study.run.cluster.{patched}", _fail(error))
     with pytest.raises(type(told)) as found:
-        study(
-            _plan(tmp_path, foreign()), tmp_path / "results", scheduler=None if patched == "LocalCluster" else scheduler
-        )
+        do()
     assert found.value.args == told.args
 
 
-def test_an_fmu_without_an_instance_and_a_script_that_is_gone_are_lines(
-    foreign: Foreign, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
+def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
+    foreign: Foreign, tmp_path: Path, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan, results = _plan(tmp_path, foreign(3)), tmp_path / "results"
     with pytest.raises(FileError) as refused:
-        study(plan, results, scheduler=scheduler)
+        do(3)
     assert str(refused.value) == "foreign.fmu: cannot be run: Failed to instantiate model; the FMU: no licence"
-    monkeypatch.setattr("__main__.__file__", "gone.py")
-    with pytest.raises(StudyError) as lost:
-        study(plan, results)
-    assert str(lost.value) == f"workers cannot be started, because gone.py is not a file; {_WORKERS}"
+    needs = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
+    for patched, value, told in (
+        ("rov_fmu.study.run.cluster.LocalCluster", _fail(RuntimeError()), "the workers do not start"),
+        ("__main__.__file__", "gone.py", "workers cannot be started, because gone.py is not a file"),
+    ):
+        monkeypatch.setattr(patched, value, raising=False)
+        with pytest.raises(StudyError) as lost:
+            study(_plan(tmp_path, foreign()), tmp_path / "results")
+        assert str(lost.value) == f"{told}; {needs}"
 
 
 @pytest.mark.long
