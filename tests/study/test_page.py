@@ -1,7 +1,7 @@
 """The page about a study shows what is in its data frames."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -25,6 +25,10 @@ from tests.commands import without_progress
 from tests.folders import beside
 from tests.report.pages import check_is_whole
 from tests.report.plots.test_identification import bands, bars, lines
+
+
+def numbers_of(cells: Iterable[str]) -> list[float]:
+    return [float(cell.replace("−", "-")) for cell in cells]
 
 
 def made(folder: Path, fmu: Path, scheduler: str, plan: str, code: int = 0) -> Path:
@@ -76,12 +80,12 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     )
     quantiles, drawn = ended.end.quantile([0.05, 0.25, 0.5, 0.75, 0.95]), results.runs.b
     numbers = [*quantiles, ended.end.mean(), ended.end.std(), len(ended)]
-    assert [float(cell.replace("−", "-")) for cell in rows["end"][1:]] == pytest.approx(numbers, rel=3e-3)
+    assert numbers_of(rows["end"][1:]) == pytest.approx(numbers, rel=3e-3)
     assert rows["odd"] == ["odd", *"–––––––", "0"]
     assert rows["mode"][1] == "values: 0, 0, 0, 0, 0, 0, …"
     assert rows["b"][1] == "normal: mean 0, sd 1"
     extremes = [drawn.min(), drawn.median(), drawn.max()]
-    assert [float(cell.replace("−", "-")) for cell in rows["b"][2:5]] == pytest.approx(extremes, rel=1e-3, abs=1e-3)
+    assert numbers_of(rows["b"][2:5]) == pytest.approx(extremes, rel=1e-3, abs=1e-3)
     index = results.sensitivity("end").loc["b"]
     indices = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='b']/td")
     assert float(indices[1].text_content().replace("−", "-")) == pytest.approx(index.S1, abs=1e-3)
@@ -175,7 +179,7 @@ far = "u[round(300*m_rov + 30*u_l)]"
     ]
     columns = ["u_l", "m_rov", "V", "way", "sway", "T"]
     assert head == ["u_l", "m_rov (kg)", *columns[2:], "far"]
-    shown = [[float(cell.replace("−", "-")) for cell in row[:-1]] for row in rows]
+    shown = [numbers_of(row[:-1]) for row in rows]
     assert shown == [pytest.approx(row, rel=1e-5) for row in runs[columns].to_numpy()[:60]]
     assert "And 2 more rows:" in text
     assert (len(page.xpath("//table")[-1].xpath(".//tr")), "And 12 more reasons:" in text) == (51, True)
