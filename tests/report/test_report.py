@@ -118,8 +118,8 @@ def test_progress_tells_each_plot_and_the_picture_shows_the_log_that_is_predicte
     assert [share for _, share in steps] == pytest.approx([n / len(steps) for n in range(len(steps))])
     surge, heave, yaw = example().axes
     other = prediction(HEAVE, "depth", FILES[0], span=10.0, error=0.05)
-    velocity = prediction(SURGE, "surge velocity", FILES[0], error=0.2)
-    axes = (replace(surge, predictions=(velocity, *surge.predictions)), replace(heave, predictions=(other,)), yaw)
+    first = [prediction(SURGE, name, FILES[0], span=10.0, error=0.2) for name in ("surge velocity", "distance")]
+    axes = (replace(surge, predictions=(*first, *surge.predictions)), replace(heave, predictions=(other,)), yaw)
     words = unfolded(report_page(replace(example(), axes=axes)))
     every = "(started again every 10 s)"
     assert f"the distance {every} and the heading {every} of log_2.csv, predicted" in words

@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -85,8 +86,12 @@ def do(foreign: Foreign, tmp_path: Path, scheduler: str) -> Callable[..., Result
 
 def _processes(word: str) -> set[int]:
     """The processes that this one has started, directly or not, whose command line has a word."""
-    processes = psutil.Process().children(recursive=True)
-    return {process.pid for process in processes if any(word in part for part in process.cmdline())}
+    found = set()
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):  # it has just ended
+            if any(word in part for part in process.cmdline()):
+                found.add(process.pid)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -125,8 +130,9 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
     reset: int, do: Callable[..., Results], whole: Results
 ) -> None:
     """A reset that does nothing leaves y as it was."""
+    others = _processes("_serve")
     _same(do(reset), whole)
-    assert not _processes("_serve"), "the processes of the FMU have ended"
+    assert _processes("_serve") <= others, "the processes of the FMU have ended"
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
