@@ -167,8 +167,8 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     ("mode", "reason"),
     [
         (2, "ended its process: SIGABRT"),
-        pytest.param(3, "ended its process: SIGSEGV", marks=pytest.mark.long),
-        pytest.param(4, "did not return within time_limit = 5 s", marks=pytest.mark.long),
+        pytest.param(3, "ended its process: SIGSEGV", marks=[pytest.mark.long, posix]),
+        pytest.param(4, "did not return within time_limit = 5 s", marks=[pytest.mark.long, posix]),
     ],
 )
 def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_tell_if_the_vehicle_turned_over(
