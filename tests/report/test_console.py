@@ -12,15 +12,17 @@ from rich.progress import Progress, TextColumn
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.fmu.claims.claims import CLAIMS, Proof
+from rov_fmu.fmu.claims.measures import Evidence
 from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
 from rov_fmu.report import console as terminal
-from rov_fmu.report.console import console, paragraph, print_end, print_table, table
+from rov_fmu.report.console import console, paragraph, print_claims, print_end, print_table, table
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.report.progress import Parts, StudyParts, compiling, parts
 from rov_fmu.report.templates import in_words, number, pretty_unit, sentence, text
-from tests.vehicles import HEAVY
+from tests.vehicles import HEAVY, VIDEORAY
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -124,6 +126,10 @@ def test_a_tuning_is_printed_with_its_deviations_its_commands_and_the_lag(capsys
     for *_, value, model, deviation in rows:
         assert float(deviation) == pytest.approx(100.0 * (float(model) / float(value) - 1.0), abs=0.1)
     assert re.findall(r"^(\w+) = [\d.]+   95 %: [\d.]+ \.\.\. [\d.]+$", out, re.M) == ["alpha_w", "beta_w"]
+    print_tuning(tune(VIDEORAY, HEAVE, [Target(*wanted[0])]))
+    alone = capsys.readouterr().out
+    assert re.findall(r"^(\w+) = [\d.]+$", alone, re.M) == ["alpha_w", "beta_w"], "one point tells no interval"
+    assert "lag" not in alone
     assert out.splitlines()[-3:] == [
         "A command of 50% of heave: u_5 = 0.5, u_6 = 0.5, u_7 = 0.5, u_8 = 0.5",
         "A command of 70% of heave: u_5 = 0.7, u_6 = 0.7, u_7 = 0.7, u_8 = 0.7",
@@ -131,7 +137,23 @@ def test_a_tuning_is_printed_with_its_deviations_its_commands_and_the_lag(capsys
     ]
 
 
-def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_column() -> None:
+def test_a_claim_has_its_figure_or_why_it_was_not_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    found = [
+        Evidence("holds", "It is so."),
+        Evidence("fails", "It is not.", "3 of 4"),
+        Evidence("not checked", "Too slow."),
+        Evidence("does not apply", "No states."),
+    ]
+    print_claims(Proof(Path("a.fmu"), "", None, {}, [(CLAIMS[0], one) for one in found]))
+    rows = [re.split("  +", line) for line in capsys.readouterr().out.splitlines()[2:]]
+    results = ["holds"], ["fails", "3 of 4"], ["not checked", "Too slow."], ["does not apply", "No states."]
+    assert rows == [["expected results", *cells] for cells in results]
+
+
+def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_column(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In a pipe it stays whole. What a command wrote and what to do next are two lines where one would not fit."""
     out = console()
     out.file, out._force_terminal, out._color_system, out.width = io.StringIO(), True, None, 30
     numbers = [f"number {n}" for n in range(5)]
@@ -146,6 +168,15 @@ def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_
         *("row", "number 2", "number 3", "its name", "92", "93"),
         *("row", "number 4", "words", "its name", "94", "A caption"),
     ]
+    monkeypatch.setattr(terminal, "console", lambda: out)
+    for out.width, words in {29: "Wrote a.fmu. Next: open a.fmu\n", 28: "Wrote a.fmu.\nNext: open a.fmu\n"}.items():
+        out.file = io.StringIO()
+        print_end([Path("a.fmu")], "open a.fmu")
+        print_end([])
+        assert out.file.getvalue() == words
+    out.file, out._force_terminal = io.StringIO(), False
+    print_table(found, out)
+    assert " ".join(out.file.getvalue().splitlines()[-2].split()) == "its name 90 91 92 93 94 a text that is wrapped"
 
 
 # ---- The progress of long work ---------------------------------------------------------------------------------------

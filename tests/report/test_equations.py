@@ -2,15 +2,13 @@
 
 import random
 from collections.abc import Mapping
-from dataclasses import replace
 from math import copysign
 
 import pytest
 from lxml import html
 
-from rov_fmu.equation import thrust
-from rov_fmu.equation.expression import Expression, Name, Names, Operation, call, compiled, where
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.expression import Expression, Name, Operation, compiled, where
+from rov_fmu.equation.layout import Layout
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.equations import Equations, Line, mathml, text
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -141,22 +139,6 @@ def test_the_equations_of_the_paper_are_those_of_the_paper() -> None:
         "z' = w",
         "ψ' = r",
     ]
-
-
-def test_an_effect_of_commands_on_the_thrust_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The page derives the thrust from the formula of the FMU, and does not write the curve a second time."""
-    usual = thrust._steady_thrust
-
-    def with_loss(name: str, curve: Curve, names: Names) -> thrust.Formulas:
-        formulas = usual(name, curve, names)
-        *_, steady = formulas
-        return formulas | {steady: formulas[steady] * (1.0 - 0.2 * call("abs", names("command", name)))}
-
-    monkeypatch.setattr(thrust, "_steady_thrust", with_loss)
-    layout = VEHICLES["VideoRay"].layout
-    shown = _text(replace(layout, curves=tuple(replace(curve, equation="with loss") for curve in layout.curves)))
-    assert "F_l = 0.5 (a_t_rear |u_l| u_l + b_t_rear u_l) (1 − 0.2 |u_l|)  with loss" in shown
-    assert "F_t = (a_t_top |u_t| u_t + b_t_top u_t) (1 − 0.2 |u_t|)  with loss" in shown
 
 
 @pytest.mark.parametrize("kind", ROVS)

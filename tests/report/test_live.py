@@ -196,19 +196,6 @@ def test_a_step_test_stands_beside_what_was_measured_and_stops_at_its_end(page: 
     until(page, f"live.flight.time > {ceil(6.0 * Tau)}")
 
 
-def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(page: Any, vehicle: Vehicle) -> None:
-    page.locator("summary", has_text="Tuning").click()
-    page.locator("input[name=alpha_w]").fill("2")
-    page.locator("input[name=u_t]").fill("0.5")
-    until(page, "live.flight.pilot.model.marks[2] !== 0")
-    marks = page.evaluate("[live.flight.pilot, live.flight.ghost].map(({ model }) => model.marks[2])")
-    expected = [one.response(HEAVE, 0.5)[0] for one in (vehicle.replaced({"alpha_w": 2.0}), vehicle)]
-    assert marks == pytest.approx(expected, rel=1e-12)
-    assert page.is_checked("#live-ghost")
-    page.click("#live-file")
-    assert get(page, *vehicle.layout.tuning) == [vehicle[name] for name in vehicle.layout.tuning]
-
-
 def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, fly: Fly) -> None:
     other = load_vehicle(SHIPPED["bluerov2"])
     assert main(["fly", "videoray", "--against", "bluerov2", "-o", str(tmp_path / "both.html")]) == 0

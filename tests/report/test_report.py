@@ -118,11 +118,19 @@ def test_progress_tells_each_plot_and_the_picture_shows_the_log_that_is_predicte
     assert [share for _, share in steps] == pytest.approx([n / len(steps) for n in range(len(steps))])
     surge, heave, yaw = example().axes
     other = prediction(HEAVE, "depth", FILES[0], span=10.0, error=0.05)
-    velocity = prediction(SURGE, "surge velocity", FILES[0], error=0.2)
-    axes = (replace(surge, predictions=(velocity, *surge.predictions)), replace(heave, predictions=(other,)), yaw)
-    words = unfolded(report_page(replace(example(), axes=axes)))
+    first = [prediction(SURGE, name, FILES[0], span=10.0, error=0.2) for name in ("surge velocity", "distance")]
     every = "(started again every 10 s)"
-    assert f"the distance {every} and the heading {every} of log_2.csv, predicted" in words
+    for unchanged, told_ in {
+        0.7: f"the distance {every} and the heading {every} of log_2.csv",
+        0.1: f"the distance {every} and the depth {every} of log_1.csv",
+    }.items():
+        own = (*(replace(p, unchanged=unchanged) for p in first), *surge.predictions)
+        axes = (replace(surge, predictions=own), replace(heave, predictions=(other,)), yaw)
+        assert f"{told_}, predicted" in unfolded(report_page(replace(example(), axes=axes)))
+    unjudged = replace(surge, predictions=(prediction(SURGE, "distance", FILES[0]),))
+    assert "Unseen motion: the distance of log_1.csv, predicted" in unfolded(
+        report_page(replace(example(), axes=(unjudged,)))
+    )
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
     assert report.today() == date(1970, 1, 2)
 

@@ -18,13 +18,13 @@ HERE = Path(__file__).parent
 
 @pytest.fixture(scope="session")
 def foreign(made_once: Made) -> Callable[..., Path]:
-    """A function that returns the FMU; the argument selects what its fmi2Reset does (see foreign.c)."""
+    """A function that returns the FMU; the argument selects how it can be reset (see foreign.c)."""
     name = f"foreign{fmpy.sharedLibraryExtension}"
 
     def fill(folder: Path) -> None:
         library = compile_c(HERE / "foreign.c", folder / name, {}, "-shared", "-fPIC", "-Wno-unused-parameter")
         description = (HERE / "foreign.xml").read_text(encoding="utf-8")
-        for reset in range(3):
+        for reset in range(4):
             (folder / f"{reset}").mkdir()
             with zipfile.ZipFile(folder / f"{reset}" / "foreign.fmu", "w") as fmu:
                 fmu.writestr("modelDescription.xml", description.replace("{0}", f"{{{reset}}}"))

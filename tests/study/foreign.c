@@ -2,8 +2,8 @@
 
    y' = (a + 2 b + 3 c + gain u - y)/0.5; if fast is true, y is at once what it would become. mode: 1 fails at 1 s, 2 ends
    the process, 3 reads a null pointer, 4 does not return, 5 waits for a millisecond in each step, 6 refuses inputs and
-   7 tells nothing once y is positive, 8 cannot be initialized. The digit in the GUID selects what fmi2Reset
-   does: 0 resets, 1 does nothing and returns OK, 2 returns an error. */
+   7 tells nothing once y is positive, 8 cannot be initialized, 9 warns and goes on. The digit in the GUID selects what
+   fmi2Reset does: 0 resets, 1 does nothing and returns OK, 2 returns an error; with 3 there is no instance. */
 #ifdef _WIN32
 #include <windows.h>
 #define WAIT() Sleep(1)
@@ -33,6 +33,10 @@ static void begin(Instance *i) {
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *host, fmi2Boolean visible, fmi2Boolean logging) {
+    if (guid[1] == '3') {
+        host->logger(NULL, name, fmi2Error, "error", "no licence");
+        return NULL;
+    }
     Instance *i = calloc(1, sizeof *i);
     begin(i);
     i->host = host;
@@ -56,13 +60,13 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     const Instance *i = c;
     const double all[] = {i->a, i->b, i->c, i->u, i->y};
     for (size_t k = 0; k < n; k++) value[k] = all[vr[k]];
-    return i->mode == 7 && i->y > 0.0 ? fmi2Discard : fmi2OK;
+    return i->mode == 7 && i->y > 0.0 ? fmi2Discard : i->mode == 9 ? fmi2Warning : fmi2OK;
 }
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     Instance *i = c;
     double *all[] = {&i->a, &i->b, &i->c, &i->u, &i->y};
     for (size_t k = 0; k < n; k++) *all[vr[k]] = value[k];
-    return i->mode == 6 && i->y > 0.0 ? fmi2Discard : fmi2OK;
+    return i->mode == 6 && i->y > 0.0 ? fmi2Discard : i->mode == 9 ? fmi2Warning : fmi2OK;
 }
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
     const Instance *i = c;
@@ -90,12 +94,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
     if (i->mode == 5) WAIT();
     while (i->mode == 4) WAIT();
     if (i->mode == 1 && t >= 1.0 - 1e-9) {
-        i->host->logger(NULL, "foreign", fmi2Error, "error", "the pump is blocked");
+        i->host->logger(NULL, "foreign", fmi2Warning, "warning", "the pump is blocked");
+        i->host->logger(NULL, "foreign", fmi2OK, "info", "goodbye");
         return fmi2Error;
     }
     const double to = i->a + 2.0 * i->b + 3.0 * i->c + i->gain * i->u;
     i->y = i->fast ? to : to + (i->y - to) * exp(-h / 0.5);
-    return fmi2OK;
+    return i->mode == 9 ? fmi2Warning : fmi2OK;
 }
 
 /* Functions that an importer looks up and a study does not call. */

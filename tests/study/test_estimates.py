@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import redirect_stderr
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -112,18 +112,9 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
 # ---- Done ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Done:
-    """A study of an FMU, made by the command, with the vehicle file that holds the estimates."""
-
-    plan: Path
-    results: Results
-    lines: list[str]
-    """The lines that the command printed to stderr."""
-
-
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> Done:
+def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> tuple[Results, list[str]]:
+    """The results of a study of an FMU, made by the command, and the lines that it printed to stderr."""
     folder = tmp_path_factory.mktemp("estimates")
     write_vehicle(MADE, folder / "made.toml")
     plan = folder / "plan.toml"
@@ -141,33 +132,37 @@ same = "0*a_d_u"
 """)
     with redirect_stderr(StringIO()) as printed:
         assert main(["study", str(plan), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
-    return Done(plan, Results(folder / "results"), without_progress(printed.getvalue()).splitlines())
+    return Results(folder / "results"), without_progress(printed.getvalue()).splitlines()
 
 
 @pytest.mark.long
-def test_sobol_indices_are_those_of_groups_in_closed_form(done: Done) -> None:
+def test_sobol_indices_are_those_of_groups_in_closed_form(done: tuple[Results, list[str]]) -> None:
     """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
 
     If a_d_u and b_d_u were independent, they would have 0.60 of it.
     """
-    assert done.results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
+    results, _ = done
+    assert results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
     both = 0.5**2 + (2.0 * 0.3) ** 2 - 2.0 * 0.8 * 0.5 * (2.0 * 0.3)
     shares = np.array([both, 0.6**2, (4.0 * 0.05) ** 2])
     shares /= shares.sum()
-    found = done.results.sensitivity("mixed")
+    found = results.sensitivity("mixed")
     assert found.index.tolist() == ["a_d_u, b_d_u", "a_d_w", "m_rov"]
     for index in ("S1", "ST"):
         assert found[index].to_numpy() == pytest.approx(shares, abs=0.02)
     assert (abs(found.S1 - shares) <= found.S1_95).all()
     assert (found.S1_95 < 0.2).all()
     with pytest.raises(FileError, match="same is the same in all runs"):
-        done.results.sensitivity("same")
+        results.sensitivity("same")
 
 
-def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(done: Done) -> None:
-    page = html.fromstring((done.results.folder / "study.html").read_text(encoding="utf-8"))
+def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
+    done: tuple[Results, list[str]],
+) -> None:
+    results, lines = done
+    page = html.fromstring((results.folder / "study.html").read_text(encoding="utf-8"))
     items = [item.text_content() for item in page.xpath("//ul[@class='warnings']/li")]
-    warnings = done.results.warnings
+    warnings = results.warnings
     assert (
         warnings[0]
         == "the plan gives no input of the FMU (u_l, u_r, u_t, X_ext, Z_ext and 3 more): all keep their start values"
@@ -175,10 +170,10 @@ def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
     assert warnings[1].startswith("the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.")
     assert warnings[2:] == ("what is correlated has one Sobol index together: a_d_u and b_d_u",)
     assert items == [f"{sentence(warning)}." for warning in warnings]
-    assert done.lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
+    assert lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
     varied = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
     assert varied["b_d_u"] == "estimate: value 5, error 0.3; correlated with a_d_u"
     assert varied["m_rov"] == "normal: mean 6.572, sd 0.05"
-    index = done.results.sensitivity("mixed").loc["a_d_u, b_d_u"]
+    index = results.sensitivity("mixed").loc["a_d_u, b_d_u"]
     cells = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='a_d_u, b_d_u']/td")
     assert float(cells[1].text_content()) == pytest.approx(index.S1, abs=1e-3)

@@ -5,6 +5,7 @@ import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pandas as pd
@@ -15,7 +16,7 @@ from rov_fmu.cli import main
 from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.results.store import Store
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
 from tests.folders import beside
 
@@ -82,10 +83,24 @@ def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were
     progress: list[Progress] = []
     plan, address = _plan(tmp_path, videoray3_fmu), cluster.scheduler_address
     _close(study(plan, tmp_path / "results", scheduler=address, on_progress=progress.append), native)
-    assert [progress[0].done, progress[-1].done, progress[-1].total] == [0, RUNS, RUNS]
+    link = cluster.dashboard_link
+    assert [progress[0], progress[-1]] == [Progress(0, RUNS, 0, link), Progress(RUNS, RUNS, 0, link)]
     scheduler: Any = cluster.scheduler
     (worker,) = scheduler.workers.values()
     assert not [*Path(worker.local_directory).rglob("modelDescription.xml")]
+
+
+def test_a_study_of_a_vehicle_keeps_the_fmu_that_is_built_for_it(
+    tmp_path: Path, videoray_fmu: Path, native: Results, scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def built(vehicle: Vehicle, path: Path, platforms: list[str]) -> SimpleNamespace:
+        assert (vehicle.identifier, path.name, platforms) == ("videoray", "videoray.fmu", ["host"])
+        return SimpleNamespace(path=videoray_fmu)
+
+    monkeypatch.setattr("rov_fmu.study.run.run_study.build", built)
+    results = study(_plan(tmp_path, None), tmp_path / "results", scheduler=scheduler)
+    _close(results, native)
+    assert (results.folder / "videoray.fmu").read_bytes() == videoray_fmu.read_bytes()
 
 
 @pytest.mark.long

@@ -172,7 +172,7 @@ def test_variables_have_the_type_bounds_unit_and_start_of_the_description(
         "m_rov", mass.reference, "Real", "parameter", True, False, 1e-3, 1e6, "kg", 6.57, "Mass m_rov"
     )
     assert {name: v.start for name, v in has.items()} == {
-        **dict.fromkeys("abcuy", 0.0),
+        **dict.fromkeys([*"abcuy", "phi", "theta", "psi"], 0.0),
         "gain": 1.0,
         "mode": 0.0,
         "fast": 0.0,

@@ -5,6 +5,8 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,12 +20,15 @@ from distributed import LocalCluster
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError, StudyError
+from rov_fmu.io.output import WriteError
 from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.child import Child
+from rov_fmu.study.run.cluster import Spent
+from rov_fmu.study.run.run_study import run_study
 from tests.commands import start, without_progress
 from tests.folders import beside
 
@@ -68,11 +73,38 @@ def _same(one: Results, other: Results) -> None:
     pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), check_exact=True)
 
 
+@pytest.fixture
+def do(foreign: Foreign, tmp_path: Path, scheduler: str) -> Callable[..., Results]:
+    """A function that does the study of a foreign FMU (`_plan`) on the shared worker, in the folder `results`."""
+
+    def done(reset: int = 0, on_progress: Any = lambda _: None, **plan: Any) -> Results:
+        path = _plan(tmp_path, foreign(reset), **plan)
+        return study(path, tmp_path / "results", scheduler=scheduler, on_progress=on_progress)
+
+    return done
+
+
+def _processes(word: str) -> set[int]:
+    """The processes that this one has started, directly or not, whose command line has a word."""
+    found = set()
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):  # it has just ended
+            if any(word in part for part in process.cmdline()):
+                found.add(process.pid)
+    return found
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
-    """The results of one worker."""
-    folder = tmp_path_factory.mktemp("whole")
-    return study(_plan(folder, foreign()), folder / "results", workers=1)
+    """The results of one worker, which is a process."""
+    folder, others, started = tmp_path_factory.mktemp("whole"), _processes("spawn_main"), list[int]()
+
+    def count(_: Progress) -> None:
+        started.append(len(_processes("spawn_main") - others))
+
+    results = study(_plan(folder, foreign()), folder / "results", workers=1, on_progress=count)
+    assert {*started} == {1}
+    return results
 
 
 def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,36 +125,25 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pyte
     assert whole.trajectories([3, 5]).run.tolist() == [3] * 5 + [5] * 5
 
 
-@pytest.mark.long
-def test_runs_in_which_the_vehicle_turns_over_are_counted(
-    tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A moment of 60 N.m about the x axis is more than weight and buoyancy resist. No figure has an angle."""
-    plan = tmp_path / "plan.toml"
-    plan.write_text(
-        'vehicle = "bluerov2_heavy"\nstop_time = 5.0\nstep = 0.1\nsampler = "grid"\n'
-        '[vary]\nK_ext.values = [0.0, 1.0, 60.0]\n[figures]\nend = "z[-1]"\n',
-        encoding="utf-8",
-    )
-    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 0
-    told = "warning: in 1 of 3 runs the vehicle turned over: phi or theta passed 90 degrees"
-    assert capsys.readouterr().err.count(told) == 1
-
-
+@pytest.mark.parametrize("reset", [1, 2])
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
-    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str
+    reset: int, do: Callable[..., Results], whole: Results
 ) -> None:
     """A reset that does nothing leaves y as it was."""
-    _same(study(_plan(tmp_path, foreign(1)), tmp_path / "results", scheduler=scheduler), whole)
+    others = _processes("_serve")
+    _same(do(reset), whole)
+    assert _processes("_serve") <= others, "the processes of the FMU have ended"
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
-    foreign: Foreign, tmp_path: Path, scheduler: str
+    do: Callable[..., Results],
 ) -> None:
-    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1, 6, 7, 8]", more='bad = "1/(mode - mode)"')
     progress: list[Progress] = []
-    results = study(plan, tmp_path / "results", scheduler=scheduler, on_progress=progress.append)
-    failed, others = results.runs[results.runs["mode"] > 0], results.runs[results.runs["mode"] == 0]
+    modes = "mode.values = [0, 1, 6, 7, 8, 9]"
+    results = do(runs=30, vary=modes, more='bad = "1/(mode - mode)"', on_progress=progress.append)
+    warns = results.runs["mode"].isin([0, 9])
+    failed, others = results.runs[~warns], results.runs[warns]
+    assert {*others["mode"]} == {0, 9}, "an FMU that warns goes on"
     assert 0 < len(failed) < 30
     assert {*failed.status} == {"failed"}
     assert {*zip(failed["mode"], failed.reason, strict=True)} == {
@@ -132,7 +153,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
         (8, "initialization: error"),
     }
     assert failed[["end", "sooner"]].isna().all(axis=None)
-    table = pq.read_table(tmp_path / "results" / "runs")
+    table = pq.read_table(results.folder / "runs")
     assert [table[name].null_count for name in ("end", "bad")] == [len(failed), 30]
     assert {*others.status} == {"incomplete"}
     assert {*others.reason} == {"bad: ZeroDivisionError: division by zero"}
@@ -142,55 +163,45 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     assert [*results.failed.index, *results.incomplete.index] == [*failed.index, *others.index]
 
 
-def test_a_run_that_ends_its_process_fails_and_the_next_runs_tell_whether_the_vehicle_turned_over(
-    foreign: Foreign, tmp_path: Path
+@pytest.mark.parametrize(
+    ("mode", "reason"),
+    [
+        (2, "ended its process: SIGABRT"),
+        pytest.param(3, "ended its process: SIGSEGV", marks=[pytest.mark.long, posix]),
+        pytest.param(4, "did not return within time_limit = 5 s", marks=[pytest.mark.long, posix]),
+    ],
+)
+def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_tell_if_the_vehicle_turned_over(
+    mode: float, reason: str, foreign: Foreign, tmp_path: Path
 ) -> None:
-    """The output stands for an angle: with a = 2, it passes 90 degrees."""
-    plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]"), tmp_path / "unpacked"
+    """With a = 2 the roll passes 90 degrees. A run takes thousandths of a second."""
+    plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]", limit=5.0), tmp_path / "unpacked"
     job = prepare(load_plan(plan), plan, read_model(foreign())).job
     job.model.unpack(folder)
-    child = Child(str(folder), replace(job, angles=["y"], trials=np.zeros((1, 4))))
-    (failed,) = child.runs(np.array([[0.0, 0.0, 0.0, 2.0]]))
-    assert (failed.status, failed.reason, failed.turned) == ("failed", "the FMU ended its process: SIGABRT", False)
-    assert np.isnan(failed.figures).tolist() == [True, True]
-    runs = child.runs(np.array([[2.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]))
+    child = Child(str(folder), replace(job, trials=np.zeros((1, 4))))
+    runs = child.runs(np.array([[2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, mode], [1.0, 0.0, 0.0, 0.0]]))
     child.close()
-    assert [(run.status, run.reason, run.turned) for run in runs] == [("done", "", True), ("done", "", False)]
-
-
-LIMIT = 2.0
-"""The seconds that a run may take, which takes thousandths: a busy machine may stop a process for long."""
-HARMFUL = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
-    4: f"the FMU did not return within time_limit = {LIMIT:g} s"
-}
-
-
-@posix
-@pytest.mark.long
-def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(foreign: Foreign, tmp_path: Path) -> None:
-    """One of sixteen runs, on average, has each of the harmful modes."""
-    plan = _plan(tmp_path, foreign(), runs=64, vary=f"mode.values = {[0] * 13 + [*HARMFUL]}", limit=LIMIT)
-    runs = study(plan, tmp_path / "results", workers=2).runs
-    assert runs.index.tolist() == [*range(64)]
-    for mode, reason in HARMFUL.items():
-        of_mode = runs[runs["mode"] == mode]
-        assert len(of_mode) >= 2
-        assert {*of_mode.status} == {"failed"}
-        assert {*of_mode.reason} == {reason}
-    others = runs[runs["mode"] == 0]
-    assert {*others.status} == {"done"}
-    assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
+    assert [(run.status, run.reason, run.turned) for run in runs] == [
+        ("done", "", True),
+        ("failed", f"the FMU {reason}", False),
+        ("done", "", False),
+    ]
+    assert np.isnan(runs[1].figures).tolist() == [True, True]
 
 
 def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
-    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, capsys: pytest.CaptureFixture[str]
+    foreign: Foreign, tmp_path: Path, whole: Results, do: Callable[..., Results], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    results = tmp_path / "results"
-    study(_plan(tmp_path, foreign(), runs=16), results, scheduler=scheduler)
+    results = do(runs=24).folder
+    progress: list[Progress] = []
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
     for draft in ("trajectories/part-000000090-000000099.parquet", "runs/.part-000000090-000000099.parquet.abc.part"):
         (results / draft).write_bytes(b"of a process that was killed")
-    _same(study(_plan(tmp_path, foreign(), runs=40, limit=99.0), results, scheduler=scheduler), whole)
+    _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
+    assert [progress[0].done, progress[-1].done] == [24, 40]
+    assert run_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent(
+        0, 0, 0, 0.0, 0.0
+    )
     assert not [*results.glob("*/*part-000000090*")]
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
@@ -212,7 +223,7 @@ def test_a_folder_of_another_vehicle_or_without_its_description_is_refused(tmp_p
     with store.held():
         store.belongs_to({}, "1", "rov", 9)
         store.write(2, 4, b"", None)
-        assert store.missing(9) == [(0, 2), (4, 9)]
+        assert (store.missing(9), store.missing(4)) == ([(0, 2), (4, 9)], [(0, 2)])
         with pytest.raises(
             FileError, match="another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"
         ):
@@ -220,6 +231,12 @@ def test_a_folder_of_another_vehicle_or_without_its_description_is_refused(tmp_p
         (store.folder / "study.json").unlink()
         with pytest.raises(FileError, match=r"has runs, but study\.json, which describes them, is missing"):
             store.belongs_to({}, "1", "rov", 9)
+    for text in ("{", "[1]", '{"format": 0}', '{"format": 2}'):
+        (store.folder / "study.json").write_text(text)
+        with pytest.raises(FileError, match="or was written by another version of this tool"):
+            store.description()
+    (store.folder / "study.json").write_text('{"format": 1}')
+    assert store.description() == {"format": 1}
 
 
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
@@ -234,6 +251,10 @@ def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path,
         results.bands("y")
     with pytest.raises(FileError, match="there is no figure 'y', only end, sooner"):
         results.sensitivity("y")
+    with pytest.raises(FileError, match='Sobol indices need sampler = "saltelli" in the plan'):
+        results.sensitivity("end")
+    with pytest.raises(WriteError, match="Not a directory"):
+        study(plan, plan / "results", scheduler=scheduler)
 
 
 # ---- Interrupted and killed ------------------------------------------------------------------------------------------
@@ -309,14 +330,70 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
     _same(Results(results), slow)
 
 
-def test_a_scheduler_that_is_not_there_is_a_line(
-    foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_a_scheduler_that_is_not_there_or_has_no_workers_is_a_line(
+    foreign: Foreign, tmp_path: Path, cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 1.0)
-    plan, results, address = str(_plan(tmp_path, foreign())), str(tmp_path / "results"), "tcp://127.0.0.1:9"
-    assert main(["study", plan, "-o", results, "--scheduler", address]) == 2
-    assert capsys.readouterr().err == f"rov-fmu: --scheduler {address}: no scheduler of Dask answers there\n"
+    scheduler: Any = cluster.scheduler
+    (worker,) = scheduler.workers
+    with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as without:
+        for address, reason in {
+            "tcp://127.0.0.1:9": "no scheduler of Dask answers there",
+            worker: "no scheduler of Dask answers there",
+            without.scheduler_address: "it has no workers",
+        }.items():
+            with pytest.raises(FileError) as refused:
+                study(_plan(tmp_path, foreign()), tmp_path / "results", scheduler=address)
+            assert str(refused.value) == f"--scheduler {address}: {reason}"
     assert not (tmp_path / "results").exists()
+
+
+def _fail(error: Exception) -> Callable[..., None]:
+    """Return a function that raises an error."""
+
+    def fail(*_: Any, **__: Any) -> None:
+        raise error
+
+    return fail
+
+
+_VERSION = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
+
+
+@pytest.mark.parametrize(
+    ("patched", "error", "told"),
+    [
+        ("do_runs", ValueError("wrong"), StudyError("the workers are lost: wrong")),
+        ("do_runs", ValueError(), StudyError("the workers are lost: ValueError")),
+        ("do_runs", CancelledError(), StudyError("the connection to the scheduler is lost. Finished runs are kept")),
+        ("Client.submit", KeyError("ours"), KeyError("ours")),
+        ("Client.register_plugin", TypeError("old"), StudyError(f"{_VERSION}: old")),
+    ],
+)
+def test_what_goes_wrong_on_the_workers_is_a_line(
+    patched: str, error: Exception, told: Exception, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"rov_fmu.study.run.cluster.{patched}", _fail(error))
+    with pytest.raises(type(told)) as found:
+        do()
+    assert found.value.args == told.args
+
+
+def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
+    foreign: Foreign, tmp_path: Path, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(FileError) as refused:
+        do(3)
+    assert str(refused.value) == "foreign.fmu: cannot be run: Failed to instantiate model; the FMU: no licence"
+    needs = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
+    for patched, value, told in (
+        ("rov_fmu.study.run.cluster.LocalCluster", _fail(RuntimeError()), "the workers do not start"),
+        ("__main__.__file__", "gone.py", "workers cannot be started, because gone.py is not a file"),
+    ):
+        monkeypatch.setattr(patched, value, raising=False)
+        with pytest.raises(StudyError) as lost:
+            study(_plan(tmp_path, foreign()), tmp_path / "results")
+        assert str(lost.value) == f"{told}; {needs}"
 
 
 @pytest.mark.long

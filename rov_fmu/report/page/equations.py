@@ -259,15 +259,15 @@ _INDICES = ("t", "d", "a", "0", "V", "max", "u")
 def symbol_of(name: Name) -> Symbol:
     """Return the symbol of a name: a letter with the indices that its identifier has, as in m_a_u or alpha_u."""
     stem = name.identifier.removesuffix("±").removesuffix(REVERSE)
-    head, *rest = stem.split("_", 1)
+    head, _, rest = stem.partition("_")
     if name.kind:
         head, index, upper = name.kind, "_".join(name.owners).removeprefix("u_"), ""
     elif head == "delayed":
-        index, upper = rest[0].removeprefix("u_"), "d"
+        index, upper = rest.removeprefix("u_"), "d"
     else:
-        index, _, upper = rest[0].partition("_") if rest else ("", "", "")
+        index, _, upper = rest.partition("_")
         if upper and index not in _INDICES:
-            index, upper = rest[0], ""
+            index, upper = rest, ""
     mark = {"": "*" if head == "steady" else "", REVERSE: "−"}.get(name.identifier.removeprefix(stem), "±")
     return Symbol(_LETTERS.get(head, head), index, upper, mark)
 

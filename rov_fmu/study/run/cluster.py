@@ -123,7 +123,7 @@ class _Runs:
         """Do all missing runs."""
         self.done_before = self.design.runs - sum(end - first for first, end in self.missing)
         self._report()
-        coming = as_completed(loop=self.client.loop, raise_errors=False)
+        coming = as_completed(loop=self.client.loop)
         try:
             self._submit_tasks(coming)
             for future in coming:

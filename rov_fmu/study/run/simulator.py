@@ -93,9 +93,7 @@ class Simulator:
         try:
             self._run(values)
         except _FailedError as failed:
-            reason = str(failed)
-            if not self._logs:
-                reason = self._with_message(values) or reason
+            reason = self._with_message(values) or str(failed)
             self.renew()
             raise RunError(brief(reason, 240)) from failed
         return {name: group.table[:, n] for group in self._reads for n, name in enumerate(group.names)}
