@@ -7,10 +7,9 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.parameters import PLACED
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
-from rov_fmu.identify.result import Effect, Logging, Sensor
+from rov_fmu.identify.result import PLACED, Effect, Logging, Sensor
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""

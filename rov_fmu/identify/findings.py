@@ -12,10 +12,10 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
-from rov_fmu.identify.likelihood.parameters import PLACED
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
+    PLACED,
     Answer,
     AxisResult,
     Coefficient,
@@ -386,7 +386,7 @@ def driven_aside(identification: Identification) -> list[str]:
 def extrapolated(vehicle: Vehicle) -> list[str]:
     """Return a sentence if the tests had no full command, for which there is an answer, too."""
     low, high = vehicle.command_range
-    words = f"The tests had commands of {low:.0%} to {high:.0%}: the speed at {SHARES[-1]:.0%} is extrapolated."
+    words = f"The tests had commands of {low:.0%} to {high:.0%}, so the speed at {SHARES[-1]:.0%} is extrapolated."
     return [words] if SHARES[-1] > high else []
 
 

@@ -21,6 +21,8 @@ Word = Literal["good", "usable", "do not use"]
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
+PLACED = {True: "velocity sensor", False: "position sensor"}
+"""The sensors that may be beside the origin: those of velocities, and those of positions."""
 _UNUSUAL = 2.5
 """An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 

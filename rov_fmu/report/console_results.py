@@ -36,7 +36,7 @@ def print_identification(identification: Identification) -> None:
         paragraph(out, f"First: {words}")
     for result in identification.axes:
         paragraph(out, f"- {verdict_in_words(result)}")
-    asides = [*extrapolated(vehicle), *driven_aside(identification)]
+    asides = [*driven_aside(identification), *extrapolated(vehicle)]
     for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:
             out.print()

@@ -11,7 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.assess import answers, answers_of_file, unseen_current, verdict
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.result import Disturbance, Point, Slip
+from rov_fmu.identify.result import Disturbance, Effect, Point, Slip
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT
 from tests.report import results
@@ -19,6 +19,7 @@ from tests.vehicles import VIDEORAY
 
 DEPTH = results.prediction(HEAVE, "depth", span=10.0)
 WORSE = replace(DEPTH, error=0.8, unchanged=0.7)
+SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 FORCE = Disturbance("force", SURGE, "log.csv", 1.0, "N", 0.06, None, 9.0)
 
 
@@ -68,6 +69,8 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "do not use",
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
         ),
+        ({"effects": [SLOW]}, "usable", "The time constant of the thrusters is unusual."),
+        ({"effects": [replace(SLOW, beyond=2.4)]}, "good", ""),
         ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
         ({"difference": 40.0}, "good", ""),
     ],

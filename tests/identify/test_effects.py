@@ -1,23 +1,31 @@
-"""What is told of a fit: its effects, loggers and sensors in their units, and how far its predictions may be off."""
+"""What is told of a fit: its effects, loggers and sensors, the errors of its predictions, and effects found in logs."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import log
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
-from rov_fmu.equation.catalogue import CURVE, HEAVE
+from rov_fmu.c.simulation import simulate
+from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE
 from rov_fmu.identify import beginning
 from rov_fmu.identify.assess import ahead, cautious
+from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.identified_vehicle import identified_vehicle
+from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.result import Identification, Interval
+from tests.folders import ARM, HEAD, MASS, TURNS, folder_of
+from tests.vehicles import VIDEORAY
 
 ERROR = 0.004
 HALF = t.ppf(0.975, 10) * ERROR
-FOUND = {"lag": 0.2, "dead time": 0.1, "dead band": 0.05, "drag astern": log(1.3), "load": 0.03}
+FOUND = {"lag": 0.2, "dead time": 0.1, "dead band": 0.05, "advance": 0.1, "drag astern": log(1.3), "load": 0.03}
 """The coordinates of effects that are clear with this standard error."""
 
 
@@ -68,12 +76,13 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     assert [numbers[name].began for name in ("T_top", "c_0_top")] == ["0.05 ± 0.15 s", "0 ± 0.05"]
     assert numbers["T_top"].narrowed == pytest.approx(ERROR / 0.15)
     assert (vehicle.command_range, vehicle.measured_from) == ((0.2, 0.8), "tank tests")
-    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "T"]
+    assert vehicle["d_top"] == pytest.approx(0.1 * (vehicle["a_t_top"] + vehicle["b_t_top"]))
+    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "d", "T"]
     assert [[*curve.keys] for curve in vehicle.layout.curves] == [[key for key in CURVE if key in keys]] * 2
 
 
 def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: beginning.Tests) -> None:
-    bare = dict.fromkeys(("dead_time", "dead_band", "drag_astern", "load"), 0.0)
+    bare = dict.fromkeys(("dead_time", "dead_band", "advance", "drag_astern", "load"), 0.0)
     plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, lag=0.02, **bare))
     assert [[*curve.keys] for curve in plain.layout.curves] == [["a_t", "b_t", "a_t_reverse", "b_t_reverse"]] * 2
     assert [form.keys for form in plain.layout.axes] == [("a_d", "b_d")] * 2
@@ -86,6 +95,7 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
         ("time constant of the thrusters", ""): (0.2, 0.2 - HALF, 0.2 + HALF, "s"),
         ("dead time of the commands", ""): (0.1, 0.1 - HALF, 0.1 + HALF, "s"),
         ("dead band", "top"): (0.05, 0.04, 0.06, "1"),
+        ("share of the full thrust lost per speed of advance", "top"): (0.1, 0.1 - HALF, 0.1 + HALF, "s/m"),
         ("drag astern relative to drag ahead", "heave"): (1.3, 1.3 * np.exp(-HALF), 1.3 * np.exp(HALF), "1"),
         ("constant load", "heave"): (0.03 * full, (0.03 - HALF) * full, (0.03 + HALF) * full, "N"),
     }
@@ -95,6 +105,11 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
         assert (one.value, *one.interval) == pytest.approx((value, low, high)), key
         assert (one.unit, one.kept) == (unit, True)
     assert told["constant load", "yaw"].unit == "N.m"
+    assert told["dead band", "top"].beyond == pytest.approx(1.0), "a deviation of 0.05"
+    assert not told["time constant of the thrusters", ""].is_unusual
+    (late,) = (one for one in effects_of(found(fit, dead_time=0.13)) if one.kind == "dead time")
+    assert late.is_unusual
+    assert late.beyond == pytest.approx(2.6)
 
 
 @pytest.mark.parametrize(("dead_time", "offset", "half"), [(0.1, -0.05, HALF), (ERROR, -0.046, np.sqrt(2.0) * HALF)])
@@ -139,3 +154,84 @@ def test_a_prediction_is_as_uncertain_as_its_parameters(fit: Fit) -> None:
     quiet, loud = (np.where(np.arange(len(z)) == gain, log(size), z) for size in (0.01, 0.05))
     assert np.exp(cautious(objective, quiet)[gain]) == pytest.approx(0.03)
     assert cautious(objective, loud).tolist() == loud.tolist()
+
+
+# ---- Effects that no table of tank tests shows, in logs whose equations are written out here ----
+
+THRUST = "".join(
+    f'{key} = {{ value = {value}, unit = "N", source = "bollard pull" }}\n'
+    for key, value in (("a_t_rear", 78.0), ("b_t_rear", 0.0))
+)
+HELD = (0.0, 0.3, 0.0, 0.6, 0.0, -0.4, 0.7, 0.0, -0.7, 0.5, 0.0, -0.3, 0.0, 0.8, 0.2)
+"""Commands, each for 4 s."""
+
+
+def contains(interval: Interval | None, truth: float) -> bool:
+    return bool(interval and interval[0] <= truth <= interval[1])
+
+
+def identified(folder: Path, rov: str, columns: Mapping[str, np.ndarray], name: str) -> Identification:
+    rows = (",".join(f"{value:.6g}" for value in row) for row in zip(*columns.values(), strict=True))
+    return identify(load_tests(folder_of(folder, rov, {name: "\n".join([",".join(columns), *rows])})))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lost", [12.0, 0.0])
+def test_thrust_that_falls_with_the_speed_is_found(lost: float, tmp_path: Path) -> None:
+    """The thrust at rest is exact, 78 c |c| N. Of it, d |c| v is lost; the way to stop has no thrust."""
+    h, speeds, v = 0.001, [], 0.0
+    commands = np.repeat(HELD, round(4.0 / h))
+    for c in commands.tolist():
+        speeds.append(v)
+        v += h * (78.0 * c * abs(c) - lost * abs(c) * v - 38.0 * abs(v) * v - 9.0 * v) / 31.0
+    measured = np.array(speeds) + 0.01 * np.random.default_rng(1).standard_normal(len(speeds))
+    time = h * np.arange(len(commands))
+    columns = {"time [s]": time, "command [1]": commands, "velocity [m/s]": measured}
+    mass = 'm_rov = { value = 20.0, unit = "kg", source = "scale" }\n'
+    every = {title: values[::100] for title, values in columns.items()}
+    result = identified(tmp_path, f"{HEAD}[known]\n{mass}{THRUST}", every, "log_surge.csv")
+    (surge,) = result.axes
+    truth = {"a_d_u": 38.0, "b_d_u": 9.0, "beta_u": 20.0 / 31.0}
+    assert [one.name for one in surge.known if contains(one.interval, truth[one.name])] == [*truth]
+    kept = {effect.kind: effect for effect in result.effects if effect.kept}
+    assert ("advance" in kept) == ("d_rear" in result.vehicle.coefficients) == (lost > 0.0)
+    if lost:
+        assert contains(kept["advance"].interval, lost / 78.0)
+        assert contains(result.vehicle.intervals["d_rear"], lost)
+    for answer in surge.answers:
+        c = abs(answer.command)
+        V = 2.0 * 78.0 * c**2 / (9.0 + lost * c + np.hypot(9.0 + lost * c, np.sqrt(4.0 * 38.0 * 78.0) * c))
+        way = 31.0 / 38.0 * np.log((38.0 * V + 9.0) / (3.8 * V + 9.0))
+        assert contains(answer.stop[1], way), answer
+        assert contains(answer.steady[1], np.copysign(V, answer.command)), answer
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("aside", [0.3, 0.0])
+def test_a_velocity_sensor_beside_the_origin_is_found(aside: float, tmp_path: Path) -> None:
+    """A sensor to starboard measures u - r y."""
+    random, step = np.random.default_rng(2), 0.1
+    rov = VIDEORAY
+    commands = {name: np.repeat(random.uniform(-0.5, 0.5, 30), 30) for name in ("u_l", "u_r")}
+    time = step * np.arange(900.0)
+    motion = simulate(rov, time, commands).values[:, 0]
+    u, r = (motion[[*rov.layout.state].index(name)] for name in "ur")
+    noise = 0.005 * random.standard_normal((2, len(time)))
+    columns = {
+        "time [s]": time,
+        **{f"{name} [1]": values for name, values in commands.items()},
+        "surge velocity [m/s]": u - aside * r + noise[0],
+        "yaw velocity [rad/s]": r + noise[1],
+    }
+    thrust = "".join(
+        f'{key} = {{ value = {rov[key]}, unit = "N", source = "bollard pull" }}\n' for key in ("a_t_rear", "b_t_rear")
+    )
+    result = identified(tmp_path, f"{HEAD}[known]\n{MASS}{TURNS}{ARM}{thrust}", columns, "dive.csv")
+    kept = {effect.name: effect for effect in result.effects if effect.kept}
+    assert ("place of the velocity sensor to starboard" in kept) == (aside > 0.0)
+    if aside:
+        assert contains(kept["place of the velocity sensor to starboard"].interval, aside)
+    surge = next(one for one in result.axes if one.axis is SURGE)
+    for answer in surge.answers:
+        V, _ = rov.response(SURGE, answer.command)
+        assert contains(answer.steady[1], V), answer

@@ -98,6 +98,7 @@ BETA = Coefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5"
 DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
 DRIFTING = prediction(YAW, "heading", error=0.9)
 OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
+SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
 
 CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
@@ -127,6 +128,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         disturbance(axis=YAW, size=0.21, unit="N.m"),
         "yaw: an unknown slow torque of 0.21 N.m (RMS), 16% of the torque, acts in log_3.csv from 41 s on. Check",
         disturbance(evidence=5.0),
+    ),
+    (
+        "unusual effect",
+        quiet(effects=(SLOW,)),
+        "the time constant of the thrusters of 0.60 s (0.50 to 0.70) is unusual. Something else may act in its place",
+        quiet(effects=(replace(SLOW, beyond=2.4),)),
     ),
     ("change of thrust", disturbance("gain", since=None), "the thrust changes slowly by 12% (RMS) in log_3", quiet()),
     (

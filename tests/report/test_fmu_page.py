@@ -5,6 +5,7 @@ import hashlib
 import json
 import re
 import zlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 from lxml import html
 
+from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.templates import number
@@ -146,6 +148,21 @@ def test_the_page_of_each_kind_of_fmu_claims_what_that_does(vehicle: Vehicle, pa
 @pytest.fixture(scope="module")
 def heavy_page(heavy: Vehicle) -> str:
     return page_without_plots(replace(heavy, intervals={"a_d_u": (130.5, 151.5)}))
+
+
+@pytest.mark.parametrize("content_of", [native_content, python_content])
+def test_nothing_of_the_videoray_stands_in_the_fmu_of_another_vehicle(
+    vehicle: Vehicle, heavy: Vehicle, heavy_page: str, content_of: Callable[..., Content]
+) -> None:
+    """Neither its name nor its pictures nor what was found of it alone."""
+    assert vehicle.pictures
+    own = {path.read_bytes() for path in vehicle.pictures.iterdir()}
+    for name, content in content_of(heavy, {"documentation/index.html": heavy_page.encode()}).files.items():
+        assert content not in own, name
+        if not name.endswith((".png", ".so", ".dll")):
+            text = content.decode("utf-8").lower()
+            for claim in ("videoray", "#f6b90c", *(limit.lower() for limit in vehicle.limits)):
+                assert claim not in text, (name, claim)
 
 
 def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_page: str) -> None:

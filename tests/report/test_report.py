@@ -151,7 +151,7 @@ def test_ten_questions_of_an_owner_are_answered_before_anything_is_unfolded(monk
         "can I trust surge": "Surge: good",
         "from which data": "2 logs with 120 s in total (log_1.csv, log_2.csv), 3 forces, 9 points, commands of 20 %",
         "when was it identified": "Identification from two dive logs · 2026-11-23",
-        "may I use full power": "The tests had commands of 20 % to 70 %: the speed at 100 % is extrapolated.",
+        "may I use full power": "The tests had commands of 20 % to 70 %, so the speed at 100 % is extrapolated.",
         "what is wrong with log_2": "it disagrees with the other log. Check the depth: is it in cm?",
         "what to do first": "First: Repair log_2.csv or take it out of the folder",
         "what to measure next": "hold 0.6 for 8 s, then −0.6 for 8 s. V_ss at 50 %, now ±60 %, becomes ±30 %.",

@@ -17,6 +17,7 @@ from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.identify.result import PLACED
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,6 @@ _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
 CURRENT = ("to the north", "to the east")
 """The parts of a current."""
-PLACED = {True: "velocity sensor", False: "position sensor"}
-"""The sensors that may be beside the origin: those of velocities, and those of positions."""
 _PLACES = ("forward", "to starboard", "down")
 """The parts of the place of a sensor."""
 USUAL_EXPONENT = 1.5
