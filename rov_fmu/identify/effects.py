@@ -40,7 +40,7 @@ _WORDS = {
     "reverse thrust": "thrust astern relative to thrust ahead",
     "dead band": "dead band",
     "dead band astern": "dead band astern relative to dead band ahead",
-    "advance": "share of the full thrust lost per speed of advance",
+    "advance": "loss of thrust with the speed of advance, relative to full thrust",
     "lag": "time constant of the thrusters",
     "dead time": "dead time of the commands",
     "drag astern": "drag astern relative to drag ahead",

@@ -95,7 +95,12 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
         ("time constant of the thrusters", ""): (0.2, 0.2 - HALF, 0.2 + HALF, "s"),
         ("dead time of the commands", ""): (0.1, 0.1 - HALF, 0.1 + HALF, "s"),
         ("dead band", "top"): (0.05, 0.04, 0.06, "1"),
-        ("share of the full thrust lost per speed of advance", "top"): (0.1, 0.1 - HALF, 0.1 + HALF, "s/m"),
+        ("loss of thrust with the speed of advance, relative to full thrust", "top"): (
+            0.1,
+            0.1 - HALF,
+            0.1 + HALF,
+            "s/m",
+        ),
         ("drag astern relative to drag ahead", "heave"): (1.3, 1.3 * np.exp(-HALF), 1.3 * np.exp(HALF), "1"),
         ("constant load", "heave"): (0.03 * full, (0.03 - HALF) * full, (0.03 + HALF) * full, "N"),
     }
