@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 import rov_fmu
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
-from rov_fmu.bridges.sitl_frames import servos_of
+from rov_fmu.bridges.sitl_frames import FRAMES, servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
@@ -373,6 +373,8 @@ def test_the_motors_of_the_heavy_push_as_ardusub_means_them_to() -> None:
 
 
 def test_frames_and_tables() -> None:
+    motors = {name: len(FRAMES[name]) for name in ("simplerov_3", "simplerov_4", "simplerov_5", "bluerov1", "vectored")}
+    assert motors == {"simplerov_3": 3, "simplerov_4": 4, "simplerov_5": 5, "bluerov1": 6, "vectored": 6}
     videoray = load_vehicle(SHIPPED["videoray"]).layout
     assert servos_of(videoray, None, {}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (3, 1.0)}
     assert servos_of(videoray, "simplerov_3", {5: "-t"}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (5, -1.0)}

@@ -2,6 +2,7 @@
 
 import random
 from ctypes import c_bool, c_int, pointer
+from itertools import pairwise
 from math import cos, pi, sin
 
 import pytest
@@ -97,6 +98,19 @@ def test_a_quaternion_is_set_by_solvers_and_in_events_only(fmu: Fmu) -> None:
             is_taken = mode == CONTINUOUS or (mode == EVENT and fmu.VERSION == 3)
             rov.set({"eta": 0.5}, OK if is_taken or mode == INSTANTIATED else ERROR)
             assert rov.get(["eta"]) == [0.5 if is_taken else 1.0], mode
+
+
+def test_steps_count_the_turns(fmu: Fmu) -> None:
+    """A torque turns the vehicle several times, by less than half a turn in each step; psi never falls."""
+    with fmu.instance() as rov:
+        rov.start({"N_ext": 5.0})
+        headings = [0.0]
+        for n in range(60):
+            rov.step(0.5 * n, 0.5)
+            headings += rov.get(["psi"])
+    turns = [after - before for before, after in pairwise(headings)]
+    assert 0.0 < min(turns) < max(turns) < pi
+    assert headings[-1] > 4.0 * pi
 
 
 # ---- Model Exchange ----
