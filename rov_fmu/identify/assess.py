@@ -325,10 +325,11 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     known = vehicle.uncertainty
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     rovs = [vehicle, *(vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
+    rests = [NO_SHAPES.motion(rov, axis, 0.0) for rov in rovs]
     found = []
     for command in ANSWERED:
-        motions = ([NO_SHAPES.motion(rov, axis, c) for c in (command, 0.0)] for rov in rovs)
-        values = np.array([_response(pushed, rest) for pushed, rest in motions])
+        pushed = (NO_SHAPES.motion(rov, axis, command) for rov in rovs)
+        values = np.array([_response(one, rest) for one, rest in zip(pushed, rests, strict=True)])
         low, high = np.quantile(values[1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=0).tolist()
         if not known.names:
             low = high = values[0].tolist()

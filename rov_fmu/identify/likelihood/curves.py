@@ -109,7 +109,7 @@ def measured_time_constant(motion: AxisAlone, load: float, T: float) -> float:
     infinite if V_ss is not reached.
     """
     Tau, goal = motion.time_constant(), RISE * motion.steady_velocity()
-    if T <= 0.0 or not isfinite(Tau):
+    if not isfinite(Tau):
         return Tau
     h, v = (Tau + T) / 50.0, 0.0
 

@@ -74,13 +74,12 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
             forces.setdefault(row.subject, []).append(n)
             continue
         motion = shapes.motion(vehicle, row.subject, row.command)
-        if row.quantity == "V_ss":
-            found[n] = motion.steady_velocity()
-        else:
-            curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(row.subject)}
-            T = max((vehicle[curve.coefficient("T")] for curve in curves if curve.has_lag), default=least_lag)
+        found[n] = motion.steady_velocity() if row.quantity == "V_ss" else motion.time_constant()
+        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(row.subject)}
+        lag = max((vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag), default=0.0)
+        if row.quantity == "Tau" and lag > 0.0:
             load = shapes.motion(vehicle, row.subject, 0.0).C
-            found[n] = measured_time_constant(motion, load, T - least_lag)
+            found[n] = measured_time_constant(motion, load, lag)
     for curve, places in forces.items():
         found[places] = shapes.forces(vehicle, curve, np.array([rows[n].command for n in places]))
     return found

@@ -1,11 +1,16 @@
 """The shape of thrust curves: how a command is warped, its prior, and the quadratic curve that a vehicle file has."""
 
+from math import exp
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, nearest
+from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VIDEORAY
@@ -91,3 +96,25 @@ def test_a_shape_is_fitted_where_it_was_tested() -> None:
     assert error(found) < 0.05 < error({})
     for name, value in found.items():
         assert error({**found, name: 1.01 * value}) > error(found) < error({**found, name: 0.99 * value})
+
+
+@pytest.mark.parametrize("command", [0.5, -0.5])
+def test_a_measured_time_constant_contains_the_lag(command: float) -> None:
+    """SciPy integrates w and the thrust from rest, beside a load, until 63 % of V_ss."""
+    T, M = 0.4, VIDEORAY["m_rov"] / VIDEORAY["beta_w"]
+    k = VIDEORAY.extended({"T_top": T, "F_0_w": 0.1})
+
+    def rates(_: float, x: np.ndarray) -> list[float]:
+        w, F = x
+        steady = (k["a_t_top"] * abs(command) + k["b_t_top"]) * command
+        drag = (k["a_d_w"] * abs(w) + k["b_d_w"]) * w
+        return [(k["alpha_w"] * F + 0.1 - drag) / M, (steady - F) / T]
+
+    def reached(_: float, x: np.ndarray) -> float:
+        return float(abs(x[0]) - (1.0 - exp(-1.0)) * abs(k.response(HEAVE, command)[0]))
+
+    reached.terminal = True  # type: ignore[attr-defined]
+    (time,) = solve_ivp(rates, (0.0, 60.0), [0.0, 0.0], "DOP853", events=reached, rtol=1e-10, atol=1e-12).t_events[0]
+    row = TableRow("heave", HEAVE, "Tau", command, 1.0, 1.0)
+    assert modelled([row], k, NO_SHAPES) == pytest.approx(time, rel=1e-5)
+    assert modelled([row], k, NO_SHAPES, least_lag=T) == pytest.approx(k.response(HEAVE, command)[1])
