@@ -126,6 +126,7 @@ def _text(proof: Proof) -> str:
     return " ".join(" ".join(root.xpath("//body//text()")).split())
 
 
+@pytest.mark.long
 def test_the_page_answers_ten_questions(proof: Proof, identified: Path, tmp_path: Path) -> None:
     """Of an FMU that must not be used for yaw it says so. That is no promise of the FMU, so nothing fails."""
     path, vehicle_file = tmp_path / "harbour.fmu", f"{FOLDER}/vehicle/harbour_bluerov2.toml"
