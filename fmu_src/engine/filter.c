@@ -629,9 +629,9 @@ static bool turns(const filter *f, int state)
 static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real H[N_X])
 {
     const int kind = f->log->kind[sensor], place = f->log->place[sensor];
-    const bool is_rate = kind == STATE && !locates(f, sensor, 0) && !locates(f, sensor, 1) && !locates(f, sensor, 2);
+    const bool ignores_attitude = kind == STATE && !locates(f, sensor, 0) && !locates(f, sensor, 1) && !locates(f, sensor, 2);
     real y[N_X], R[3][3], base = 0.0;
-    if (!is_rate) {
+    if (!ignores_attitude) {
         memcpy(y, x, sizeof y);
         rotation(f, x, R);
         base = measured(f, x, sensor);
@@ -643,7 +643,7 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
             H[c] += 1.0;
         } else if (j < N_AXES && f->where->turn[j] >= 0) {
             H[c] += arm(f, sensor, j);
-        } else if (turns(f, j) && !is_rate) {
+        } else if (turns(f, j) && !ignores_attitude) {
             y[j] = x[j] + 1e-6;
             H[c] = remainder(measured(f, y, sensor) - base, TURN) / 1e-6;
             y[j] = x[j];

@@ -185,12 +185,15 @@ class Table:
             found[name] = self.get(z, kind, axis.name, default=found[name])
             astern = f"{key}{REVERSE}"
             if (reverse := axis.coefficient(astern)) in self.layout.coefficients:
-                ratio = self.base[reverse] / self.base[name] if self.base[name] else 1.0
-                found[reverse] = found[name] * ratio * exp(self.get(z, "drag astern", axis.name))
+                found[reverse] = found[name] * self._ratio(reverse, name) * exp(self.get(z, "drag astern", axis.name))
         beta = axis.coefficient("beta")
         found[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
         if (load := form.coefficient("F_0")) in self.layout.coefficients:
             found[load] = self.base[load] + self.full.get(axis.name, 0.0) * self.get(z, "load", axis.name)
+
+    def _ratio(self, astern: str, ahead: str) -> float:
+        """Return a coefficient astern of the base relative to that ahead; 1 if that ahead is 0."""
+        return self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
 
     def _curve(self, found: dict[str, float], z: Sequence[float], curve: Curve) -> None:
         scale = self.get(z, "thrust scale", curve.name, default=1.0)
@@ -209,14 +212,13 @@ class Table:
             band, other = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
             found[band] = self.get(z, "dead band", curve.name, default=found[band])
             if other != band:
-                ratio = self.base[other] / self.base[band] if self.base[band] else 1.0
-                found[other] = found[band] * ratio * exp(self.get(z, "dead band astern", curve.name))
+                found[other] = found[band] * self._ratio(other, band) * exp(self.get(z, "dead band astern", curve.name))
         if "d" in curve.keys and not curve.tables:
             lost = self.get(z, "advance", curve.name, default=_lost(curve, self.base))
-            names = [curve.coefficient(key) for key in ("d", f"d{REVERSE}")]
-            ratio = self.base[names[1]] / self.base[names[0]] if self.base[names[0]] else 1.0
             full = found[curve.coefficient("a_t")] + found[curve.coefficient("b_t")]
-            found |= {names[1]: ratio * lost * full, names[0]: lost * full}
+            ahead = curve.coefficient("d")
+            for name in (ahead, curve.coefficient(f"d{REVERSE}")):
+                found[name] = self._ratio(name, ahead) * lost * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)
