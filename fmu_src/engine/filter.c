@@ -5,8 +5,9 @@
  *     x' = f(x, exp(g) thrust, force)      the states of the vehicle
  *     force_i, g, drift_i                  a slow force along each axis, a slow change of all thrust, and a slow velocity over ground:
  *                                          Ornstein-Uhlenbeck processes, each with a size and a time constant
- *     y = h(x, drift) + n + e              a sample: n is the sensor's coloured noise, also such a process, and e is white; h knows
- *                                          the place of the sensor
+ *     v = h(x, drift)                      what a sensor would measure at once; h knows its place
+ *     s' = (v - s) / lag                   what it measures without noise; s = v for a sensor without lag
+ *     y = s + n + e                        a sample: n is the sensor's coloured noise, also such a process, and e is white
  *
  * A change of the commands happens at an unknown time within a window. The mean uses the expected command, and the state `lateness`
  * has the deviation of the integral of the command from its mean. The mean takes fourth-order Runge-Kutta steps; the covariance
@@ -41,7 +42,8 @@ enum {
     N_AXES = N_MONITORED,
     N_DRIFTS = 3,
     MOST_SENSORS = 16,
-    FORCE = N_STATES, /* the places of the states after those of the vehicle */
+    LAGGED = N_STATES, /* the places of the states after those of the vehicle: first what each sensor with a lag measures */
+    FORCE = LAGGED + MOST_SENSORS,
     GAIN = FORCE + N_AXES,
     DRIFT = GAIN + 1,
     NOISE = DRIFT + N_DRIFTS,
@@ -90,6 +92,7 @@ typedef struct {
     real at[N_VARIABLES];                   /* the coefficients, and the inputs besides the commands */
     real size[N_SLOW], time_constant[N_SLOW]; /* of the slow processes */
     real white[MOST_SENSORS];               /* the standard deviation of each sensor's white noise */
+    real lag[MOST_SENSORS];                 /* the time constant of each sensor, s */
     real lever[MOST_SENSORS][N_DRIFTS];     /* the place of each sensor of velocity or position: ahead, to starboard, down, m */
     real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
     real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
@@ -142,7 +145,7 @@ static inline real flushed(real value)
     return fabs(value) < TINY ? 0.0 : value;
 }
 
-/* ---- The mean ----------------------------------------------------------------------------------------------------- */
+/* ---- The sensors -------------------------------------------------------------------------------------------------- */
 
 /* Compute the rotation matrix from the body to the earth. */
 static void rotation(const filter *f, const real x[N_X], real R[3][3])
@@ -211,6 +214,123 @@ static real current(const filter *f, int axis)
     }
     return found;
 }
+
+/* Return the direction of the velocity that a sensor measures: 0 ahead, 1 to starboard, 2 down; -1 for any other sensor. */
+static int direction_of(const filter *f, ptrdiff_t sensor)
+{
+    const int place = f->log->place[sensor], axis = place - FIRST_STATE;
+    if (f->log->kind[sensor] == OVER_GROUND) {
+        return place;
+    }
+    return f->log->kind[sensor] == STATE && axis < N_AXES ? f->where->direction[axis] : -1;
+}
+
+/* Return the velocity at the place of a sensor, relative to the origin, for a turn of 1 rad/s. */
+static real arm(const filter *f, ptrdiff_t sensor, int axis)
+{
+    const int about = f->where->turn[axis], along = direction_of(f, sensor), across = 3 - about - along;
+    real found = 0.0;
+    if (about >= 0 && along >= 0 && about != along) {
+        found = across == (about + 1) % 3 ? f->set->lever[sensor][across] : -f->set->lever[sensor][across];
+    }
+    return found;
+}
+
+/* Return true for a sensor of the position along an axis of the earth. */
+static bool locates(const filter *f, ptrdiff_t sensor, int axis)
+{
+    return f->log->kind[sensor] == STATE && f->log->place[sensor] == f->where->position[axis];
+}
+
+/* Return what a sensor measures more than it would at the origin. */
+static real beside_origin(const filter *f, const real x[N_X], ptrdiff_t sensor)
+{
+    real R[3][3], found = 0.0;
+    for (int i = 0; i < N_AXES; i++) {
+        found += arm(f, sensor, i) * x[i];
+    }
+    for (int axis = 0; axis < N_DRIFTS; axis++) {
+        if (locates(f, sensor, axis)) {
+            rotation(f, x, R);
+            for (int i = 0; i < N_DRIFTS; i++) {
+                found += R[axis][i] * f->set->lever[sensor][i];
+            }
+        }
+    }
+    return found;
+}
+
+/* Return true for a sensor that has a lag. */
+static bool lags(const filter *f, ptrdiff_t sensor)
+{
+    return f->log->active[LAGGED + sensor] != 0;
+}
+
+/* Return what a sensor would measure at once, without noise. */
+static real at_once(const filter *f, const real x[N_X], ptrdiff_t sensor)
+{
+    const int place = f->log->place[sensor];
+    real R[3][3], value;
+    if (f->log->kind[sensor] == STATE) {
+        return x[place - FIRST_STATE] + beside_origin(f, x, sensor);
+    }
+    rotation(f, x, R);
+    if (f->log->kind[sensor] == ANGLE) { /* the place is 0 for roll, 1 for pitch, 2 for the heading */
+        if (place == 1) {
+            return -asin(fmax(fmin(R[2][0], 1.0), -1.0));
+        }
+        return place == 0 ? atan2(R[2][1], R[2][2]) : atan2(R[1][0], R[0][0]);
+    }
+    value = beside_origin(f, x, sensor); /* the place is the number of the direction: ahead, to starboard, down */
+    for (int i = 0; i < N_DRIFTS; i++) {
+        value += R[i][place] * (x[DRIFT + i] + current(f, i));
+    }
+    for (int i = 0; i < N_AXES; i++) {
+        if (f->where->direction[i] == place) {
+            value += x[i];
+        }
+    }
+    return value;
+}
+
+/* Return true for a state that the attitude depends on. */
+static bool turns(const filter *f, int state)
+{
+    const int quaternion = f->where->quaternion - FIRST_STATE;
+    return f->where->quaternion >= 0 ? state >= quaternion && state < quaternion + 4 : state + FIRST_STATE == f->where->heading;
+}
+
+/* Compute the derivatives of what a sensor would measure at once with respect to the listed states. */
+static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real H[N_X])
+{
+    const int kind = f->log->kind[sensor], place = f->log->place[sensor];
+    const bool ignores_attitude = kind == STATE && !locates(f, sensor, 0) && !locates(f, sensor, 1) && !locates(f, sensor, 2);
+    real y[N_X], R[3][3], base = 0.0;
+    if (!ignores_attitude) {
+        memcpy(y, x, sizeof y);
+        rotation(f, x, R);
+        base = at_once(f, x, sensor);
+    }
+    for (int c = 0; c < f->count; c++) {
+        const int j = f->listed[c];
+        H[c] = 0.0;
+        if (kind == STATE && j == place - FIRST_STATE) {
+            H[c] = 1.0;
+        } else if (j < N_AXES && f->where->turn[j] >= 0) {
+            H[c] = arm(f, sensor, j);
+        } else if (turns(f, j) && !ignores_attitude) {
+            y[j] = x[j] + 1e-6;
+            H[c] = remainder(at_once(f, y, sensor) - base, TURN) / 1e-6;
+            y[j] = x[j];
+        } else if (kind == OVER_GROUND && j < N_AXES) {
+            H[c] = f->where->direction[j] == place ? 1.0 : 0.0;
+        } else if (kind == OVER_GROUND && j >= DRIFT && j < NOISE) {
+            H[c] = R[j - DRIFT][place];
+        }
+    }
+}
+
+/* ---- The mean ----------------------------------------------------------------------------------------------------- */
 
 /* Return the velocity of the vehicle over ground along an axis of the earth, with its row of the rotation matrix. */
 static real over_ground(const filter *f, const real x[N_X], const real row[3], int axis)
@@ -323,12 +443,39 @@ static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, 
     }
 }
 
+/* How what a sensor with a lag measures follows from what it would measure at once, which is linear in time over a span of h: it is
+ * `remains` of what it was, and shares of the values at the beginning and at the end. A lag of 0 gives the value at the end. */
+typedef struct {
+    real remains, begin, end;
+} lagging;
+
+static lagging lagging_over(const filter *f, ptrdiff_t sensor, double h)
+{
+    const real lag = fmax(f->set->lag[sensor], TINY), remains = exp(-h / lag), share = (1.0 - remains) * lag / h;
+    return (lagging){remains, share - remains, 1.0 - share};
+}
+
+/* Move what the sensors with a lag measure over a step, of which the states at its beginning, middle and end are known. */
+static void step_lagged(const filter *f, const real before[N_X], const real middle[N_X], double h, real x[N_X])
+{
+    for (int sensor = 0; sensor < f->log->sensors; sensor++) {
+        if (lags(f, sensor)) {
+            const lagging part = lagging_over(f, sensor, 0.5 * h);
+            const real half = at_once(f, middle, sensor);
+            real *const value = &x[LAGGED + sensor];
+            *value = part.remains * *value + part.begin * at_once(f, before, sensor) + part.end * half;
+            *value = flushed(part.remains * *value + part.begin * half + part.end * at_once(f, x, sensor));
+        }
+    }
+}
+
 /* Take one Runge-Kutta step, and compute the states in its middle. */
 static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], double h, const real remains[N_SLOW],
                       real middle[N_X])
 {
-    real k[4][N_STATES], y[N_X];
+    real k[4][N_STATES], y[N_X], before[N_X];
     model_held q;
+    memcpy(before, x, sizeof before);
     scale_thrust(x, held, &q);
     memcpy(y, x, sizeof y);
     for (int stage = 0; stage < 4; stage++) {
@@ -347,6 +494,7 @@ static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], dou
     for (int i = 0; i < N_SLOW; i++) {
         x[FORCE + i] = flushed(x[FORCE + i] * remains[i]);
     }
+    step_lagged(f, before, middle, h, x);
     x[LATENESS] = 0.0;
 }
 
@@ -354,8 +502,8 @@ static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], dou
 
 /* The entries other than 0 of a matrix, row by row. A column is the place of a listed state. */
 typedef struct {
-    int count[N_STATES], column[N_STATES][N_X];
-    real entry[N_STATES][N_X];
+    int count[FORCE], column[FORCE][N_X];
+    real entry[FORCE][N_X];
 } sparse;
 
 /* Compute the derivatives of the rates of the vehicle's states with respect to the listed states. */
@@ -370,7 +518,10 @@ static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], 
     for (int c = 0; c < f->count && f->listed[c] < NOISE; c++) {
         const int j = f->listed[c];
         real change = 1e-3;
-        if (j < FORCE) {
+        if (j >= LAGGED && j < FORCE) {
+            continue; /* the vehicle does not know what is measured */
+        }
+        if (j < LAGGED) {
             change = 1e-6 * (1.0 + fabs(x[j]));
         }
         y[j] = x[j] + change;
@@ -391,20 +542,32 @@ static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], 
     }
 }
 
-/* Return how many of the listed states are those of the vehicle. They stand first. */
-static int vehicle_count(const filter *f)
+/* Return how many of the listed states stand before a place. Those of the vehicle stand first, and then those of the sensors. */
+static int count_before(const filter *f, int place)
 {
     int found = 0;
-    while (found < f->count && f->listed[found] < N_STATES) {
+    while (found < f->count && f->listed[found] < place) {
         found++;
     }
     return found;
 }
 
-/* Compute the listed rows of 1 + h A + h^2 A^2 / 2. */
+/* Keep a row of a matrix. */
+static void keep(const filter *f, const real row[N_X], int a, sparse *phi)
+{
+    phi->count[a] = 0;
+    for (int b = 0; b < f->count; b++) {
+        if (ANY(row[b] != 0.0)) {
+            phi->column[a][phi->count[a]] = b;
+            phi->entry[a][phi->count[a]++] = row[b];
+        }
+    }
+}
+
+/* Compute the listed rows of 1 + h A + h^2 A^2 / 2 for the vehicle. */
 static void transition(const filter *f, const sparse *A, double h, sparse *phi)
 {
-    const int vehicle = vehicle_count(f);
+    const int vehicle = count_before(f, LAGGED);
     for (int a = 0; a < vehicle; a++) {
         const int i = f->listed[a];
         real row[N_X];
@@ -421,23 +584,46 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
             }
         }
         row[a] += 1.0;
-        phi->count[a] = 0;
-        for (int b = 0; b < f->count; b++) {
-            if (ANY(row[b] != 0.0)) {
-                phi->column[a][phi->count[a]] = b;
-                phi->entry[a][phi->count[a]++] = row[b];
+        keep(f, row, a, phi);
+    }
+}
+
+/* Compute the rows of the sensors with a lag, which follow from the rows of the vehicle, and how much of the value at the end of the
+ * step each of them takes. */
+static void transition_lagged(const filter *f, const real middle[N_X], double h, const real remains[N_SLOW], sparse *phi,
+                              lagging part[MOST_SENSORS], real slope[MOST_SENSORS][N_X])
+{
+    const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
+    for (int a = vehicle; a < moving; a++) {
+        const int sensor = f->listed[a] - LAGGED;
+        real *const H = slope[sensor], row[N_X];
+        part[sensor] = lagging_over(f, sensor, h);
+        gradient(f, middle, sensor, H);
+        memset(row, 0, sizeof row);
+        row[a] = part[sensor].remains;
+        for (int c = 0; c < f->count; c++) {
+            row[c] += part[sensor].begin * H[c];
+            if (c >= moving && f->listed[c] != LATENESS) {
+                row[c] += part[sensor].end * H[c] * remains[f->listed[c] - FORCE];
+            }
+            if (c >= vehicle) {
+                continue;
+            }
+            for (int l = 0; l < phi->count[c]; l++) {
+                row[phi->column[c][l]] += part[sensor].end * H[c] * phi->entry[c][l];
             }
         }
+        keep(f, row, a, phi);
     }
 }
 
 /* Move the covariance over one step. `late` is the change of each rate by the growth of the lateness; `remains` is how much of each
  * slow process remains. */
-static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi, const real late[N_STATES], const real remains[N_SLOW])
+static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi, const real late[FORCE], const real remains[N_SLOW])
 {
-    const int n = f->count, last = n - 1, vehicle = vehicle_count(f);
-    real moved[N_STATES][N_X];
-    for (int a = 0; a < vehicle; a++) {
+    const int n = f->count, last = n - 1, moving = count_before(f, FORCE);
+    real moved[FORCE][N_X];
+    for (int a = 0; a < moving; a++) {
         for (int b = 0; b < n; b++) {
             moved[a][b] = late[f->listed[a]] * P[last][b];
         }
@@ -447,7 +633,7 @@ static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi
             }
         }
     }
-    for (int a = 0; a < vehicle; a++) {
+    for (int a = 0; a < moving; a++) {
         for (int b = 0; b <= a; b++) {
             real sum = moved[a][last] * late[f->listed[b]];
             for (int c = 0; c < phi->count[b]; c++) {
@@ -457,13 +643,13 @@ static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi
         }
         P[a][last] = P[last][a] = flushed(moved[a][last]);
     }
-    for (int a = vehicle; a < last; a++) {
+    for (int a = moving; a < last; a++) {
         const int slow = f->listed[a] - FORCE;
         const real size = f->set->size[slow];
-        for (int b = 0; b < vehicle; b++) {
+        for (int b = 0; b < moving; b++) {
             P[a][b] = P[b][a] = flushed(remains[slow] * moved[b][a]);
         }
-        for (int b = vehicle; b < a; b++) {
+        for (int b = moving; b < a; b++) {
             P[a][b] = P[b][a] = flushed(remains[slow] * remains[f->listed[b] - FORCE] * P[a][b]);
         }
         P[a][last] = P[last][a] = flushed(remains[slow] * P[a][last]);
@@ -487,16 +673,19 @@ static void reset_lateness(const filter *f, real P[N_X][N_X], mask begins_anew)
 static void advance(filter *f, belief *b, double from, double to, int pieces, bool has_covariance)
 {
     const double h = (to - from) / pieces;
+    const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     ptrdiff_t row = f->row;
     real reset = f->reset, remains[N_SLOW];
+    lagging part[MOST_SENSORS];
+    real slope[MOST_SENSORS][N_X];
     sparse A, phi;
     memset(remains, 0, sizeof remains);
-    for (int a = vehicle_count(f); a < f->count - 1; a++) {
+    for (int a = moving; a < f->count - 1; a++) {
         remains[f->listed[a] - FORCE] = exp(-h / f->set->time_constant[f->listed[a] - FORCE]);
     }
     for (int piece = 0; piece < pieces; piece++) {
         const double begin = from + piece * h, end = begin + h;
-        real held[N_HELD], middle[N_X], late[N_STATES];
+        real held[N_HELD], middle[N_X], late[FORCE];
         while (row + 1 < f->log->rows && ALL(ends(f, row + 1) <= begin)) {
             row++;
         }
@@ -509,6 +698,7 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         if (piece % 4 == 0) { /* the derivatives of the rates change slowly */
             slopes(f, middle, held, &A);
             transition(f, &A, h, &phi);
+            transition_lagged(f, middle, h, remains, &phi, part, slope);
         }
         memset(late, 0, sizeof late);
         for (ptrdiff_t j = row + 1; j < f->log->rows && ANY(begins(f, j) < end); j++) {
@@ -530,6 +720,12 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
                 }
             }
         }
+        for (int a = vehicle; a < moving; a++) {
+            const int sensor = f->listed[a] - LAGGED;
+            for (int c = 0; c < vehicle; c++) {
+                late[f->listed[a]] += part[sensor].end * slope[sensor][c] * late[f->listed[c]];
+            }
+        }
         step_covariance(f, b->P, &phi, late, remains);
     }
 }
@@ -546,120 +742,12 @@ static void pass_rows(filter *f, double time)
     }
 }
 
-/* Return the direction of the velocity that a sensor measures: 0 ahead, 1 to starboard, 2 down; -1 for any other sensor. */
-static int direction_of(const filter *f, ptrdiff_t sensor)
-{
-    const int place = f->log->place[sensor], axis = place - FIRST_STATE;
-    if (f->log->kind[sensor] == OVER_GROUND) {
-        return place;
-    }
-    return f->log->kind[sensor] == STATE && axis < N_AXES ? f->where->direction[axis] : -1;
-}
-
-/* Return the velocity at the place of a sensor, relative to the origin, for a turn of 1 rad/s. */
-static real arm(const filter *f, ptrdiff_t sensor, int axis)
-{
-    const int about = f->where->turn[axis], along = direction_of(f, sensor), across = 3 - about - along;
-    real found = 0.0;
-    if (about >= 0 && along >= 0 && about != along) {
-        found = across == (about + 1) % 3 ? f->set->lever[sensor][across] : -f->set->lever[sensor][across];
-    }
-    return found;
-}
-
-/* Return true for a sensor of the position along an axis of the earth. */
-static bool locates(const filter *f, ptrdiff_t sensor, int axis)
-{
-    return f->log->kind[sensor] == STATE && f->log->place[sensor] == f->where->position[axis];
-}
-
-/* Return what a sensor measures more than it would at the origin. */
-static real beside_origin(const filter *f, const real x[N_X], ptrdiff_t sensor)
-{
-    real R[3][3], found = 0.0;
-    for (int i = 0; i < N_AXES; i++) {
-        found += arm(f, sensor, i) * x[i];
-    }
-    for (int axis = 0; axis < N_DRIFTS; axis++) {
-        if (locates(f, sensor, axis)) {
-            rotation(f, x, R);
-            for (int i = 0; i < N_DRIFTS; i++) {
-                found += R[axis][i] * f->set->lever[sensor][i];
-            }
-        }
-    }
-    return found;
-}
-
-/* Return what a sensor measures without noise. */
-static real measured(const filter *f, const real x[N_X], ptrdiff_t sensor)
-{
-    const int place = f->log->place[sensor];
-    real R[3][3], value;
-    if (f->log->kind[sensor] == STATE) {
-        return x[place - FIRST_STATE] + beside_origin(f, x, sensor);
-    }
-    rotation(f, x, R);
-    if (f->log->kind[sensor] == ANGLE) { /* the place is 0 for roll, 1 for pitch, 2 for the heading */
-        if (place == 1) {
-            return -asin(fmax(fmin(R[2][0], 1.0), -1.0));
-        }
-        return place == 0 ? atan2(R[2][1], R[2][2]) : atan2(R[1][0], R[0][0]);
-    }
-    value = beside_origin(f, x, sensor); /* the place is the number of the direction: ahead, to starboard, down */
-    for (int i = 0; i < N_DRIFTS; i++) {
-        value += R[i][place] * (x[DRIFT + i] + current(f, i));
-    }
-    for (int i = 0; i < N_AXES; i++) {
-        if (f->where->direction[i] == place) {
-            value += x[i];
-        }
-    }
-    return value;
-}
-
-/* Return true for a state that the attitude depends on. */
-static bool turns(const filter *f, int state)
-{
-    const int quaternion = f->where->quaternion - FIRST_STATE;
-    return f->where->quaternion >= 0 ? state >= quaternion && state < quaternion + 4 : state + FIRST_STATE == f->where->heading;
-}
-
-/* Compute the derivatives of what a sensor measures with respect to the listed states. */
-static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real H[N_X])
-{
-    const int kind = f->log->kind[sensor], place = f->log->place[sensor];
-    const bool ignores_attitude = kind == STATE && !locates(f, sensor, 0) && !locates(f, sensor, 1) && !locates(f, sensor, 2);
-    real y[N_X], R[3][3], base = 0.0;
-    if (!ignores_attitude) {
-        memcpy(y, x, sizeof y);
-        rotation(f, x, R);
-        base = measured(f, x, sensor);
-    }
-    for (int c = 0; c < f->count; c++) {
-        const int j = f->listed[c];
-        H[c] = j == NOISE + sensor ? 1.0 : 0.0;
-        if (kind == STATE && j == place - FIRST_STATE) {
-            H[c] += 1.0;
-        } else if (j < N_AXES && f->where->turn[j] >= 0) {
-            H[c] += arm(f, sensor, j);
-        } else if (turns(f, j) && !ignores_attitude) {
-            y[j] = x[j] + 1e-6;
-            H[c] = remainder(measured(f, y, sensor) - base, TURN) / 1e-6;
-            y[j] = x[j];
-        } else if (kind == OVER_GROUND && j < N_AXES) {
-            H[c] = f->where->direction[j] == place ? 1.0 : 0.0;
-        } else if (kind == OVER_GROUND && j >= DRIFT && j < NOISE) {
-            H[c] = R[j - DRIFT][place];
-        }
-    }
-}
-
 /* Return the innovation of a sample. Angles are compared within half a turn. */
 static real innovation(const filter *f, const belief *b, ptrdiff_t k)
 {
     const int sensor = f->log->sensor[k];
-    const real off = f->log->value[k] - measured(f, b->x, sensor) - b->x[NOISE + sensor];
+    const real value = lags(f, sensor) ? b->x[LAGGED + sensor] : at_once(f, b->x, sensor);
+    const real off = f->log->value[k] - value - b->x[NOISE + sensor];
     const bool wraps = f->log->kind[sensor] == ANGLE || f->log->place[sensor] == f->where->heading;
     if (wraps && f->log->kind[sensor] != OVER_GROUND) {
         return remainder(off, TURN);
@@ -672,7 +760,15 @@ static real project(const filter *f, const belief *b, ptrdiff_t sensor, real PH[
 {
     const real white = f->set->white[sensor];
     real H[N_X], variance = white * white;
-    gradient(f, b->x, sensor, H);
+    memset(H, 0, sizeof H);
+    if (!lags(f, sensor)) {
+        gradient(f, b->x, sensor, H);
+    }
+    for (int c = 0; c < f->count; c++) {
+        if (f->listed[c] == LAGGED + sensor || f->listed[c] == NOISE + sensor) {
+            H[c] = 1.0;
+        }
+    }
     memset(PH, 0, N_X * sizeof PH[0]);
     for (int c = 0; c < f->count; c++) {
         if (ANY(H[c] != 0.0)) {
@@ -751,6 +847,33 @@ static int pieces_over(const filter *f, double from, double to)
 }
 #endif
 
+/* Let what the sensors with a lag measure begin at what they would measure at once. It differs from it by the lag times a rate, whose
+ * standard deviation the log knows. */
+static void begin_lagged(filter *f)
+{
+    const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
+    belief *const b = &f->now;
+    for (int a = vehicle; a < moving; a++) {
+        const int sensor = f->listed[a] - LAGGED;
+        const real off = f->set->lag[sensor] * f->log->error[LAGGED + sensor];
+        real H[N_X], variance = off * off;
+        b->x[LAGGED + sensor] = at_once(f, b->x, sensor);
+        gradient(f, b->x, sensor, H);
+        b->P[a][a] = 0.0;
+        for (int d = 0; d < f->count; d++) {
+            real sum = 0.0;
+            for (int c = 0; c < f->count; c++) {
+                sum += H[c] * b->P[c][d];
+            }
+            if (d != a) {
+                b->P[a][d] = b->P[d][a] = sum;
+                variance += H[d] * sum;
+            }
+        }
+        b->P[a][a] = variance;
+    }
+}
+
 /* Begin a run: take the sets of parameters of all lanes, and compute the thrust of each row. */
 static void begin_run(filter *f, const parameter_set sets[LANES])
 {
@@ -784,6 +907,7 @@ static void begin_run(filter *f, const parameter_set sets[LANES])
     }
     pass_rows(f, log->time[0]);
     set_tilt(f, log->time[0]);
+    begin_lagged(f);
     f->ahead = f->now;
 }
 

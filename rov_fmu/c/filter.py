@@ -28,6 +28,8 @@ STATE, OVER_GROUND, ANGLE = range(3)
 """What a sensor measures: a state, a velocity over ground along an axis of the body, or an angle of the attitude."""
 DRIFTS = ("x", "y", "z")
 MOST_SENSORS = 16
+_USUAL_RATE = {False: 0.1, True: 0.3}
+"""The standard deviation of the rate of what a sensor measures when a log begins: of translations and of rotations."""
 AT_ORIGIN = (0.0, 0.0, 0.0)
 """The place of a sensor at the origin."""
 _CURRENT = ("V_N", "V_E", "V_D")
@@ -94,6 +96,8 @@ class Parameters:
     """The coloured noise of each sensor."""
     levers: tuple[tuple[float, ...], ...] = ()
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
+    lags: tuple[float | None, ...] = ()
+    """The time constant of each sensor, s; None for one that measures at once. Empty: all do."""
     offset: float = 0.0
     """How much later than its row a command acts, s."""
     width: float = 0.0
@@ -170,7 +174,7 @@ class Filter:
         self._records: dict[tuple[Record, tuple[bool, ...]], tuple[_Record, list[object]]] = {}
         self._where = np.array(_where(layout, self._places), np.intc)
         self.vehicle_states = [*layout.state]
-        first = len(self.vehicle_states)
+        first = len(self.vehicle_states) + MOST_SENSORS  # after what the sensors with a lag measure
         self.force, self.gain, self.drift = first, first + axes, first + axes + 1
         self.noise = self.drift + len(DRIFTS)
         """The places of the slow processes among the states of the filter."""
@@ -260,17 +264,21 @@ class Filter:
         levers = np.zeros((MOST_SENSORS, len(DRIFTS)))
         levers[: len(parameters.levers)] = parameters.levers or AT_ORIGIN
         sizes, constants = [one.size for one in slow], [one.time_constant for one in slow]
+        lags = np.zeros(MOST_SENSORS)
+        lags[: len(parameters.lags)] = [lag or 0.0 for lag in parameters.lags]
         units = np.ones(self.states)
-        names = [*self.vehicle_states, *(form.axis.name for form in self.layout.axes)]
-        units[: len(names)] = [parameters.units.get(name, 1.0) for name in names]
+        axes = [form.axis.name for form in self.layout.axes]
+        for first, names in ((0, self.vehicle_states), (self.force, axes)):
+            units[first : first + len(names)] = [parameters.units.get(name, 1.0) for name in names]
         return np.concatenate(
-            [at, sizes, constants, white, levers.ravel(), units, [parameters.offset, parameters.width]]
+            [at, sizes, constants, white, lags, levers.ravel(), units, [parameters.offset, parameters.width]]
         )
 
     def _record(self, record: Record, parameters: Parameters) -> _Record:
         """Return the struct `record`, which is made once for each log and set of states with a covariance."""
         slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise]
-        acting = tuple(one.size > 0.0 for one in slow)
+        lagging = [lag is not None for lag in parameters.lags] or [False] * len(record.sensors)
+        acting = (*lagging, *(one.size > 0.0 for one in slow))
         found = self._records.get((record, acting))
         if found is None:  # another thread may have made it meanwhile, and its arrays must stay alive
             found = self._records.setdefault((record, acting), self._arrays(record, acting))
@@ -285,8 +293,11 @@ class Filter:
         for n, name in enumerate(self.vehicle_states):
             start[n], error[n] = record.start.get(name, 0.0), record.errors.get(name, 0.0)
             active[n] = name in record.errors
-        active[self.force : self.force + len(acting)] = acting
+        sensors, lagged = len(record.sensors), len(self.vehicle_states)
+        active[lagged : lagged + sensors] = acting[:sensors]
+        active[self.force : self.force + len(acting) - sensors] = acting[sensors:]
         active[-1] = 1
+        error[lagged : lagged + sensors] = [_USUAL_RATE[sensor.axis.is_rotation] for sensor in record.sensors]
         arrays: list[Array | Indices] = [
             *(np.ascontiguousarray(array, np.float64) for array in (record.time - first, record.value)),
             np.ascontiguousarray(record.sensor, np.intc),

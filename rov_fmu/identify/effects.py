@@ -47,6 +47,7 @@ _WORDS = {
     "load": "constant load",
     "current": "current",
     **{kind: f"place of the {kind}" for kind in PLACED.values()},
+    "sensor lag": "time constant",
     "voltage": "exponent of thrust over voltage",
 }
 

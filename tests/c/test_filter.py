@@ -88,11 +88,15 @@ def with_all(k: Vehicle) -> Parameters:
 
 @dataclass(frozen=True)
 class Diver:
-    """The heave of one axis with everything that is slow, by hand: w, z, F, force, gain, drift, and two noises."""
+    """The heave of one axis with everything that is slow, by hand.
+
+    The states are w, z, F, force, gain, drift, two noises, and what sensors of depth and velocity with a lag show.
+    """
 
     k: Vehicle
     switches: Array
     commands: Array
+    lags: Array
 
     def rates(self, time: float, x: Array) -> Array:
         k, (w, _, F, force, gain, drift, *_) = self.k, x.tolist()
@@ -101,20 +105,31 @@ class Diver:
         drag = (k["a_d_w"] * abs(w) + k["b_d_w"]) * w
         load = k["alpha_w"] * F + k["F_0_w"] + force - drag
         moved = [load * k["beta_w"] / k["m_rov"], w + drift, (steady - F) / k["T_top"]]
-        return np.concatenate([moved, -x[3:] / TIME_CONSTANTS])
+        true = np.array([x[1], w + drift])
+        return np.concatenate([moved, -x[3:8] / TIME_CONSTANTS, (true - x[8:]) / self.lags])
 
 
-def textbook(k: Vehicle, log: Record) -> tuple[Array, Array]:
-    """Return the innovations and variances of a log of depth and velocity by the textbook filter."""
+def textbook(k: Vehicle, log: Record, lags: Sequence[float] = ()) -> tuple[Array, Array]:
+    """Return the innovations and variances of a log of depth and velocity by the textbook filter.
+
+    A sensor with a lag begins at the true value, up to the lag times a rate of 0.1.
+    """
     measure: list[Callable[[Array], float]] = [lambda x: float(x[1] + x[6]), lambda x: float(x[0] + x[5] + x[7])]
-    mean = np.array([*log.start.values(), *np.zeros(5)])
-    belief = Belief(float(log.time[0]), mean, np.diag(np.square([*log.errors.values(), *SIZES])))
+    if lags:
+        measure = [lambda x: float(x[8] + x[6]), lambda x: float(x[9] + x[7])]
+    shown = np.eye(10)
+    shown[8:] = 0.0
+    shown[8, 1] = shown[9, 0] = shown[9, 5] = 1.0
+    mean = shown @ [*log.start.values(), *np.zeros(7)]
+    P = shown @ np.diag(np.square([*log.errors.values(), *SIZES, 0.0, 0.0])) @ shown.T
+    P[8:, 8:] += np.diag(np.square(0.1 * np.array(lags or (0.0, 0.0))))
+    belief = Belief(float(log.time[0]), mean, P)
     samples = [
         Sample(t, y, measure[n], WHITE[n])
         for t, y, n in zip(log.time.tolist(), log.value.tolist(), log.sensor.tolist(), strict=True)
     ]
-    diver = Diver(k, log.told, log.inputs[:, 0])
-    diffusion = np.diag([0.0, 0.0, 0.0, *(2.0 * SIZES**2 / TIME_CONSTANTS)])
+    diver = Diver(k, log.told, log.inputs[:, 0], np.array(lags or (1.0, 1.0)))
+    diffusion = np.diag([0.0, 0.0, 0.0, *(2.0 * SIZES**2 / TIME_CONSTANTS), 0.0, 0.0])
     return run(belief, samples, diver.rates, diffusion, log.told.tolist())
 
 
@@ -125,23 +140,35 @@ def sampled(seed: int = 0, seconds: float = 6.0) -> list[tuple[float, int]]:
     return [(0.2 * n, 0) for n in range(round(5 * seconds))] + [(t, 1) for t in irregular.tolist() if t < seconds]
 
 
-def measured(k: Vehicle, log: Record, seed: int = 1) -> Record:
+def measured(k: Vehicle, log: Record, seed: int = 1, lags: tuple[float, ...] = ()) -> Record:
     """Return the log with values near those of the model."""
-    off = Filter(k).run(log, parameters(k, 2), begin=0.0).innovations
+    off = Filter(k).run(log, parameters(k, 2, lags=lags), begin=0.0).innovations
     random = np.random.default_rng(seed)
     noise = np.array(WHITE)[log.sensor] * random.standard_normal(len(log.time))
     return replace(log, value=log.value - off + noise)
 
 
+@pytest.mark.parametrize("lags", [(), (0.3, 0.5)])
 @pytest.mark.parametrize(("longest", "near"), [(0.1, 0.01), pytest.param(0.00025, 2e-4, marks=pytest.mark.long)])
-def test_innovations_and_variances_are_those_of_a_textbook(longest: float, near: float) -> None:
+def test_innovations_and_variances_are_those_of_a_textbook(
+    longest: float, near: float, lags: tuple[float, ...]
+) -> None:
     """The errors of the filter are of first order in its step, and below 1 % with the usual one of 0.1 s."""
-    log = measured(LAGGING, record((DEPTH, VELOCITY), sampled()))
-    found = Filter(LAGGING, longest).run(log, with_all(LAGGING))
-    off, variances = textbook(LAGGING, log)
+    log = measured(LAGGING, record((DEPTH, VELOCITY), sampled()), lags=lags)
+    found = Filter(LAGGING, longest).run(log, replace(with_all(LAGGING), lags=lags))
+    off, variances = textbook(LAGGING, log, lags)
     assert 1.0 < np.abs(off / np.sqrt(variances)).max() < 3.0, "outliers count less than in a textbook"
     assert found.variances == pytest.approx(variances, rel=near)
     assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < near
+
+
+def test_a_lag_of_zero_is_none() -> None:
+    """The slow velocity over ground, which goes on to change during a step, makes a small difference."""
+    log, known = measured(LAGGING, record((DEPTH, VELOCITY), sampled())), with_all(LAGGING)
+    fine = Filter(LAGGING, 0.002)
+    at_once, shown = fine.run(log, known), fine.run(log, replace(known, lags=(0.0, 0.0)))
+    assert shown.variances == pytest.approx(at_once.variances, rel=5e-4)
+    assert np.abs((shown.innovations - at_once.innovations) / np.sqrt(at_once.variances)).max() < 1e-3
 
 
 PROBES = (Sensor(YAW, is_velocity=False), Sensor(SURGE, is_velocity=True), Sensor(SURGE, is_velocity=False))

@@ -211,6 +211,36 @@ def test_thrust_that_falls_with_the_speed_is_found(lost: float, tmp_path: Path) 
         assert contains(answer.steady[1], np.copysign(V, answer.command)), answer
 
 
+@pytest.mark.parametrize("lag", [0.6, pytest.param(0.0, marks=pytest.mark.long)])
+def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Path) -> None:
+    """A depth of 31 w' = 78 c |c| - 38 |w| w - 9 w is measured through a filter of the first order."""
+    h, w, z, shown, depths = 0.005, 0.0, 5.0, 5.0, []
+    commands = np.repeat(HELD, round(4.0 / h))
+    for c in commands.tolist():
+        depths.append(shown)
+        shown += (1.0 - np.exp(-h / lag)) * (z - shown) if lag else z - shown
+        z += h * w
+        w += h * (78.0 * c * abs(c) - 38.0 * abs(w) * w - 9.0 * w) / 31.0
+    measured = np.array(depths) + 0.005 * np.random.default_rng(3).standard_normal(len(depths))
+    columns = {"time [s]": h * np.arange(len(commands)), "command [1]": commands, "depth [m]": measured}
+    mass = 'm_rov = { value = 20.0, unit = "kg", source = "scale" }\n'
+    every = {title: values[::20] for title, values in columns.items()}
+    thrust = THRUST.replace("rear", "top")
+    result = identified(tmp_path, f"{HEAD}[known]\n{mass}{thrust}", every, "log_heave.csv")
+    (heave,) = result.axes
+    truth = {"a_d_w": 38.0, "b_d_w": 9.0, "beta_w": 20.0 / 31.0}
+    assert [one.name for one in heave.known if contains(one.interval, truth[one.name])] == [*truth]
+    kept = {effect.kind: effect for effect in result.effects if effect.kept}
+    assert "lag" not in kept
+    assert ("sensor lag" in kept) == (lag > 0.0)
+    if lag:
+        assert kept["sensor lag"].name == "time constant of the depth sensor"
+        assert contains(kept["sensor lag"].interval, lag)
+        beta = next(one for one in heave.known if one.name == "beta_w")
+        assert beta.interval
+        assert beta.interval[1] / beta.interval[0] < 1.05
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("aside", [0.3, 0.0])
 def test_a_velocity_sensor_beside_the_origin_is_found(aside: float, tmp_path: Path) -> None:

@@ -45,6 +45,9 @@ PRIORS = {
     "drag_astern": Prior(0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
     "load": Prior(0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
     "current": Prior(0.1, "the current, m/s", "tests are made in calm water"),
+    "sensor_lag": Prior(
+        0.3, "the time constant of a sensor, s", "sensors and navigation filters smooth over 0 to 0.5 s"
+    ),
     "sensor_place": Prior(0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"),
     "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
     "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
@@ -132,6 +135,15 @@ class Parameter:
 def has_place(sensor: Sensor) -> bool:
     """Return True for a sensor of a velocity or a horizontal position. Its place changes what it measures of a turn."""
     return not sensor.axis.is_rotation and (sensor.is_velocity or sensor.axis is not HEAVE)
+
+
+def _kind_of(sensor: Sensor) -> str:
+    """Return whose lag a sensor has, in words. An angle is measured at once, so its sensor has none: it is empty."""
+    if sensor.axis.is_rotation:
+        return "of the turn rate sensor" if sensor.is_velocity else ""
+    if sensor.is_velocity:
+        return "of the velocity sensor"
+    return "of the depth sensor" if sensor.axis is HEAVE else "of the position sensor"
 
 
 _noise = partial(Parameter, is_log=True, of_motion=False)
@@ -278,11 +290,17 @@ class Table:
             drifts=(along, along, down if is_inside else Slow()),
             white=tuple(white),
             noise=tuple(noise),
+            lags=tuple(self._lag(z, m.sensor) for m in one.measured),
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
             offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
             width=self.get(z, "logging width", file),
             inputs=self.shapes(z).inputs(layout, one.record.inputs),
         )
+
+    def _lag(self, z: Sequence[float], sensor: Sensor) -> float | None:
+        """Return the lag of a sensor; None if it has none."""
+        place = self.place("sensor lag", "", _kind_of(sensor))
+        return None if place is None else float(z[place])
 
 
 @dataclass(frozen=True)
@@ -337,6 +355,9 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         if prior("voltage") and any("n_V" in c.keys for c in known.curves):
             yield Parameter("voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=0.0, high=4.0, null=0.0)
         yield from _of_sensors(logs, prior("sensor_place"))
+        if prior("sensor_lag"):
+            for of in sorted({_kind_of(s) for one in logs for s in one.record.sensors} - {""}):
+                yield Parameter("sensor lag", "", of, deviation=prior("sensor_lag"), low=0.0, null=0.0, unit="s")
     yield from (p for p in found if p.deviation > 0.0)
     for number, one in enumerate(logs):
         yield from _of_one_log(one, number, prior)

@@ -116,6 +116,7 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     z = objective.mean.copy()
     z[kinds.index("slow gain")] = np.log(0.2)
     z[kinds.index("slow force")] = np.log(0.02)
+    z[kinds.index("sensor lag")] = 0.1
     check_gradient(objective, z)
 
 

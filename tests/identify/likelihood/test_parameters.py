@@ -37,6 +37,8 @@ PRIORS = """
 lag: 0.05 ± 0.15, 0.02 to inf, absent at 0.02
 dead time: 0 ± 0.05, 0 to inf, absent at 0
 voltage: 1.5 ± 0.5, 0 to 4, absent at 0
+sensor lag of the depth sensor: 0 ± 0.3, 0 to inf, absent at 0
+sensor lag of the position sensor: 0 ± 0.3, 0 to inf, absent at 0
 thrust scale rear: ln 1 ± 0.1, 0 to inf
 thrust shape rear: 0 ± 1, -inf to inf
 reverse thrust rear: 0 ± 0.1, -inf to inf, absent at 0
