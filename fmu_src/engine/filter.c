@@ -602,15 +602,15 @@ static void transition_lagged(const filter *f, const real middle[N_X], double h,
         memset(row, 0, sizeof row);
         row[a] = part[sensor].remains;
         for (int c = 0; c < f->count; c++) {
-            row[c] += part[sensor].begin * H[c];
-            if (c >= moving && f->listed[c] != LATENESS) {
-                row[c] += part[sensor].end * H[c] * remains[f->listed[c] - FORCE];
-            }
-            if (c >= vehicle) {
+            if (ALL(H[c] == 0.0)) {
                 continue;
             }
-            for (int l = 0; l < phi->count[c]; l++) {
+            row[c] += part[sensor].begin * H[c];
+            for (int l = 0; c < vehicle && l < phi->count[c]; l++) {
                 row[phi->column[c][l]] += part[sensor].end * H[c] * phi->entry[c][l];
+            }
+            if (c >= vehicle) { /* a slow velocity over ground */
+                row[c] += part[sensor].end * H[c] * remains[f->listed[c] - FORCE];
             }
         }
         keep(f, row, a, phi);
@@ -912,20 +912,20 @@ static void begin_run(filter *f, const parameter_set sets[LANES])
 }
 
 /* Run through a log with the parameters of each lane. failed[lane] becomes 1 when a number is not finite, and the run ends when this
- * is so for all. `scratch` has room for one model_held per row. */
+ * is so for all. `memory` has room for a filter and then one model_held per row: it is too large for the stack of some threads. */
 EXPORT void run_filter(const places *where, const record *log, const parameter_set sets[LANES], const mode *how,
-                       const output results[LANES], int failed[LANES], model_held *scratch)
+                       const output results[LANES], int failed[LANES], filter *memory)
 {
     real at[N_VARIABLES];
     parameters numbers;
-    filter f;
-    memset(&f, 0, sizeof f);
-    f.where = where;
-    f.log = log;
-    f.set = &numbers;
-    f.at = at;
-    f.thrust = scratch;
-    begin_run(&f, sets);
+    filter *const f = memory;
+    memset(f, 0, sizeof *f);
+    f->where = where;
+    f->log = log;
+    f->set = &numbers;
+    f->at = at;
+    f->thrust = (model_held *)(memory + 1);
+    begin_run(f, sets);
     const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
     double restart = log->time[0] + how->begin, last = log->time[0];
     int *const pieces = results[0].pieces, running = LANES;
@@ -935,18 +935,18 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
         real off, variance = 0.0, gain[N_X];
         if (h > 0.0) {
 #if LANES == 1
-            pieces[k] = how->repeats == 0 ? pieces_over(&f, last, log->time[k]) : pieces[k];
+            pieces[k] = how->repeats == 0 ? pieces_over(f, last, log->time[k]) : pieces[k];
 #endif
-            advance(&f, &f.now, last, log->time[k], pieces[k], has_covariance);
+            advance(f, &f->now, last, log->time[k], pieces[k], has_covariance);
             if (predicts) {
-                advance(&f, &f.ahead, last, log->time[k], pieces[k], has_covariance);
+                advance(f, &f->ahead, last, log->time[k], pieces[k], has_covariance);
             }
             last = log->time[k];
-            pass_rows(&f, last);
-            set_tilt(&f, last);
+            pass_rows(f, last);
+            set_tilt(f, last);
         }
         if (predicts && log->time[k] >= restart) {
-            f.ahead = f.now;
+            f->ahead = f->now;
             restart += how->span * (floor((log->time[k] - restart) / how->span) + 1.0);
         }
         for (int i = 0; i < LANES && how->repeats == 2; i++) {
@@ -954,12 +954,12 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
                 LANE(gain[n], i) = results[i].gain[k * N_X + n];
             }
         }
-        take(&f, &f.now, k, how->repeats, &off, &variance, gain);
+        take(f, &f->now, k, how->repeats, &off, &variance, gain);
         if (predicts) {
             real PH[N_X];
-            off = innovation(&f, &f.ahead, k);
+            off = innovation(f, &f->ahead, k);
             if (has_covariance) {
-                variance = project(&f, &f.ahead, log->sensor[k], PH);
+                variance = project(f, &f->ahead, log->sensor[k], PH);
             }
         }
         for (int i = 0; i < LANES; i++) {
@@ -976,17 +976,18 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
             for (int n = 0; n < N_X && has_covariance && to->gain; n++) {
                 to->gain[k * N_X + n] = LANE(gain[n], i);
             }
-            for (int a = 0; a < f.count && to->states; a++) {
-                to->states[k * N_X + f.listed[a]] = LANE(f.now.x[f.listed[a]], i);
-                to->deviations[k * N_X + f.listed[a]] = sqrt(LANE(f.now.P[a][a], i));
+            for (int a = 0; a < f->count && to->states; a++) {
+                to->states[k * N_X + f->listed[a]] = LANE(f->now.x[f->listed[a]], i);
+                to->deviations[k * N_X + f->listed[a]] = sqrt(LANE(f->now.P[a][a], i));
             }
         }
     }
 }
 
 /* Return the sizes that Python needs to lay out its arrays. */
-EXPORT void filter_sizes(int sizes[7])
+EXPORT void filter_sizes(int sizes[8])
 {
-    const int found[7] = {N_X, N_AXES, MOST_SENSORS, N_VARIABLES, N_INPUTS, (int)sizeof(model_held), LANES};
+    const int held = (int)sizeof(model_held), whole = (int)sizeof(filter);
+    const int found[8] = {N_X, N_AXES, MOST_SENSORS, N_VARIABLES, N_INPUTS, held, whole, LANES};
     memcpy(sizes, found, sizeof found);
 }

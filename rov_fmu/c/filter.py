@@ -221,7 +221,7 @@ class Filter:
     def _library(self, file: Path) -> tuple[Callable[..., None], list[int]]:
         """Return the function run_filter of a file, and its sizes."""
         if file not in self._libraries:
-            library, sizes = load_library(self._vehicle, file), (ctypes.c_int * 7)()
+            library, sizes = load_library(self._vehicle, file), (ctypes.c_int * 8)()
             library.filter_sizes(sizes)
             library.run_filter.restype = None
             self._libraries[file] = library.run_filter, list(sizes)
@@ -231,10 +231,10 @@ class Filter:
         self, file: Path, record: Record, sets: Sequence[Parameters], mode: _Mode, runs: Sequence[Run]
     ) -> set[int]:
         """Run through a log with sets of parameters, write the runs, and return the indices of those that diverge."""
-        run, (*_, held, lanes) = self._library(file)
+        run, (*_, held, whole, lanes) = self._library(file)
         log, failed = self._record(record, sets[0]), set[int]()
-        scratch = np.zeros(len(record.told) * held // 8 + 8)
-        aligned = ctypes.c_void_p(-(-scratch.ctypes.data // 64) * 64)
+        memory = np.zeros((whole + len(record.told) * held) // 8 + 8)
+        aligned = ctypes.c_void_p(-(-memory.ctypes.data // 64) * 64)
         where = ctypes.c_void_p(self._where.ctypes.data)
         for first in range(0, len(sets), lanes):
             places = [min(first + lane, len(sets) - 1) for lane in range(lanes)]
