@@ -62,7 +62,11 @@ def plot_answers(figure: Figure, result: AxisResult, quantity: Literal["V_ss", "
     factor, unit = in_degrees(axis.unit) if is_steady else (1.0, "s")
     ax: Axes = figure.subplots()
     _curve(ax, factor, result.answers, quantity, "blue", "this fit, with 95 % band")
-    _points(ax, factor, [p for p in result.points if p.quantity == quantity])
+    points = [p for p in result.points if p.quantity == quantity]
+    _points(ax, factor, points)
+    if points and not is_steady:  # a measured time contains the lag of the thrusters, and the curve does not
+        expected = [p.model for p in points]
+        ax.plot([100.0 * p.command for p in points], expected, "x", color=LIGHT["blue"], label="this fit, with the lag")
     _curve(ax, factor, result.compared, quantity, "grey", "compared")
     name_axes(ax, "steady velocity" if is_steady else "time to 63 %", unit, "command (%)")
     add_legend(figure)

@@ -96,6 +96,8 @@ def test_answers_have_a_curve_and_a_band_for_each_direction_and_the_measured_poi
     (ax,) = times.axes
     assert lines(ax)["this fit, with 95 % band"][1] == pytest.approx([0.5, 1.0, 0.5 / 0.3])
     assert lines(ax)["measured, not counted"] == ([50.0], [1.1])
+    (measured,) = (point for point in surge.points if point.quantity == "Tau")
+    assert lines(ax)["this fit, with the lag"] == ([50.0], [measured.model])
     assert ax.get_title(loc="left") == "Time to 63 % (s)"
     plot_forces(forces := Figure(), example().forces[::-1], [6.0, None, 2.0])
     (ax,) = forces.axes
