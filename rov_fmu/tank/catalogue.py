@@ -16,8 +16,9 @@ from typing import Any
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.io.csv_table import Column
 
-LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
+LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "ft": 1.0 / 0.3048}
+ANGLES = {"rad": 1.0, "deg": 180.0 / pi, "°": 180.0 / pi}
+_SPEEDS, _TURNS = {"kn": 3600.0 / 1852.0}, {"dps": ANGLES["deg"]}
 TIMES = {"s": 1.0, "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9}
 VOLTAGES = {"V": 1.0, "mV": 1000.0}
 PRESSURES = {"Pa": 1.0, "hPa": 0.01, "mbar": 0.01, "kPa": 1e-3, "bar": 1e-5}
@@ -60,8 +61,9 @@ class Quantity:
         return Column(self.units, True, True, self.minimum, self.maximum, also=self.also)
 
 
-def _rates(lengths: Mapping[str, float]) -> dict[str, float]:
-    return {f"{unit}/s": per for unit, per in lengths.items()}
+def _rates(axis: Axis, lengths: Mapping[str, float]) -> dict[str, float]:
+    """Return the units of a velocity along or about an axis."""
+    return {f"{unit}/s": per for unit, per in lengths.items()} | (_TURNS if axis.is_rotation else _SPEEDS)
 
 
 def _quantities() -> Iterator[Quantity]:
@@ -74,7 +76,7 @@ def _quantities() -> Iterator[Quantity]:
         yield Quantity(name, lengths, axis, also=also, wraps=axis in (ROLL, YAW))
         rate = f"{axis.name} {'rate' if axis.is_rotation else 'speed'}"
         yield Quantity(
-            f"{axis.name} velocity", _rates(lengths), axis, True, (axis.velocity, rate), minimum=-1e3, maximum=1e3
+            f"{axis.name} velocity", _rates(axis, lengths), axis, True, (axis.velocity, rate), minimum=-1e3, maximum=1e3
         )
     yield Quantity("distance", LENGTHS)
     yield Quantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)

@@ -17,10 +17,10 @@ from rov_fmu.tank.readers.tables import rules_of_page
 
 COLUMNS = {name: quantity.column for name, quantity in QUANTITIES.items()} | {"time": TIME} | columns_of("thrust")
 EQUAL = {
-    "depth": "2 m, 200 cm, 2000 mm",
-    "surge velocity": "2 m/s, 200 cm/s, 2000 mm/s",
-    "heading": "3.141592653589793 rad, 180 deg",
-    "yaw velocity": "3.141592653589793 rad/s, 180 deg/s",
+    "depth": "3.048 m, 304.8 cm, 3048 mm, 10 ft",
+    "surge velocity": "0.9144 m/s, 91.44 cm/s, 914.4 mm/s, 3 ft/s, 1.7774514038876894 kn",
+    "heading": "3.141592653589793 rad, 180 deg, 180 °",
+    "yaw velocity": "3.141592653589793 rad/s, 180 deg/s, 180 °/s, 180 dps",
     "time": "2 s, 2e3 ms, 2e6 us, 2e6 µs, 2e9 ns",
     "voltage": "16 V, 16000 mV",
     "pressure": "120000 Pa, 1200 hPa, 1200 mbar, 120 kPa, 1.2 bar",

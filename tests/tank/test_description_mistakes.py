@@ -258,9 +258,9 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
         ("value = 6.57", 'value = "?"', "body.m_rov.value = '?': must be a number"),
         (
             '"force [N]"',
-            '"force [lb]"\nTiefe = "depth [ft]"',
+            '"force [lb]"\nTiefe = "depth [fathom]"',
             "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or 'force [lbf]' | "
-            "/rov.toml: columns.Tiefe = 'depth [ft]': must be 'depth [m]' or",
+            "/rov.toml: columns.Tiefe = 'depth [fathom]': must be 'depth [m]' or",
         ),
         ("u_v [us]", "u_w [us]", "columns.thr_pwm = 'u_w [us]': there is no such column, but time [s], u_v [%], "),
         (
