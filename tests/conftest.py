@@ -17,6 +17,7 @@ from rov_fmu.c.compile import compile_all
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
+from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
@@ -48,6 +49,13 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     """Remove the marker `long` from a weekly test, which it may have from another of its parameters."""
     if item.get_closest_marker("weekly"):
         item.own_markers = [mark for mark in item.own_markers if mark.name != "long"]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_process() -> Iterator[None]:
+    """Read the logs of all tests in one child process, which takes half a second to start."""
+    with one_parser():
+        yield
 
 
 @pytest.fixture(scope="session")
