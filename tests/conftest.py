@@ -1,6 +1,7 @@
 """The FMUs under test, built for this machine once in a run, by the command line of the exporter."""
 
-from collections.abc import Callable, Iterator
+import gc
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -17,6 +18,7 @@ from rov_fmu.c.compile import compile_all
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
+from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
@@ -44,10 +46,28 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("fresh" if config.option.markexpr == "weekly" else "same")
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Leave what the collection makes to no garbage collector. It would look through all of it again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
 def pytest_itemcollected(item: pytest.Item) -> None:
     """Remove the marker `long` from a weekly test, which it may have from another of its parameters."""
     if item.get_closest_marker("weekly"):
         item.own_markers = [mark for mark in item.own_markers if mark.name != "long"]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_process() -> Iterator[None]:
+    """Read the logs of all tests in one child process, which takes half a second to start."""
+    with one_parser():
+        yield
 
 
 @pytest.fixture(scope="session")

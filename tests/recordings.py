@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from math import radians
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import lfilter
 
 from rov_fmu.equation.catalogue import AXIS, CURVE, HEAVE, SURGE, YAW, Axis, coefficient_name
 from rov_fmu.tank.arrays import Array
@@ -100,9 +100,15 @@ class Run:
             values = np.interp(self.time + jitter * random.standard_normal(len(values)), self.time, values)
         errors = random.standard_normal(len(values))
         if colour:
-            errors = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], errors)
+            errors = coloured(errors, colour)
         values = values + (NOISE[quantity] if noise is None else noise) * errors
         return Measured(file, self.axis, quantity, self.time, self.command, values)
+
+
+def coloured(errors: Array, colour: float) -> Array:
+    """Return errors of the same variance of which each is correlated with the next one."""
+    new = np.sqrt(1.0 - colour**2) * errors
+    return np.array([*accumulate(new.tolist(), lambda last, error: colour * last + error)])
 
 
 def write_log(folder: Path, name: str, recording: Measured) -> Path:

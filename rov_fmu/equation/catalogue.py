@@ -13,7 +13,7 @@ which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the c
 
 import re
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from math import degrees, inf, pi
 
 from .attitude import INITIAL, QUATERNION
@@ -163,6 +163,7 @@ def delayed_name(command: str) -> str:
     return f"delayed_{command}"
 
 
+@cache
 def coefficient_name(key: str, of: str) -> str:
     """Return the name in the FMU of a coefficient of a curve or of an axis."""
     stem = key.removesuffix(REVERSE)

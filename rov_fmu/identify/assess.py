@@ -269,7 +269,7 @@ def answers(
         return np.array([_response(replace(full, C=rest.C + push * (full.C - rest.C)), rest) for push in pushes])
 
     def logarithms(z: Array) -> Array:
-        fitted = values(Vehicle(table.layout, table.coefficients(z.tolist())), table.shapes(z.tolist()))
+        fitted = values(*table.model(z.tolist()))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log(np.abs(fitted)).ravel()
 

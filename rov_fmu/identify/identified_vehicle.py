@@ -156,8 +156,7 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
 def _quadratics(fit: Fit, z: Array) -> Iterator[Quadratic]:
     """Yield the curves of the file for those that bend. A file has no shapes of curves: it has the nearest ones."""
     table, (low, high) = fit.kept.table, fit.command_range
-    coefficients = table.coefficients(z.tolist())
-    shapes, vehicle = table.shapes(z.tolist()), Vehicle(table.layout, coefficients)
+    vehicle, shapes = table.model(z.tolist())
     for curve in fit.known.curves:
         if curve.name in shapes.of:
             bands = shapes.dead_bands[curve.name]

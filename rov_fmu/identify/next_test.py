@@ -15,7 +15,6 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
-from rov_fmu.vehicle.vehicle import Vehicle
 
 _STRENGTHS = (0.2, 0.4, 0.6, 0.8, 1.0)
 _HOLD, _REST = 8.0, 4.0
@@ -37,9 +36,8 @@ def next_test(
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
 
     def motion(z: Array, command: float) -> AxisAlone:
-        table = posterior.table
-        vehicle = Vehicle(table.layout, table.coefficients(z.tolist()))
-        return table.shapes(z.tolist()).motion(vehicle, axis, command)
+        vehicle, shapes = posterior.table.model(z.tolist())
+        return shapes.motion(vehicle, axis, command)
 
     def speed(z: Array, command: float) -> float:
         return motion(z, command).steady_velocity()

@@ -60,9 +60,7 @@ def held_out_rows(fit: Fit) -> HeldOut:
             with_noise=False,
             last=False,
         ).z
-        vehicle = Vehicle(objective.table.layout, objective.table.coefficients(z.tolist()))
-        shapes = objective.table.shapes(z.tolist())
         some = [rows[n] for n in members]
-        for row, value in zip(some, modelled(some, vehicle, shapes).tolist(), strict=True):
+        for row, value in zip(some, modelled(some, *objective.table.model(z.tolist())).tolist(), strict=True):
             found[row.quantity, row.subject.name, row.command] = value
     return found

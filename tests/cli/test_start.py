@@ -16,6 +16,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import BARE, ROOT, without_progress
+from tests.conftest import without_page
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -40,7 +41,8 @@ def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_term
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
+    with without_page():
+        assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
     out, err = capsys.readouterr()
     assert without_progress(err) == ""
     (path,) = tmp_path.iterdir()

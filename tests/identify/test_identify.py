@@ -308,8 +308,23 @@ def with_gaps(log: Measured, random: np.random.Generator) -> Measured:
     return replace(log, time=log.time[some], command=log.command[some], values=values)
 
 
-@pytest.mark.parametrize(("change", "near"), [(with_outliers, 0.15), (with_gaps, 0.05)])
-def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_path: Path) -> None:
+def with_both(log: Measured, random: np.random.Generator) -> Measured:
+    return with_gaps(with_outliers(log, random), random)
+
+
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    ("change", "near", "share"),
+    [
+        (with_both, 0.15, 0.55),
+        pytest.param(with_outliers, 0.15, 0.45, marks=LONG),
+        pytest.param(with_gaps, 0.05, 0.1, marks=LONG),
+    ],
+)
+def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share: float, tmp_path: Path) -> None:
+    """Outliers count as errors of the predictions: the errors are below this share of those of no change."""
     path, random = folder_of(tmp_path / "tests", KNOWN, FORCES), np.random.default_rng(3)
     write_log(path, "0", change(run(TRUTH, HEAVE, PLANS["heave"][0], 5.0).noisy(random), random))
     shares: list[float] = []
@@ -319,7 +334,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, tmp_pa
     check_answers(heave, near)
     by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
     assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"
-    assert all(p.error < 0.45 * p.unchanged for p in heave.predictions)
+    assert all(p.error < share * p.unchanged for p in heave.predictions)
     assert heave.coverage > 0.8
 
 

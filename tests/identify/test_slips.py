@@ -139,12 +139,16 @@ def asked(folder: Path, *logs: Measured, rov: str) -> dict[tuple[str, str], str]
 
 @pytest.mark.parametrize("kind", QUESTIONS)
 def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
-    """Nothing tells the drag but the log and the mass. Nothing is asked of the log without the slip."""
+    """Nothing tells the drag but the log and the mass."""
     slip = SLIPS[kind]
     (log, *_), sensor = recordings(slip.axis), SENSOR[slip.axis.name]
     quantity = "surge distance" if slip.axis is SURGE else sensor
     assert asked(tmp_path, slipped(log, slip), rov=KNOWN) == {(log.file, quantity): QUESTIONS[kind]}
-    assert not asked(tmp_path, log, rov=KNOWN)
+
+
+@pytest.mark.parametrize("axis", [HEAVE, SURGE, YAW])
+def test_nothing_is_asked_of_a_log_without_slip(axis: Axis, tmp_path: Path) -> None:
+    assert not asked(tmp_path, recordings(axis)[0], rov=KNOWN)
 
 
 def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:

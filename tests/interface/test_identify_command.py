@@ -10,7 +10,7 @@ from rov_fmu.io.messages import Progress
 from tests.folders import small_folder
 
 
-@pytest.mark.parametrize("with_report", [False, True])
+@pytest.mark.parametrize("with_report", [pytest.param(False, marks=pytest.mark.long), True])
 def test_the_progress_names_what_is_done_and_never_goes_back(with_report: bool, tmp_path: Path) -> None:
     begun: dict[str, list[tuple[str, float]]] = {}
 

@@ -36,10 +36,13 @@ def foreign(made_once: Made) -> Callable[..., Path]:
 
 @pytest.fixture(scope="package")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
-    """A worker with two threads that the tests of this folder share, because a start takes seconds."""
+    """A worker that the tests of this folder share, because a start takes seconds.
+
+    It has one thread, because each thread starts a process for the FMU in every study.
+    """
     folder = tmp_path_factory.mktemp("cluster")
     places = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
-    with LocalCluster(n_workers=1, threads_per_worker=2, **places) as started:
+    with LocalCluster(n_workers=1, threads_per_worker=1, **places) as started:
         yield started
 
 

@@ -96,14 +96,14 @@ def _processes(word: str) -> set[int]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
-    """The results of one worker, which is a process."""
+    """The results of two workers, which are processes. The other studies here are done by one worker."""
     folder, others, started = tmp_path_factory.mktemp("whole"), _processes("spawn_main"), list[int]()
 
     def count(_: Progress) -> None:
         started.append(len(_processes("spawn_main") - others))
 
-    results = study(_plan(folder, foreign()), folder / "results", workers=1, on_progress=count)
-    assert {*started} == {1}
+    results = study(_plan(folder, foreign()), folder / "results", workers=2, on_progress=count)
+    assert {*started} == {2}
     return results
 
 

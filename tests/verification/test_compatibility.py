@@ -7,15 +7,22 @@ import numpy as np
 import pytest
 
 from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import without_page
 from verification.compatibility import check, write
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of one vehicle."""
+def written(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, videoray3_fmu: Path) -> Path:
+    """The folder of one vehicle, with the FMUs that other tests use, too."""
+
+    def build(vehicle: Vehicle, path: Path, platforms: str, fmi: int) -> None:
+        assert (vehicle.identifier, platforms) == ("videoray", "host")
+        shutil.copy(videoray_fmu if fmi == 2 else videoray3_fmu, path)
+
     folder = tmp_path_factory.mktemp("compatibility")
-    with without_page():
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("verification.compatibility.build", build)
         write(folder, ["videoray"], "host")
     return folder
 

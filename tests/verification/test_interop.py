@@ -29,7 +29,10 @@ SIMPLE = MANOEUVRES["videoray"]
 
 @pytest.mark.parametrize(
     "manoeuvre",
-    [pytest.param(m, marks=pytest.mark.long if name == "every_option" else ()) for name, m in MANOEUVRES.items()],
+    [
+        pytest.param(m, marks=pytest.mark.long if name in ("bluerov2_heavy", "every_option") else ())
+        for name, m in MANOEUVRES.items()
+    ],
     ids=list(MANOEUVRES),
 )
 def test_a_manoeuvre_uses_every_input_and_turns_every_velocity_around(manoeuvre: Manoeuvre) -> None:

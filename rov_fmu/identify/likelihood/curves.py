@@ -9,7 +9,7 @@ deviations ahead and astern are correlated by one half.
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from math import exp, inf, isfinite
 
 import numpy as np
@@ -48,6 +48,19 @@ def _spline() -> CubicSpline:
     return CubicSpline([*KNOTS, 1.0], np.eye(len(KNOTS) + 1)[:, :-1], bc_type="natural")
 
 
+def _weights(commands: Array) -> Array:
+    """Return the derivatives of eta at some commands with respect to the coordinates of a curve: n x COUNT."""
+    own, is_astern = _spline()(np.maximum(np.abs(commands), KNOTS[0])), (commands < 0.0)[:, None]
+    knots = np.hstack([np.where(is_astern, 0.0, own), np.where(is_astern, own, 0.0)])
+    return np.asarray(knots @ _root() / _POWER)
+
+
+@lru_cache(4096)
+def _weights_of_one(command: float) -> Array:
+    """Return the derivatives at one command. A fit asks for those of the rows of its tables again and again."""
+    return _weights(np.array([command]))
+
+
 @dataclass(frozen=True, eq=False)
 class Shapes:
     """The deviations of the shapes of some curves."""
@@ -63,14 +76,13 @@ class Shapes:
         """Return the commands of the prior curve that act like some commands of a curve."""
         if curve not in self.of:
             return commands
-        eta = _root() @ self.of[curve] / _POWER
-        size, is_astern, half = np.abs(commands), commands < 0.0, len(KNOTS)
-        weights = _spline()(np.maximum(size, KNOTS[0]))
-        ahead, astern = weights @ eta[:half], weights @ eta[half:]
+        size, is_astern = np.abs(commands), commands < 0.0
+        weights = _weights_of_one(float(commands[0])) if len(commands) == 1 else _weights(commands)
+        eta = weights @ self.of[curve]
         if curve in self.exact_astern:
-            astern = 0.0 * astern
+            eta = np.where(is_astern, 0.0, eta)
         band = np.where(is_astern, *reversed(self.dead_bands.get(curve, (0.0, 0.0))))
-        bent = np.maximum(np.where(is_astern, astern, ahead), _WEAKEST - 1.0) * np.maximum(size - band, 0.0)
+        bent = np.maximum(eta, _WEAKEST - 1.0) * np.maximum(size - band, 0.0)
         return np.asarray(np.sign(commands) * np.clip(size + bent, 0.0, 1.0))
 
     def inputs(self, layout: Layout, inputs: Array) -> Array:

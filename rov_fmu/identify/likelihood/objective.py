@@ -18,7 +18,7 @@ is the square of their noise.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -68,17 +68,18 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
     A measured time constant contains the lag of the thrusters. `least_lag` is the lag of a vehicle without one.
     """
     found = np.zeros(len(rows))
+    motion_of = cache(partial(shapes.motion, vehicle))
     forces: dict[Curve, list[int]] = {}
     for n, row in enumerate(rows):
         if isinstance(row.subject, Curve):
             forces.setdefault(row.subject, []).append(n)
             continue
-        motion = shapes.motion(vehicle, row.subject, row.command)
+        motion = motion_of(row.subject, row.command)
         found[n] = motion.steady_velocity() if row.quantity == "V_ss" else motion.time_constant()
         curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(row.subject)}
         lag = max((vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag), default=0.0)
         if row.quantity == "Tau" and lag > 0.0:
-            load = shapes.motion(vehicle, row.subject, 0.0).C
+            load = motion_of(row.subject, 0.0).C
             found[n] = measured_time_constant(motion, load, lag)
     for curve, places in forces.items():
         found[places] = shapes.forces(vehicle, curve, np.array([rows[n].command for n in places]))
@@ -173,11 +174,8 @@ class Objective:
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
         """Return the innovations of all or some rows of tables and their variances."""
         rows = self.rows if rows is None else rows
-        vehicle = Vehicle(self.table.layout, self.table.coefficients(z.tolist()))
-        shapes = self.table.shapes(z.tolist())
-        off = np.array([row.measured for row in rows]) - modelled(
-            rows, vehicle, shapes, LEAST_LAG if self.logs else 0.0
-        )
+        least_lag = LEAST_LAG if self.logs else 0.0
+        off = np.array([row.measured for row in rows]) - modelled(rows, *self.table.model(z.tolist()), least_lag)
         noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
         return off, noise**2
 

@@ -18,6 +18,7 @@ from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.result import PLACED
+from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -244,9 +245,13 @@ class Table:
         """
         return self.full.get(axis.name, 1.0) * self.get(z, "inertia", axis.name, default=1.0)
 
-    def shapes(self, z: Sequence[float]) -> Shapes:
-        """Return the deviations of the shapes of the curves."""
-        found, bands, coefficients = {}, {}, self.coefficients(z)
+    def model(self, z: Sequence[float]) -> tuple[Vehicle, Shapes]:
+        """Return the vehicle, and the deviations of the shapes of its curves."""
+        coefficients = self.coefficients(z)
+        return Vehicle(self.layout, coefficients), self._shapes(z, coefficients)
+
+    def _shapes(self, z: Sequence[float], coefficients: Mapping[str, float]) -> Shapes:
+        found, bands = {}, {}
         for curve in self.layout.curves:
             if (first := self.place("thrust shape", curve.name, "1")) is not None:
                 found[curve.name] = self.shape_deviation * np.array(z[first : first + COUNT])
@@ -259,6 +264,7 @@ class Table:
         """Return the parameters of the filter for a log."""
         file, layout = one.log.file, one.layout
         found = self.coefficients(z)
+        shapes = self._shapes(z, found)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
             found[name] = self.get(z, "current", file, part)
         whole = self.get(z, "slow gain", default=0.0)
@@ -294,7 +300,7 @@ class Table:
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
             offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
             width=self.get(z, "logging width", file),
-            inputs=self.shapes(z).inputs(layout, one.record.inputs),
+            inputs=shapes.inputs(layout, one.record.inputs),
         )
 
     def _lag(self, z: Sequence[float], sensor: Sensor) -> float | None:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.signal import lfilter
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -24,7 +23,7 @@ from tests.identify.scenarios.scenario import (
     voltage,
     write_folder,
 )
-from tests.recordings import PLANS, with_more
+from tests.recordings import PLANS, coloured, with_more
 from verification.references import pool, rigid_pool
 from verification.references.pool import NOTHING, Array, Commands, Conditions
 
@@ -322,7 +321,7 @@ def _measured(sensor: Sensor, values: Array, rows: Array, logs: Logs, random: Ra
     noise = random.standard_normal(len(rows))
     if logs.correlation_time:
         colour = np.exp(-1.0 / (logs.rate * logs.correlation_time))
-        noise = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], noise)
+        noise = coloured(noise, float(colour))
     values = sensor.scale * values + sensor.noise * noise
     if sensor.resolution:
         values = np.round(values / sensor.resolution) * sensor.resolution

@@ -12,7 +12,6 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import around
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.vehicle import Vehicle
 from verification.identification.data import Recording, Split
 from verification.identification.protocol import Known
 
@@ -57,8 +56,8 @@ class Identified:
                 known[f"V_ss {100 * answer.command:g} %"] = abs(answer.steady[0]), low, high
 
         def drag(z: Array) -> Array:
-            model = Vehicle(own.table.layout, own.table.coefficients(z.tolist()))
-            A, _ = own.table.shapes(z.tolist()).motion(model, axis, assess.COMMANDS[0]).drag(1.0)
+            model, shapes = own.table.model(z.tolist())
+            A, _ = shapes.motion(model, axis, assess.COMMANDS[0]).drag(1.0)
             return np.array([A])
 
         (value,), ((variance,),), _ = own.numbers(drag)
