@@ -21,7 +21,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, a_vehicle
+from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle
 
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
 defaultCallbacks.logger = _LOGGER
@@ -157,9 +157,9 @@ def _six() -> Vehicle:
 
 
 heavy_dir, heavy3_dir = _folder_of("heavy", lambda: HEAVY), _folder_of("heavy3", lambda: HEAVY, 3)
-everything_dir = _folder_of("everything", _everything)
+everything_dir, everything3_dir = _folder_of("everything", _everything), _folder_of("everything3", _everything, 3)
 thrust_dir, thrust3_dir = _folder_of("thrust", _thrust), _folder_of("thrust3", _thrust, 3)
-six_dir, six3_dir = _folder_of("six", _six), _folder_of("six3", _six, 3)
+six_dir, outside3_dir = _folder_of("six", _six), _folder_of("outside3", lambda: OUTSIDE, 3)
 
 
 @pytest.fixture(scope="module")

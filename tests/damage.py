@@ -2,7 +2,9 @@
 
 import random
 from collections.abc import Callable
+from copy import deepcopy
 from datetime import date, datetime
+from functools import cache
 from typing import Any
 
 import tomlkit
@@ -88,9 +90,19 @@ def changed_lines(content: bytes, data: st.DataObject) -> bytes:
     return b"".join(lines)
 
 
+@cache
+def _parsed(text: str) -> Any:
+    return tomlkit.parse(text).unwrap()
+
+
+def toml_of(text: str) -> Any:
+    """Return a new copy of the data of a TOML file, which is parsed once."""
+    return deepcopy(_parsed(text))
+
+
 def changed_toml(content: bytes, data: st.DataObject) -> bytes:
     """Return a TOML file with keys changed, removed, renamed or added."""
-    document = tomlkit.parse(content.decode()).unwrap()
+    document = toml_of(content.decode())
     for _ in range(data.draw(st.integers(1, 2))):
         table = document
         while inner := [key for key, value in table.items() if isinstance(value, dict)]:
@@ -112,7 +124,7 @@ def changed_toml(content: bytes, data: st.DataObject) -> bytes:
 
 def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
     """Return a TOML file with other numbers in place of some of its numbers."""
-    document = tomlkit.parse(content.decode()).unwrap()
+    document = toml_of(content.decode())
     places: list[tuple[Any, Any, float]] = []
     tables: list[Any] = [document]
     while tables:

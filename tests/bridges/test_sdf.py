@@ -336,11 +336,11 @@ def grows(vehicle: Vehicle, *, explicit: bool) -> bool:
     """True if velocities grow without bound in steps of 1 ms: the plugin's force follows the last acceleration."""
     gazebo = Gazebo(gazebo_model(vehicle, in_world=True, explicit=explicit).text)
     newtons = {name: 0.1 * n * force for n, (name, force) in enumerate(gazebo.largest.items())}
+    thrust, accelerated = gazebo.thrust(newtons), np.linalg.inv(gazebo.rigid + gazebo.added)
     velocity: Array = np.zeros(6)
     acceleration: Array = np.zeros(6)
     for _ in range(1000):
-        load = gazebo.wrench(np.eye(3), velocity) + gazebo.thrust(newtons) + gazebo.explicit @ acceleration
-        acceleration = np.asarray(np.linalg.solve(gazebo.rigid + gazebo.added, load), dtype=float)
+        acceleration = accelerated @ (gazebo.wrench(np.eye(3), velocity) + thrust + gazebo.explicit @ acceleration)
         velocity = velocity + 1e-3 * acceleration
         if np.max(np.abs(velocity)) > 1e3:
             return True
