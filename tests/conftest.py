@@ -16,7 +16,7 @@ from rov_fmu.build import chosen_platforms
 from rov_fmu.c.compile import compile_all
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.archive import native_content, web_module
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
@@ -85,17 +85,21 @@ def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFact
     return made
 
 
-def _videoray(folder: Path, fmi: int) -> None:
-    """Build the VideoRay's FMU into a folder, and unzip it there."""
+def _videoray(made_once: Made, folder: Path, fmi: int) -> None:
+    """Build the VideoRay's FMU into a folder, and unzip it there. Its page has the same module in both versions."""
     path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
-    assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
+    layout = load_vehicle(VIDEORAY).layout
+    module = made_once("module", lambda of: (of / "module.wasm").write_bytes(web_module(layout))) / "module.wasm"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.build.web_module", lambda _: module.read_bytes())
+        assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
     fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
 
 
 @pytest.fixture(scope="session")
 def videoray_fmu(made_once: Made) -> Path:
     # a path with a space and an umlaut, as users have them
-    return made_once("FMU für Tests", lambda folder: _videoray(folder, 2)) / "videoray.fmu"
+    return made_once("FMU für Tests", lambda folder: _videoray(made_once, folder, 2)) / "videoray.fmu"
 
 
 @pytest.fixture(scope="session")
@@ -105,7 +109,7 @@ def videoray_dir(videoray_fmu: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def videoray3_fmu(made_once: Made) -> Path:
-    return made_once("FMU für FMI 3", lambda folder: _videoray(folder, 3)) / "videoray.fmi3.fmu"
+    return made_once("FMU für FMI 3", lambda folder: _videoray(made_once, folder, 3)) / "videoray.fmi3.fmu"
 
 
 @pytest.fixture(scope="session")

@@ -3,6 +3,7 @@
 They differ in the value references, and in the elements that hold the unit and the bounds of a variable.
 """
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +50,9 @@ def described(rov: Vehicle, fmi: int) -> etree._Element:
     return etree.fromstring(description)
 
 
-def check_schema(document: etree._Element, name: str) -> None:
-    etree.XMLSchema(file=str(SCHEMAS / name)).assertValid(document)
+@cache
+def schema(name: str) -> etree.XMLSchema:
+    return etree.XMLSchema(file=str(SCHEMAS / name))
 
 
 def declared(root: etree._Element) -> dict[str, dict[str, Any]]:
@@ -142,11 +144,12 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
 @pytest.mark.parametrize("kind", ROVS)
 def test_the_description_follows_its_schema_and_the_rules_of_fmpy(kind: str, fmi: int, tmp_path: Path) -> None:
     document = described(ROVS[kind], fmi)
-    check_schema(document, f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
-    check_schema(etree.fromstring(build_description("a_rov")), "fmi3/fmi3BuildDescription.xsd")
+    schema(f"fmi{fmi}/fmi{fmi}ModelDescription.xsd").assertValid(document)
+    schema("fmi3/fmi3BuildDescription.xsd").assertValid(etree.fromstring(build_description("a_rov")))
     (tmp_path / "modelDescription.xml").write_bytes(etree.tostring(document))
     description = fmpy.read_model_description(str(tmp_path), validate=False)
-    assert validate_model_description(description, validate_variable_names=True, validate_model_structure=True) == []
+    are_new = fmi == 2  # FMI 3.0 has the same names, as test_both_versions_declare_the_same holds
+    assert validate_model_description(description, validate_variable_names=are_new, validate_model_structure=True) == []
 
 
 SAVED = {"canGetAndSetFMU{0}tate": "true", "canSerializeFMU{0}tate": "true", "providesDirectionalDerivative{1}": "true"}
