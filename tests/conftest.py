@@ -12,11 +12,9 @@ from filelock import FileLock
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackLoggerTYPE, printLogMessage
 from hypothesis import settings
 
-from rov_fmu.build import chosen_platforms
-from rov_fmu.c.compile import compile_all
+from rov_fmu.c.compile import compile_all, host_platform
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import native_content, web_module
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
@@ -87,6 +85,8 @@ def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFact
 
 def _videoray(made_once: Made, folder: Path, fmi: int) -> None:
     """Build the VideoRay's FMU into a folder, and unzip it there. Its page has the same module in both versions."""
+    from rov_fmu.fmu.archive import web_module
+
     path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
     layout = load_vehicle(VIDEORAY).layout
     module = made_once("module", lambda of: (of / "module.wasm").write_bytes(web_module(layout))) / "module.wasm"
@@ -128,8 +128,11 @@ def without_page() -> Iterator[None]:
 
 def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     """Write the unzipped FMU of a vehicle, without its page, to a folder, and return the folder."""
-    content = native_content(vehicle, fmi=fmi)
-    (library,) = compile_all(chosen_platforms(["host"], fmi), content.sources, content.identifier, fmi=fmi).values()
+    from rov_fmu.fmu.archive import native_content
+
+    platform, content = host_platform(fmi), native_content(vehicle, fmi=fmi)
+    assert platform
+    (library,) = compile_all([platform], content.sources, content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     binary = f"binaries/{host}/{content.identifier}{fmpy.sharedLibraryExtension}"
     for name, data in {**content.files, binary: library}.items():

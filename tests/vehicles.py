@@ -264,14 +264,18 @@ def a_vehicle(rov: Vehicle) -> Vehicle:
 
 _RANGES = (
     Range(EVERY_COMMAND, 0.0, 0.7),
-    Range("u", -0.4, 0.4),
+    Range("u", 0.1, 0.4),
     Range("v", -0.2, 0.2),
     Range("p", -0.3, 0.5),
     Range("phi", -0.1, 0.2),
     Range("theta", -0.3, 0.05),
+    Range("z", 0.0, 3.0),
 )
 OUTSIDE = a_vehicle(replace(SIX, layout=replace(SIX.layout, identified=_RANGES)))
-"""The vehicle SIX with ranges for which it was identified, and so with the output `outside`."""
+"""The vehicle SIX with ranges for which it was identified, and so with the output `outside`.
+
+That of surge does not begin at 0, and there is one of the depth.
+"""
 
 
 # ---- Random vehicles ----

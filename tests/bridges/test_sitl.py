@@ -348,7 +348,7 @@ def test_holds_its_place_in_a_current() -> None:
     heading = atan2(-0.1, -0.2) + 1.05
     with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=heading + 0.05)) as (_, port):
         autopilot = ArduSub(port, depth=1.0, heading=heading, place=(0.0, 0.0))
-        autopilot.fly(25.0)
+        autopilot.fly(20.0)
         autopilot.close()
     held = [at for at in autopilot.history if at["timestamp"][0] > 15.0]
     assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05

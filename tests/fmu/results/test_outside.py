@@ -56,7 +56,7 @@ def excess(values: Mapping[str, Any], ranges: Ranges) -> Any:
     return max(found)
 
 
-@pytest.fixture(scope="module", params=["flat", "tilted"])
+@pytest.fixture(scope="module", params=[pytest.param("flat", marks=pytest.mark.long), "tilted"])
 def built(
     request: pytest.FixtureRequest, made_once: Made, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Fmu, Vehicle, Ranges]:
