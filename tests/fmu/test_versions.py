@@ -51,6 +51,12 @@ def described(rov: Vehicle, fmi: int) -> etree._Element:
 
 
 @cache
+def of_kind(kind: str, fmi: int) -> etree._Element:
+    """Return the description of a vehicle in ROVS, which tests only read."""
+    return described(ROVS[kind], fmi)
+
+
+@cache
 def schema(name: str) -> etree.XMLSchema:
     return etree.XMLSchema(file=str(SCHEMAS / name))
 
@@ -97,7 +103,7 @@ def units(root: etree._Element) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("kind", ROVS)
 def test_both_versions_declare_the_same(kind: str) -> None:
-    two, three = (described(ROVS[kind], fmi) for fmi in (2, 3))
+    two, three = (of_kind(kind, fmi) for fmi in (2, 3))
     variables_2, variables_3 = declared(two), declared(three)
     assert variables_3.pop("time") == TIME
     assert list(variables_3) == list(variables_2)
@@ -117,7 +123,7 @@ def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
     It ends with "bad dependency on variable with index 0" where there is no such position, and else takes the variable
     at that position for the one that is meant.
     """
-    two, three = (described(ROVS[kind], fmi) for fmi in (2, 3))
+    two, three = (of_kind(kind, fmi) for fmi in (2, 3))
     of_two, of_three = ([int(v.get("valueReference")) for v in root.find("ModelVariables")] for root in (two, three))
     assert of_two == [*range(len(of_two))]
     assert of_three == [*range(1, len(of_two) + 2)]  # FMI 3.0 also has the time
@@ -126,7 +132,7 @@ def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
 @pytest.mark.parametrize("kind", ROVS)
 def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> None:
     """FMI Library loses the unit of a variable that has bounds; fmi-sim refuses a unit on a variable."""
-    root = described(ROVS[kind], 3)
+    root = of_kind(kind, 3)
     types = {of.get("name"): of for of in root.iter("Float64Type")}
     variables_of = list(root.find("ModelVariables"))
     for v in variables_of:
@@ -143,7 +149,7 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("kind", ROVS)
 def test_the_description_follows_its_schema_and_the_rules_of_fmpy(kind: str, fmi: int, tmp_path: Path) -> None:
-    document = described(ROVS[kind], fmi)
+    document = of_kind(kind, fmi)
     schema(f"fmi{fmi}/fmi{fmi}ModelDescription.xsd").assertValid(document)
     schema("fmi3/fmi3BuildDescription.xsd").assertValid(etree.fromstring(build_description("a_rov")))
     (tmp_path / "modelDescription.xml").write_bytes(etree.tostring(document))
