@@ -13,17 +13,15 @@ from filelock import FileLock
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackLoggerTYPE, printLogMessage
 from hypothesis import settings
 
-from rov_fmu.build import chosen_platforms
-from rov_fmu.c.compile import compile_all
+from rov_fmu.c.compile import compile_all, host_platform
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import native_content
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, a_vehicle
+from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle
 
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
 defaultCallbacks.logger = _LOGGER
@@ -105,17 +103,23 @@ def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFact
     return made
 
 
-def _videoray(folder: Path, fmi: int) -> None:
-    """Build the VideoRay's FMU into a folder, and unzip it there."""
+def _videoray(made_once: Made, folder: Path, fmi: int) -> None:
+    """Build the VideoRay's FMU into a folder, and unzip it there. Its page has the same module in both versions."""
+    from rov_fmu.fmu.archive import web_module
+
     path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
-    assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
+    layout = load_vehicle(VIDEORAY).layout
+    module = made_once("module", lambda of: (of / "module.wasm").write_bytes(web_module(layout))) / "module.wasm"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.build.web_module", lambda _: module.read_bytes())
+        assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
     fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
 
 
 @pytest.fixture(scope="session")
 def videoray_fmu(made_once: Made) -> Path:
     # a path with a space and an umlaut, as users have them
-    return made_once("FMU für Tests", lambda folder: _videoray(folder, 2)) / "videoray.fmu"
+    return made_once("FMU für Tests", lambda folder: _videoray(made_once, folder, 2)) / "videoray.fmu"
 
 
 @pytest.fixture(scope="session")
@@ -125,7 +129,7 @@ def videoray_dir(videoray_fmu: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def videoray3_fmu(made_once: Made) -> Path:
-    return made_once("FMU für FMI 3", lambda folder: _videoray(folder, 3)) / "videoray.fmi3.fmu"
+    return made_once("FMU für FMI 3", lambda folder: _videoray(made_once, folder, 3)) / "videoray.fmi3.fmu"
 
 
 @pytest.fixture(scope="session")
@@ -144,8 +148,11 @@ def without_page() -> Iterator[None]:
 
 def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     """Write the unzipped FMU of a vehicle, without its page, to a folder, and return the folder."""
-    content = native_content(vehicle, fmi=fmi)
-    (library,) = compile_all(chosen_platforms(["host"], fmi), content.sources, content.identifier, fmi=fmi).values()
+    from rov_fmu.fmu.archive import native_content
+
+    platform, content = host_platform(fmi), native_content(vehicle, fmi=fmi)
+    assert platform
+    (library,) = compile_all([platform], content.sources, content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     binary = f"binaries/{host}/{content.identifier}{fmpy.sharedLibraryExtension}"
     for name, data in {**content.files, binary: library}.items():
@@ -177,9 +184,9 @@ def _six() -> Vehicle:
 
 
 heavy_dir, heavy3_dir = _folder_of("heavy", lambda: HEAVY), _folder_of("heavy3", lambda: HEAVY, 3)
-everything_dir = _folder_of("everything", _everything)
+everything_dir, everything3_dir = _folder_of("everything", _everything), _folder_of("everything3", _everything, 3)
 thrust_dir, thrust3_dir = _folder_of("thrust", _thrust), _folder_of("thrust3", _thrust, 3)
-six_dir, six3_dir = _folder_of("six", _six), _folder_of("six3", _six, 3)
+six_dir, outside3_dir = _folder_of("six", _six), _folder_of("outside3", lambda: OUTSIDE, 3)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,19 @@ from typing import Any, Literal, TypeVar
 
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
-from rov_fmu.equation.layout import Curve, Direction, Driven, Fin, Layout, Position, Thruster, Vector, VehicleAxis
+from rov_fmu.equation.layout import (
+    EVERY_COMMAND,
+    Curve,
+    Direction,
+    Driven,
+    Fin,
+    Layout,
+    Position,
+    Range,
+    Thruster,
+    Vector,
+    VehicleAxis,
+)
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -248,6 +260,22 @@ def a_vehicle(rov: Vehicle) -> Vehicle:
         sources=sources,
         command_range=(0.1, 1.0),
     )
+
+
+_RANGES = (
+    Range(EVERY_COMMAND, 0.0, 0.7),
+    Range("u", 0.1, 0.4),
+    Range("v", -0.2, 0.2),
+    Range("p", -0.3, 0.5),
+    Range("phi", -0.1, 0.2),
+    Range("theta", -0.3, 0.05),
+    Range("z", 0.0, 3.0),
+)
+OUTSIDE = a_vehicle(replace(SIX, layout=replace(SIX.layout, identified=_RANGES)))
+"""The vehicle SIX with ranges for which it was identified, and so with the output `outside`.
+
+That of surge does not begin at 0, and there is one of the depth.
+"""
 
 
 # ---- Random vehicles ----

@@ -219,8 +219,8 @@ def test_an_axis_alone_has_the_steady_velocity_and_the_time_constant_of_the_fmu(
             [0.0],
             "DOP853",
             events=reached,
-            rtol=1e-9,
-            atol=1e-12,
+            rtol=1e-7,
+            atol=1e-10,
         )
         assert sign * found.y[0, -1] == pytest.approx(V_ss, rel=2e-4), velocity
         assert found.t_events[0][0] == pytest.approx(Tau, rel=2e-4), velocity
@@ -336,11 +336,11 @@ def grows(vehicle: Vehicle, *, explicit: bool) -> bool:
     """True if velocities grow without bound in steps of 1 ms: the plugin's force follows the last acceleration."""
     gazebo = Gazebo(gazebo_model(vehicle, in_world=True, explicit=explicit).text)
     newtons = {name: 0.1 * n * force for n, (name, force) in enumerate(gazebo.largest.items())}
+    thrust, accelerated = gazebo.thrust(newtons), np.linalg.inv(gazebo.rigid + gazebo.added)
     velocity: Array = np.zeros(6)
     acceleration: Array = np.zeros(6)
     for _ in range(1000):
-        load = gazebo.wrench(np.eye(3), velocity) + gazebo.thrust(newtons) + gazebo.explicit @ acceleration
-        acceleration = np.asarray(np.linalg.solve(gazebo.rigid + gazebo.added, load), dtype=float)
+        acceleration = accelerated @ (gazebo.wrench(np.eye(3), velocity) + thrust + gazebo.explicit @ acceleration)
         velocity = velocity + 1e-3 * acceleration
         if np.max(np.abs(velocity)) > 1e3:
             return True

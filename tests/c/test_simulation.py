@@ -109,7 +109,7 @@ def test_calculated_variables_agree_with_python() -> None:
 
 def test_a_motion_that_cannot_be_computed_ends_with_nan_and_affects_no_other() -> None:
     times = np.array([0.0, 1.0, 2.0])
-    found = simulate(VIDEORAY, times, {"u": 1.0, "r": [[0.1], [1e300], [0.1]]}, ["u", "psi"], vehicles=3)
+    found = simulate(VIDEORAY, times, {"x": 1e308, "V_N": [[0.0], [1e308], [0.0]], "r": 0.1}, ["u", "psi"], vehicles=3)
     assert found.failed.tolist() == [3, 1, 3]
     assert np.isnan(found.values[:, 1]).tolist() == [[False, True, True]] * 2
     np.testing.assert_array_equal(found.values[:, 0], found.values[:, 2])

@@ -8,7 +8,6 @@ from rov_fmu.vehicle.vehicle import Vehicle
 from tests.fmi import OK
 from tests.fmi2 import Fmu
 from tests.vehicles import State, Values
-from verification.references import reference
 
 Step = Callable[[Vehicle, Values, Values, float], State]
 POSE = ("x", "y", "z", "psi")
@@ -55,6 +54,8 @@ def errors(found: Values, exact: Mapping[str, Any], scale: Mapping[str, Any], be
 
 def worst(rov: Vehicle, inputs: Values, state: Values, h: float) -> float:
     """Return the largest error of a step in Python and in C, relative to the largest velocity or the path's length."""
+    from verification.references import reference
+
     exact = reference.step(rov, inputs, state, h)
     found = (step(rov, inputs, state, h) for step in (in_python, in_engine))
     return max(max(errors(one, exact.state, exact.scale, state)) for one in found)

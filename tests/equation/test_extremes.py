@@ -49,7 +49,7 @@ def step_them_all(folder: str, count: int) -> None:
             assert seconds < 10.0, case  # a million pieces take about a second
 
 
-@often("count", 3, 150)
+@often("count", 2, 150)
 def test_steps_of_absurd_size_end(count: int, videoray_dir: Path) -> None:
     # in a separate process, because a step that does not end cannot be interrupted
     code = f"from tests.equation.test_extremes import step_them_all; step_them_all({str(videoray_dir)!r}, {count})"

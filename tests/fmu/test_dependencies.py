@@ -67,7 +67,7 @@ _KINDS = [pytest.param(kind, marks=() if kind in _SOME else pytest.mark.long) fo
 def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
     rov, rng = numbered(_ROVS[kind].layout), random.Random(1)
     knowns = [*rov.layout.inputs, *rov.layout.state]
-    moving = motions(knowns, rng, 2 if rov.layout.has_attitude else 6)
+    moving = motions(knowns, rng, 2 if rov.layout.has_attitude else 4)
     sets = [parameters(rov, rng, tunable) for tunable in ([], [False], [True])]
     samples = [[slopes(rov, m | k, knowns) for m in moving] for k in sets]
 
@@ -101,7 +101,7 @@ def test_declared_initial_dependencies_are_those_of_the_equations(kind: str) -> 
     known = {*rov.layout.inputs, *rov.layout.state, *rov.layout.initial} - {*QUATERNION}
     points = [
         m | parameters(rov, rng, [False, True])
-        for m in motions(sorted(known), rng, 2 if rov.layout.has_attitude else 8)
+        for m in motions(sorted(known), rng, 2 if rov.layout.has_attitude else 4)
     ]
     samples = [slopes(rov, point, list(point)) for point in points]
     values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in known}

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tomlkit
 
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.damage import toml_of, toml_text
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING, SIX_AXES
 
@@ -42,7 +42,7 @@ GONE = object()
 
 def changed(changes: dict[str, Any], text: str = TEXT) -> str:
     """Return a file with other values of some keys. A thruster is found by its name."""
-    data: Any = tomlkit.parse(text).unwrap()
+    data = toml_of(text)
     for place, value in changes.items():
         *above, key = place.split(".")
         table = data
@@ -54,7 +54,7 @@ def changed(changes: dict[str, Any], text: str = TEXT) -> str:
             del table[key]
         else:
             table[key] = value
-    return tomlkit.dumps(data)
+    return toml_text(data)
 
 
 def quantity(value: float, unit: str) -> dict[str, Any]:

@@ -2,9 +2,7 @@
 
 import random
 from collections.abc import Iterator, Mapping
-from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,7 +10,6 @@ from mpmath import mp
 
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests import fmi3
-from tests.conftest import Made, unzipped
 from tests.fmi import (
     CO_SIMULATION,
     INITIALIZATION,
@@ -26,9 +23,9 @@ from tests.fmi import (
     room,
 )
 from tests.fmu.calls.conftest import WRAPPERS, modes_of
-from tests.fmu.results.test_outside import OUTSIDE, TILTED, excess
+from tests.fmu.results.test_outside import TILTED, excess
 from tests.often import often
-from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, State, Values, at_rest
+from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, VIDEORAY, State, Values, at_rest
 from verification.references import rigid_vehicle
 
 ROVS = {
@@ -36,19 +33,14 @@ ROVS = {
     "videoray3_dir": VIDEORAY,
     "heavy_dir": HEAVY,
     "heavy3_dir": HEAVY,
-    "everything_dir": load_vehicle(EVERYTHING),
+    "everything3_dir": load_vehicle(EVERYTHING),
     "six_dir": SIX,
     "outside3_dir": OUTSIDE,
 }
 
 
-_SOME = ("videoray_dir", "heavy3_dir", "everything_dir", "outside3_dir")
+_SOME = ("videoray_dir", "everything3_dir", "outside3_dir")
 """The FMUs of the default tests: each vehicle once, and both versions of FMI."""
-
-
-@pytest.fixture(scope="module")
-def outside3_dir(made_once: Made) -> Path:
-    return made_once("outside", partial(unzipped, OUTSIDE, fmi=3))
 
 
 @pytest.fixture(

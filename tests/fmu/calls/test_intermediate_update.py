@@ -16,7 +16,7 @@ Control = Callable[[float], Mapping[str, float]]
 """A function that returns inputs for a time."""
 
 
-@pytest.fixture(scope="module", params=["videoray3_dir", "heavy3_dir"])
+@pytest.fixture(scope="module", params=["videoray3_dir", "everything3_dir"])
 def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
     return fmi3.Fmu(request.getfixturevalue(request.param))
 

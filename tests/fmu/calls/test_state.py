@@ -23,7 +23,7 @@ from tests.fmu.calls.conftest import WRAPPERS
 from tests.fmu.calls.test_derivatives import given
 
 
-@pytest.fixture(scope="module", params=["videoray_dir", "videoray3_dir", "thrust3_dir", "six3_dir"])
+@pytest.fixture(scope="module", params=["videoray_dir", "videoray3_dir", "thrust3_dir", "outside3_dir"])
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Return the FMU of the VideoRay, of a vehicle with a dead time, or of one with six axes that counts turns."""
     return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))

@@ -7,7 +7,7 @@ import pytest
 from tests import fmi2, fmi3
 from tests.fmi import AnyInstance, reals
 
-_FOLDERS = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
+_FOLDERS = {"videoray": ("videoray_dir", "videoray3_dir"), "everything": ("everything_dir", "everything3_dir")}
 """The fixtures with the FMUs of two vehicles in both versions."""
 
 

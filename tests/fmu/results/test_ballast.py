@@ -23,7 +23,7 @@ BALLAST |= {"x_B": ROV["x_B"] + 0.01, "y_G": ROV["y_G"] - 0.005}
 IMPOSSIBLE = {"m_rov": 2.0 * ROV["m_rov"], "z_G": 50.0}
 
 
-fmu = of_both_versions("six_dir", "six3_dir", is_two_long=True)
+fmu = of_both_versions("six_dir", "outside3_dir", is_two_long=True)
 
 
 def _restarted(folder: Path) -> None:

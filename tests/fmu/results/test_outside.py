@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,24 +10,22 @@ import pytest
 from mpmath import mp
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.equation.layout import EVERY_COMMAND
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests import fmi2, fmi3
 from tests.conftest import Made, unzipped
 from tests.fmi import CONTINUOUS, ERROR, EVENT, INITIALIZATION, MODEL_EXCHANGE, STEP, AnyInstance, Fmu
 from tests.fmu.calls.conftest import modes_of
-from tests.vehicles import SIX, a_vehicle
+from tests.vehicles import OUTSIDE
 
 Ranges = Mapping[str, tuple[float, float]]
 
-_COMMAND = 0.7
+_COMMAND = next(high for name, _, high in OUTSIDE.layout.identified if name == EVERY_COMMAND)
 _FLAT = {"u": (0.2, 0.5), "w": (-0.1, 0.3), "r": (-1.0, 2.0), "z": (0.0, 3.0)}
 """The ranges of a vehicle without roll and pitch; that of surge does not begin at 0, and there is one of the depth."""
-TILTED = {"u": (-0.4, 0.4), "v": (-0.2, 0.2), "p": (-0.3, 0.5), "phi": (-0.1, 0.2), "theta": (-0.3, 0.05)}
-_RANGES = (Range(EVERY_COMMAND, 0.0, _COMMAND), *(Range(name, *ends) for name, ends in TILTED.items()))
-OUTSIDE = a_vehicle(replace(SIX, layout=replace(SIX.layout, identified=_RANGES)))
-"""A vehicle with six axes and these ranges. tests/fmu/calls/test_derivatives.py tests its derivatives."""
+TILTED = {name: (low, high) for name, low, high in OUTSIDE.layout.identified if name != EVERY_COMMAND}
+"""The ranges of a vehicle with six axes. tests/fmu/calls/test_derivatives.py tests its derivatives."""
 
 
 def _identified(lines: Iterable[str], folder: Path) -> Vehicle:
@@ -59,13 +56,13 @@ def excess(values: Mapping[str, Any], ranges: Ranges) -> Any:
     return max(found)
 
 
-@pytest.fixture(scope="module", params=["flat", "tilted"])
+@pytest.fixture(scope="module", params=[pytest.param("flat", marks=pytest.mark.long), "tilted"])
 def built(
     request: pytest.FixtureRequest, made_once: Made, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Fmu, Vehicle, Ranges]:
     """Return an FMU of either version of FMI, with its vehicle and its ranges."""
     if request.param == "tilted":
-        return fmi3.Fmu(made_once("outside", partial(unzipped, OUTSIDE, fmi=3))), OUTSIDE, TILTED
+        return fmi3.Fmu(request.getfixturevalue("outside3_dir")), OUTSIDE, TILTED
     units = {"u": "m/s", "w": "m/s", "r": "rad/s", "z": "m"}
     lines = (f'{name} = {{ range = {[*ends]}, unit = "{units[name]}" }}' for name, ends in _FLAT.items())
     vehicle = _identified(lines, tmp_path_factory.mktemp("flat"))
