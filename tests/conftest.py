@@ -55,6 +55,11 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
+def pytest_unconfigure() -> None:
+    """Give it back before the modules end. Some bindings look at the end for objects that nobody has released."""
+    gc.unfreeze()
+
+
 def pytest_itemcollected(item: pytest.Item) -> None:
     """Remove the marker `long` from a weekly test, which it may have from another of its parameters."""
     if item.get_closest_marker("weekly"):
