@@ -260,6 +260,13 @@ static real beside_origin(const filter *f, const real x[N_X], ptrdiff_t sensor)
     return found;
 }
 
+/* Return true for a sensor of an angle, which may differ by whole turns. */
+static bool wraps(const filter *f, ptrdiff_t sensor)
+{
+    const int kind = f->log->kind[sensor];
+    return kind == ANGLE || (kind == STATE && f->log->place[sensor] == f->where->heading);
+}
+
 /* Return true for a sensor that has a lag. */
 static bool lags(const filter *f, ptrdiff_t sensor)
 {
@@ -455,16 +462,23 @@ static lagging lagging_over(const filter *f, ptrdiff_t sensor, double h)
     return (lagging){remains, share - remains, 1.0 - share};
 }
 
+/* Return what a sensor would measure at once: of the angles that differ by whole turns, the one next to a value. */
+static real next_to(const filter *f, real value, const real x[N_X], ptrdiff_t sensor)
+{
+    const real found = at_once(f, x, sensor);
+    return wraps(f, sensor) ? value + remainder(found - value, TURN) : found;
+}
+
 /* Move what the sensors with a lag measure over a step, of which the states at its beginning, middle and end are known. */
 static void step_lagged(const filter *f, const real before[N_X], const real middle[N_X], double h, real x[N_X])
 {
     for (int sensor = 0; sensor < f->log->sensors; sensor++) {
         if (lags(f, sensor)) {
             const lagging part = lagging_over(f, sensor, 0.5 * h);
-            const real half = at_once(f, middle, sensor);
             real *const value = &x[LAGGED + sensor];
-            *value = part.remains * *value + part.begin * at_once(f, before, sensor) + part.end * half;
-            *value = flushed(part.remains * *value + part.begin * half + part.end * at_once(f, x, sensor));
+            const real begin = next_to(f, *value, before, sensor), half = next_to(f, begin, middle, sensor);
+            *value = part.remains * *value + part.begin * begin + part.end * half;
+            *value = flushed(part.remains * *value + part.begin * half + part.end * next_to(f, half, x, sensor));
         }
     }
 }
@@ -748,11 +762,7 @@ static real innovation(const filter *f, const belief *b, ptrdiff_t k)
     const int sensor = f->log->sensor[k];
     const real value = lags(f, sensor) ? b->x[LAGGED + sensor] : at_once(f, b->x, sensor);
     const real off = f->log->value[k] - value - b->x[NOISE + sensor];
-    const bool wraps = f->log->kind[sensor] == ANGLE || f->log->place[sensor] == f->where->heading;
-    if (wraps && f->log->kind[sensor] != OVER_GROUND) {
-        return remainder(off, TURN);
-    }
-    return off;
+    return wraps(f, sensor) ? remainder(off, TURN) : off;
 }
 
 /* Compute P H and return the variance H P H + white noise. */

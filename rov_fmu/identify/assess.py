@@ -129,8 +129,7 @@ def _with_currents(objective: Objective, best: Minimum, covariance: Array, numbe
 def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> float:
     """Return the variance of the current of an unseen log: about as large as in the other logs of a table."""
     currents = [n for n, p in enumerate(table.parameters) if p.kind == "current" and p.of != file]
-    others = float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
-    return min(table.parameters[currents[0]].deviation ** 2, _LEAST_CURRENT**2 + others)
+    return _LEAST_CURRENT**2 + float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
 
 
 def _without(objective: Objective, best: Minimum, part: _Part) -> tuple[Array, Array]:

@@ -50,6 +50,12 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = given.description.base_quantities
     sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
+    for curve in (c for c in layout.curves if "n_V" in c.keys):
+        asked = given.description.tables.known.get(curve.coefficient("V_0"))
+        reference = asked.source if asked else layout.voltage_source
+        for key, source in (("V_0", reference), ("n_V", "The usual exponent, which [priors] takes as exact")):
+            if sources[curve.coefficient(key)] == NOT_GIVEN:
+                sources[curve.coefficient(key)] = source
     intervals = {name: q.interval for name, q in known.items() if q.interval}
     estimates: dict[str, Estimated] = {}
     names = [name for name in changed if name in identified or name in intervals]

@@ -171,6 +171,25 @@ def test_a_lag_of_zero_is_none() -> None:
     assert np.abs((shown.innovations - at_once.innovations) / np.sqrt(at_once.variances)).max() < 1e-3
 
 
+@pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
+def test_a_heading_with_a_lag_turns_over(name: str) -> None:
+    """It is that of the filter y' = (psi - y) / 0.4 s, by the exponential of each interval of 5 ms."""
+    k = load_vehicle(SHIPPED[name])
+    layout = replace(k.layout, mix={}, pulse=None, has_dead_time=False)
+    k, lag, step = Vehicle(layout, {name: k[name] for name in layout.coefficients}), 0.4, 0.005
+    start = {"r": 2.0, **({QUATERNION[0]: cos(1.4), QUATERNION[3]: sin(1.4)} if layout.has_attitude else {"psi": 2.8})}
+    samples = [(step * n, 0) for n in range(400)]
+    log = record([Sensor(YAW, is_velocity=False)], samples, start=start, errors={}, inputs=[*layout.inputs])
+    log = replace(log, inputs=np.zeros_like(log.inputs))
+    at_once, shown = (-Filter(k).run(log, parameters(k, 1, lags=lags), begin=0.0).innovations for lags in ((), (lag,)))
+    psi, expected = np.unwrap(at_once), [float(at_once[0])]
+    for begin, end in zip(psi[:-1].tolist(), psi[1:].tolist(), strict=True):
+        middle = 0.5 * (begin + end)
+        expected.append(middle + (expected[-1] - middle) * exp(-step / lag))
+    assert psi.max() > 3.5, "it turns over"
+    assert np.remainder(shown - expected + pi, 2.0 * pi) - pi == pytest.approx(0.0, abs=1e-4)
+
+
 PROBES = (Sensor(YAW, is_velocity=False), Sensor(SURGE, is_velocity=True), Sensor(SURGE, is_velocity=False))
 CURRENT = {"V_N": 0.2, "V_E": -0.1}
 

@@ -365,6 +365,10 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
     if key == "voltage":
         assert found.vehicle["n_V_top"] == USUAL_EXPONENT
         assert found.vehicle.layout.voltage_source == "Mean voltage of the logs"
+        write_vehicle(found.vehicle, tmp_path / "own.toml")
+        written = load_vehicle(tmp_path / "own.toml")
+        assert written["V_0_top"] == pytest.approx(found.vehicle["V_0_top"], rel=1e-5)
+        assert written["V_0_top"] == pytest.approx(written.layout.voltage, abs=1e-3)
     if key.startswith("slow_"):
         assert key.removeprefix("slow_") not in {one.kind for one in found.disturbances}
 

@@ -27,6 +27,8 @@ _LENGTH = 0.3
 """The correlation length of the deviations, in commands."""
 _POWER = 1.5
 """Thrust grows about with this power of the command: a deviation of the force is as many times that of the command."""
+_ROUNDING = 1e-12
+"""One of a_t and b_t is 0 where it is so small relative to the other one."""
 _WEAKEST = 0.1
 """The least of 1 + eta: beyond the dead band there is always some thrust."""
 COUNT = 2 * len(KNOTS)
@@ -175,5 +177,6 @@ def nearest(
         beyond = commands - c_0
         terms, one = np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F))
         values = np.linalg.lstsq(terms, one, rcond=None)[0]
+        values[np.abs(values) < _ROUNDING * np.abs(values).max()] = 0.0
         names = [curve.coefficient(f"{key}{end}") for key in ("a_t", "b_t")]
         yield Quadratic(curve, dict(zip(names, values.tolist(), strict=True)), terms @ values - one, terms)

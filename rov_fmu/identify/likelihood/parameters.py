@@ -13,7 +13,7 @@ from math import exp, inf, log
 import numpy as np
 
 from rov_fmu.c.filter import AT_ORIGIN, Parameters, Sensor, Slow
-from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
@@ -46,9 +46,7 @@ PRIORS = {
     "drag_astern": Prior(0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
     "load": Prior(0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
     "current": Prior(0.1, "the current, m/s", "tests are made in calm water"),
-    "sensor_lag": Prior(
-        0.3, "the time constant of a sensor, s", "sensors and navigation filters smooth over 0 to 0.5 s"
-    ),
+    "sensor_lag": Prior(0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
     "sensor_place": Prior(0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"),
     "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
     "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
@@ -139,12 +137,11 @@ def has_place(sensor: Sensor) -> bool:
 
 
 def _kind_of(sensor: Sensor) -> str:
-    """Return whose lag a sensor has, in words. An angle is measured at once, so its sensor has none: it is empty."""
-    if sensor.axis.is_rotation:
-        return "of the turn rate sensor" if sensor.is_velocity else ""
+    """Return whose lag a sensor has, in words."""
     if sensor.is_velocity:
-        return "of the velocity sensor"
-    return "of the depth sensor" if sensor.axis is HEAVE else "of the position sensor"
+        return "of the turn rate sensor" if sensor.axis.is_rotation else "of the velocity sensor"
+    own = {HEAVE: "depth", YAW: "heading", ROLL: "attitude", PITCH: "attitude"}
+    return f"of the {own.get(sensor.axis, 'position')} sensor"
 
 
 _noise = partial(Parameter, is_log=True, of_motion=False)
@@ -362,7 +359,7 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
             yield Parameter("voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=0.0, high=4.0, null=0.0)
         yield from _of_sensors(logs, prior("sensor_place"))
         if prior("sensor_lag"):
-            for of in sorted({_kind_of(s) for one in logs for s in one.record.sensors} - {""}):
+            for of in sorted({_kind_of(s) for one in logs for s in one.record.sensors}):
                 yield Parameter("sensor lag", "", of, deviation=prior("sensor_lag"), low=0.0, null=0.0, unit="s")
     yield from (p for p in found if p.deviation > 0.0)
     for number, one in enumerate(logs):
