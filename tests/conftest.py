@@ -30,8 +30,8 @@ even after that logger is gone, and would then crash."""
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Return one worker more than there are cores, because some tests wait for processes."""
-    return usable_cores() + 1
+    """Return one worker for each core. One more would cost its collection, and save nothing."""
+    return usable_cores()
 
 
 def pytest_configure(config: pytest.Config) -> None:
