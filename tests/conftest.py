@@ -46,7 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Leave what the collection makes to no garbage collector. It would look through all of it again and again."""
+    """Keep the garbage collector from the collected tests. It would look through all of them again and again."""
     gc.disable()
     try:
         return (yield)
@@ -56,7 +56,7 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_unconfigure() -> None:
-    """Give it back before the modules end. Some bindings look at the end for objects that nobody has released."""
+    """Give the collected tests back to the garbage collector. Some bindings complain at the end of what is left."""
     gc.unfreeze()
 
 

@@ -145,7 +145,7 @@ static inline real flushed(real value)
     return fabs(value) < TINY ? 0.0 : value;
 }
 
-/* ---- The sensors -------------------------------------------------------------------------------------------------- */
+/* ---- The attitude and the sensors --------------------------------------------------------------------------------- */
 
 /* Compute the rotation matrix from the body to the earth. */
 static void rotation(const filter *f, const real x[N_X], real R[3][3])
@@ -533,7 +533,7 @@ static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], 
         const int j = f->listed[c];
         real change = 1e-3;
         if (j >= LAGGED && j < FORCE) {
-            continue; /* the vehicle does not know what is measured */
+            continue; /* no rate depends on what is measured */
         }
         if (j < LAGGED) {
             change = 1e-6 * (1.0 + fabs(x[j]));
@@ -566,8 +566,8 @@ static int count_before(const filter *f, int place)
     return found;
 }
 
-/* Keep a row of a matrix. */
-static void keep(const filter *f, const real row[N_X], int a, sparse *phi)
+/* Write a row of a matrix without its zeros. */
+static void set_row(const filter *f, const real row[N_X], int a, sparse *phi)
 {
     phi->count[a] = 0;
     for (int b = 0; b < f->count; b++) {
@@ -598,7 +598,7 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
             }
         }
         row[a] += 1.0;
-        keep(f, row, a, phi);
+        set_row(f, row, a, phi);
     }
 }
 
@@ -627,7 +627,7 @@ static void transition_lagged(const filter *f, const real middle[N_X], double h,
                 row[c] += part[sensor].end * H[c] * remains[f->listed[c] - FORCE];
             }
         }
-        keep(f, row, a, phi);
+        set_row(f, row, a, phi);
     }
 }
 
@@ -857,8 +857,8 @@ static int pieces_over(const filter *f, double from, double to)
 }
 #endif
 
-/* Let what the sensors with a lag measure begin at what they would measure at once. It differs from it by the lag times a rate, whose
- * standard deviation the log knows. */
+/* Let each sensor with a lag begin with what it would measure at once. The error of this is the lag times a rate of change, whose
+ * standard deviation is the `error` of its state. */
 static void begin_lagged(filter *f)
 {
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);

@@ -29,7 +29,8 @@ STATE, OVER_GROUND, ANGLE = range(3)
 DRIFTS = ("x", "y", "z")
 MOST_SENSORS = 16
 _USUAL_RATE = {False: 0.1, True: 0.3}
-"""The standard deviation of the rate of what a sensor measures when a log begins: of translations and of rotations."""
+"""How fast a measured value changes when a log begins, per second (standard deviation): False for a translation, True
+for a rotation."""
 AT_ORIGIN = (0.0, 0.0, 0.0)
 """The place of a sensor at the origin."""
 _CURRENT = ("V_N", "V_E", "V_D")

@@ -606,7 +606,7 @@ def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]
     elif effect.kind in PLACED.values():
         names["note"] = ". The vehicle file does not have it, because it tells the motion of the origin"
     elif effect.kind == "sensor lag":
-        names["note"] = ". The vehicle file does not have it, because it tells the motion and no sensor"
+        names["note"] = ". The vehicle file does not have it, because it describes the vehicle without its sensors"
     elif effect.kind == "dead time" and not identification.vehicle.layout.has_dead_time:
         names["note"] = ". The vehicle file does not have it; T_d in [commands] would add it"
     axis = of if of in AXES else ""

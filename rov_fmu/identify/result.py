@@ -116,7 +116,7 @@ class Effect:
     """An optional part of the model: what it is, of what, its size, and the evidence for it."""
 
     kind: str
-    """A key of EFFECTS in parameters.py, such as `current`."""
+    """The kind of its parameter (likelihood/parameters.py), such as `current`."""
     of: str
     """The axis, the curve or the file that has it; empty for the vehicle."""
     name: str
@@ -136,7 +136,7 @@ class Effect:
 
     @property
     def kept(self) -> bool:
-        """True if it is reported and goes into the vehicle."""
+        """True if it is reported. The vehicle file has those of the vehicle, but not those of water or sensors."""
         return self.evidence > KEPT
 
 

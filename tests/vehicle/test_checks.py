@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomlkit
 
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.damage import toml_of, toml_text
+from tests.damage import toml_of
 from tests.vehicle.test_vehicle import refusal
 from tests.vehicles import EVERYTHING, SIX_AXES
 
@@ -54,7 +55,7 @@ def changed(changes: dict[str, Any], text: str = TEXT) -> str:
             del table[key]
         else:
             table[key] = value
-    return toml_text(data)
+    return tomlkit.dumps(data)
 
 
 def quantity(value: float, unit: str) -> dict[str, Any]:

@@ -136,8 +136,8 @@ def has_place(sensor: Sensor) -> bool:
     return not sensor.axis.is_rotation and (sensor.is_velocity or sensor.axis is not HEAVE)
 
 
-def _kind_of(sensor: Sensor) -> str:
-    """Return whose lag a sensor has, in words."""
+def _with_same_lag(sensor: Sensor) -> str:
+    """Return which sensors of a vehicle share the lag of this one, in words."""
     if sensor.is_velocity:
         return "of the turn rate sensor" if sensor.axis.is_rotation else "of the velocity sensor"
     own = {HEAVE: "depth", YAW: "heading", ROLL: "attitude", PITCH: "attitude"}
@@ -302,7 +302,7 @@ class Table:
 
     def _lag(self, z: Sequence[float], sensor: Sensor) -> float | None:
         """Return the lag of a sensor; None if it has none."""
-        place = self.place("sensor lag", "", _kind_of(sensor))
+        place = self.place("sensor lag", "", _with_same_lag(sensor))
         return None if place is None else float(z[place])
 
 
@@ -357,10 +357,7 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
             yield Parameter("dead time", "", deviation=prior("dead_time"), low=0.0, null=0.0, unit="s")
         if prior("voltage") and any("n_V" in c.keys for c in known.curves):
             yield Parameter("voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=0.0, high=4.0, null=0.0)
-        yield from _of_sensors(logs, prior("sensor_place"))
-        if prior("sensor_lag"):
-            for of in sorted({_kind_of(s) for one in logs for s in one.record.sensors}):
-                yield Parameter("sensor lag", "", of, deviation=prior("sensor_lag"), low=0.0, null=0.0, unit="s")
+        yield from _of_sensors(logs, prior)
     yield from (p for p in found if p.deviation > 0.0)
     for number, one in enumerate(logs):
         yield from _of_one_log(one, number, prior)
@@ -459,8 +456,8 @@ def _of_one_log(one: SampledLog, number: int, prior: Callable[[str], float]) -> 
             yield Parameter("current", file, part, deviation=prior("current"), null=0.0, log=number, unit="m/s")
 
 
-def _of_sensors(logs: Sequence[SampledLog], deviation: float) -> Iterator[Parameter]:
-    """Yield the places of the sensors whose velocity or position changes as the vehicle turns."""
+def _of_sensors(logs: Sequence[SampledLog], prior: Callable[[str], float]) -> Iterator[Parameter]:
+    """Yield the places of the sensors whose velocity or position changes as the vehicle turns, and all lags."""
     for is_velocity, kind in PLACED.items():
         turns = {
             form.axis
@@ -469,8 +466,11 @@ def _of_sensors(logs: Sequence[SampledLog], deviation: float) -> Iterator[Parame
             if form.axis.is_rotation and any(s.is_velocity == is_velocity and has_place(s) for s in one.record.sensors)
         }
         parts = _PLACES if turns - {YAW} else _PLACES[:2] if turns else ()
-        for part in parts if deviation else ():
-            yield Parameter(kind, "", part, deviation=deviation, null=0.0, unit="m")
+        for part in parts if prior("sensor_place") else ():
+            yield Parameter(kind, "", part, deviation=prior("sensor_place"), null=0.0, unit="m")
+    lags = {_with_same_lag(sensor) for one in logs for sensor in one.record.sensors}
+    for part in sorted(lags) if prior("sensor_lag") else ():
+        yield Parameter("sensor lag", "", part, deviation=prior("sensor_lag"), low=0.0, null=0.0, unit="s")
 
 
 def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str], float]) -> Iterator[Parameter]:
