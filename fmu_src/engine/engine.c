@@ -1,6 +1,4 @@
 /* Simulation for Python, one vehicle after the other, with the bits of the FMU. */
-#include <stdlib.h>
-
 #include "engine.h"
 
 #include "series.c"
@@ -13,19 +11,18 @@ typedef struct {
     delay_line line;
 } whole;
 
-/* Return memory for a vehicle, or NULL. free() releases it. */
-lone *lone_new(void)
+size_t lone_size(void)
 {
-    return (lone *)calloc(1, sizeof(whole));
+    return sizeof(whole);
 }
 
 /* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
- * differ by whole turns, the one nearest to psi_0 is taken. */
+ * differ by whole turns, the one nearest to psi_0 is taken. The given delayed commands act, and nothing waits. */
 void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 {
     whole *const all = (whole *)v;
     double state[N_STATES];
-    memset(all, 0, sizeof *all);
+    memset(v, 0, sizeof *v);
     for (int i = 0; i < FIRST_CALCULATED; i++) {
         v->at[i] = number(&given[i], vehicle, 0);
     }
@@ -35,6 +32,12 @@ void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
     model_prepare(v->at, &all->numbers);
     memcpy(state, v->at + FIRST_STATE, sizeof state);
     model_begin(v->at, &v->heading);
+#if HAS_DEAD_TIME
+    all->line.waiting = 0;
+    for (int i = FIRST_DELAYED; i < FIRST_DELAYED + N_COMMANDS; i++) {
+        v->at[i] = number(&given[i], vehicle, 0);
+    }
+#endif
     if (HAS_ATTITUDE && model_has_direction(state)) {
         memcpy(v->at + FIRST_STATE, state, sizeof state);
         v->heading = model_heading(v->at, v->heading);
@@ -67,6 +70,12 @@ bool lone_step(lone *v, double t, double h)
     return true;
 }
 
+/* Calculate the variables that follow from the inputs and states. */
+void lone_calculate(lone *v)
+{
+    model_calculate(v->at, &((whole *)v)->numbers, v->heading);
+}
+
 /* Return the length of a piece of a vehicle in a lane, from the coefficients of its series. *reach is 1 when the series may be used up
  * to t = 1. Otherwise it becomes the largest usable t, or 0 when the series overflows. */
 double lone_length(const double c[], const double scale[], int order, double *reach, int *reversed)
@@ -96,13 +105,13 @@ void simulate(SIMULATION)
                 v->at[i] = number(&given[i], vehicle, n);
             }
             if (calculates) {
-                model_calculate(v->at, &all.numbers, v->heading);
+                lone_calculate(v);
             }
             double *to = result + vehicle * times + n;
             for (ptrdiff_t k = 0; k < records; k++) {
                 to[k * vehicles * times] = v->at[recorded[k]];
             }
-            if (n + 1 < times && !lone_step(v, time[n], time[n + 1] - time[n])) {
+            if (n + 1 < times && !lone_step(v, time[n], length[n])) {
                 failed[vehicle] = n + 1;
                 break;
             }

@@ -37,26 +37,38 @@ static inline bool is_calculated(const int *recorded, ptrdiff_t records)
 /* The arguments of both ways to simulate the vehicles from `first` to `last` - 1. The simulation ends early when *stop becomes
  * nonzero.
  *
- * `given` has one table for each variable, at its place. Inputs are held from each time to the next. Of states and
- * parameters, only the number at the first time counts. `recorded` has the places of the variables to record. They are
+ * `given` has one table for each variable, at its place. Inputs are held from each time to the next. Of states, delayed
+ * commands and parameters, only the number at the first time counts. length[n] is the time from time[n] to the next one, which
+ * the difference of two late times would tell less exactly. `recorded` has the places of the variables to record. They are
  * written to result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be
  * computed, or `times`. From that time on, nothing is recorded. */
 #define SIMULATION                                                                                                         \
-    const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,           \
-        ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records, const volatile int *stop
+    const table given[N_VARIABLES], const double *time, const double *length, const int *recorded, double *result,        \
+        ptrdiff_t *failed, ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,        \
+        const volatile int *stop
 
-EXPORT void simulate(SIMULATION);
-EXPORT int simulate_in_lanes(SIMULATION);
-
-/* A vehicle that is stepped alone. engine.c knows more of it, whose numbers would be vectors in lanes.c. */
+/* A vehicle that is stepped alone, and goes on from where it was. Its memory, of lone_size() bytes, belongs to the caller, who may
+ * change inputs and states there between steps, and may copy it. engine.c knows more of it than these numbers, which would be
+ * vectors in lanes.c: what follows from the coefficients, and the commands that wait for the dead time. */
 typedef struct {
     double at[N_VARIABLES], heading;
 } lone;
 
-lone *lone_new(void);
-void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
+EXPORT size_t lone_size(void);
+EXPORT void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
+EXPORT bool lone_step(lone *v, double t, double h);
+EXPORT void lone_calculate(lone *v);
 bool lone_waits(const lone *v);
-bool lone_step(lone *v, double t, double h);
 double lone_length(const double c[], const double scale[], int order, double *reach, int *reversed);
+
+/* Return one of several vehicles whose memory lies side by side. */
+static inline lone *lone_of(void *vehicles, ptrdiff_t n)
+{
+    return (lone *)(void *)((char *)vehicles + n * (ptrdiff_t)lone_size());
+}
+
+EXPORT void simulate(SIMULATION);
+/* `going` has the memory of the vehicles, which go on from where they were with the inputs that stand there, or is NULL. */
+EXPORT int simulate_in_lanes(SIMULATION, void *going);
 
 #endif

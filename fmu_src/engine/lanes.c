@@ -19,7 +19,7 @@ typedef struct {
     ptrdiff_t vehicle; /* or -1 */
     ptrdiff_t n;       /* the index of the time at which the present step begins */
     int pieces;        /* the pieces of this step so far, or 0 before it */
-    lone *alone;       /* for steps that are taken alone; it has the coefficients and the commands that wait */
+    lone *alone;       /* the same vehicle for steps that are taken alone, with the commands that wait; where it begins and ends */
 } lane;
 
 typedef struct {
@@ -29,27 +29,38 @@ typedef struct {
     lane lanes[LANES];
 } block;
 
-/* Let a vehicle begin in a lane. */
-static void begin_in_lane(block *b, int i, const table given[N_VARIABLES], ptrdiff_t vehicle)
+/* Let a vehicle enter a lane where it begins, or where it was. */
+static void enter_lane(block *b, int i, const table given[N_VARIABLES], ptrdiff_t vehicle, void *going)
 {
     lane *const own = &b->lanes[i];
     own->vehicle = vehicle;
     own->n = own->pieces = 0;
-    lone_begin(own->alone, given, vehicle);
+    if (going) {
+        own->alone = lone_of(going, vehicle);
+    } else {
+        lone_begin(own->alone, given, vehicle);
+    }
     for (int k = 0; k < N_VARIABLES; k++) {
         LANE(b->at[k], i) = own->alone->at[k];
     }
     LANE(b->heading, i) = own->alone->heading;
 }
 
-/* Step the vehicle of a lane alone. Return false when its motion cannot be computed. */
-static bool step_alone(block *b, int i, double t, double h)
+/* Let the vehicle that is stepped alone be where the lane is. */
+static lone *follow_lane(block *b, int i)
 {
     lone *const alone = b->lanes[i].alone;
     for (int k = 0; k < FIRST_CALCULATED; k++) {
         alone->at[k] = LANE(b->at[k], i);
     }
     alone->heading = LANE(b->heading, i);
+    return alone;
+}
+
+/* Step the vehicle of a lane alone. Return false when its motion cannot be computed. */
+static bool step_alone(block *b, int i, double t, double h)
+{
+    lone *const alone = follow_lane(b, i);
     if (!lone_step(alone, t, h)) {
         return false;
     }
@@ -144,28 +155,31 @@ static mask take_piece(block *b, mask started, mask *alone)
 }
 
 /* Return 0 when there is not enough memory. */
-int simulate_in_lanes(SIMULATION)
+int simulate_in_lanes(SIMULATION, void *going)
 {
     const bool calculates = is_calculated(recorded, records);
     ptrdiff_t waiting = first;
-    int memory = 1, busy;
+    int busy;
     block b;
+    void *const memory = going ? NULL : calloc(LANES, lone_size());
+    if (!going && !memory) {
+        return 0;
+    }
     memset(&b, 0, sizeof b);
     for (int i = 0; i < LANES; i++) {
         b.lanes[i].vehicle = -1;
-        b.lanes[i].alone = lone_new();
-        memory &= b.lanes[i].alone != NULL;
+        b.lanes[i].alone = going ? NULL : lone_of(memory, i);
     }
     do {
         mask started = NO, begins = NO, alone = NO, ends = NO;
         real h = 0.0;
         const ptrdiff_t before = waiting;
         busy = 0;
-        for (int i = 0; memory && i < LANES; i++) {
+        for (int i = 0; i < LANES; i++) {
             lane *const own = &b.lanes[i];
             if (own->vehicle < 0 && waiting < last) {
                 failed[waiting] = times;
-                begin_in_lane(&b, i, given, waiting++);
+                enter_lane(&b, i, given, waiting++, going);
             }
             if (own->vehicle < 0) {
                 continue;
@@ -173,12 +187,12 @@ int simulate_in_lanes(SIMULATION)
             busy++;
             if (own->pieces == 0) {
                 for (int k = 0; k < N_INPUTS; k++) {
-                    if (given[k].per_time != 0) {
+                    if (!going && given[k].per_time != 0) {
                         LANE(b.at[k], i) = number(&given[k], own->vehicle, own->n);
                     }
                 }
                 if (own->n + 1 < times) {
-                    LANE(h, i) = time[own->n + 1] - time[own->n];
+                    LANE(h, i) = length[own->n];
                     LANE(alone, i) = waits_in_lane(&b, i) ? YES : NO;
                     LANE(begins, i) = ~LANE(alone, i);
                 }
@@ -201,7 +215,10 @@ int simulate_in_lanes(SIMULATION)
                 for (ptrdiff_t k = 0; k < records; k++) {
                     to[k * vehicles * times] = LANE(b.at[recorded[k]], i);
                 }
-                own->vehicle = own->n + 1 < times ? own->vehicle : -1;
+                if (own->n + 1 == times) {
+                    (void)follow_lane(&b, i);
+                    own->vehicle = -1;
+                }
             }
         }
         if (ANY(started)) {
@@ -213,7 +230,7 @@ int simulate_in_lanes(SIMULATION)
                 continue;
             }
             own->pieces++;
-            if (LANE(alone, i) && !step_alone(&b, i, time[own->n], time[own->n + 1] - time[own->n])) {
+            if (LANE(alone, i) && !step_alone(&b, i, time[own->n], length[own->n])) {
                 failed[own->vehicle] = own->n + 1;
                 own->vehicle = -1;
             }
@@ -223,8 +240,6 @@ int simulate_in_lanes(SIMULATION)
             }
         }
     } while (busy > 0 && *stop == 0);
-    for (int i = 0; i < LANES; i++) {
-        free(b.lanes[i].alone);
-    }
-    return memory;
+    free(memory);
+    return 1;
 }

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.stepper import LaneStepper
 from rov_fmu.io.messages import InputError, shown
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -58,9 +58,14 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         self.observation_space = batch_space(self.single_observation_space, count)
         self.action_space = batch_space(self.single_action_space, count)
         self.coefficients: dict[str, Array] = {}
-        self.state = np.zeros((count, len(self.states)))
+        self._stepper = LaneStepper(vehicle, count)
         self.elapsed = np.zeros(count, int)
         self.over = np.zeros(count, bool)
+
+    @property
+    def state(self) -> Array:
+        """The states (vehicles x states). They may be set."""
+        return self._stepper.states
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -88,15 +93,12 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
             raise InputError(f"actions: {self.commands[n]} of vehicle {vehicle} must be a finite number")
         layout, begun = self.vehicle.layout, self.over.copy()
         command_of = np.vectorize(layout.command_of, otypes=[float]) if layout.pulse else np.asarray
-        commands = {name: command_of(fractions[:, n])[:, None] for n, name in enumerate(self.commands)}
-        start = {name: self.state[:, n, None] for n, name in enumerate(self.states)}
-        values = {**self.coefficients, **commands, **start}
-        found = simulate(self.vehicle, [0.0, self.length], values, self.states, vehicles=self.num_envs, lanes=True)
-        after = found.values[:, :, 1].T
-        failed = ~(np.abs(after) <= BOUND).all(axis=1) & ~begun
-        moved = ~(failed | begun)
-        self.state[moved] = after[moved]
-        self.elapsed[moved] += 1
+        for n in range(len(self.commands)):
+            self._stepper.inputs[:, n] = command_of(fractions[:, n])
+        before = self.state.copy()
+        failed = (self._stepper.step(self.length) | ~(np.abs(self.state) <= BOUND).all(axis=1)) & ~begun
+        self.state[failed] = before[failed]
+        self.elapsed[~(failed | begun)] += 1
         reward = -np.sum(self.state[:, self.targets] ** 2, axis=1) - 0.1 * np.sum(fractions**2, axis=1)
         truncated = (self.elapsed >= self.steps) & ~begun
         self._begin(begun)
@@ -105,11 +107,14 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         return self.state.copy(), reward, failed, truncated, {}
 
     def _begin(self, which: NDArray[np.bool_]) -> None:
-        """Start new episodes."""
-        places = self.np_random.uniform(-START, START, (int(which.sum()), len(self.targets)))
-        level = [self.vehicle.layout.at_rest[name] for name in self.states]
-        self.state[which] = level
-        self.state[np.flatnonzero(which)[:, np.newaxis], self.targets] = places
+        """Start new episodes, with no command on its way."""
+        numbers = np.flatnonzero(which)
+        if not len(numbers):
+            return
+        start = np.tile([self.vehicle.layout.at_rest[name] for name in self.states], (len(numbers), 1))
+        start[:, self.targets] = self.np_random.uniform(-START, START, (len(numbers), len(self.targets)))
+        own = {name: column[numbers] for name, column in self.coefficients.items()}
+        self._stepper.begin(own | dict(zip(self.states, start.T[:, :, np.newaxis], strict=True)), numbers.tolist())
         self.elapsed[which], self.over[which] = 0, False
 
 

@@ -50,24 +50,29 @@ def places_of(layout: Layout) -> dict[str, int]:
     return places | {f"der({name})": places[name] + len(layout.state) for name in layout.state}
 
 
-def numbers_of(vehicle: Vehicle, values: Mapping[str, float] = MappingProxyType({})) -> Array:
-    """Return the number of each variable in the arrays of the C code.
+def tables_of(
+    vehicle: Vehicle, values: Mapping[str, Any], shape: tuple[int, int]
+) -> tuple[NDArray[np.void], list[Array]]:
+    """Return a table for each variable of the C code, and the arrays whose addresses they contain.
 
-    Inputs have their usual values, coefficients those of the vehicle, and states are 0, unless `values` has others.
+    `values` broadcast to vehicles x times, the shape. Others are the usual ones, as `simulate` says.
     """
-    places = places_of(vehicle.layout)
+    layout = vehicle.layout
+    places = places_of(layout)
     numbers = np.zeros(len(places))
-    for name, number in {**vehicle.layout.usual_inputs, **vehicle.coefficients, **values}.items():
-        if name in places:
-            numbers[places[name]] = number
-    return numbers
-
-
-def tables_of(numbers: Array) -> NDArray[np.void]:
-    """Return a table for each number, which is the same for all vehicles and times. The array must stay alive."""
-    tables = np.zeros(len(numbers), TABLE)
+    tables = np.zeros(len(places), TABLE)
     tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
-    return tables
+    arrays = [numbers]
+    neutral = {name: declaration.start for name, declaration in layout.delayed.items()}
+    coefficients = {name: vehicle[name] for name in layout.coefficients}
+    for name, value in {**neutral, **layout.usual_inputs, **coefficients, **values}.items():
+        array = np.require(value, np.float64, ["C", "A"])
+        if array.ndim == 0:
+            numbers[places[name]] = array
+        else:
+            arrays.append(table := np.broadcast_to(array, shape))
+            tables[places[name]] = table.ctypes.data, *(stride // table.itemsize for stride in table.strides)
+    return tables, arrays
 
 
 def usable_cores() -> int:
@@ -92,6 +97,9 @@ def simulate(
     usual voltage. States that are not given are 0, and coefficients that are not given are those of the vehicle.
     `record` names the variables to record, by default the states. The results do not depend on the number of workers.
 
+    Of a vehicle with a dead time, the delayed commands may be given, too: those that act at the first time. Otherwise
+    no command acts yet.
+
     The attitude of a vehicle with roll or pitch begins at the Euler angles phi_0, theta_0 and psi_0, which are 0 by
     default, or at the quaternion among the states.
 
@@ -102,49 +110,50 @@ def simulate(
     """
     record = list(vehicle.layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
-    shape = vehicles, len(times)
-    places, numbers = places_of(vehicle.layout), numbers_of(vehicle)
-    tables = tables_of(numbers)
-    arrays = []  # keeps the arrays alive while C uses their addresses
-    for name, value in values.items():
-        array = np.require(value, np.float64, ["C", "A"])
-        if array.ndim == 0:
-            numbers[places[name]] = array
-        else:
-            arrays.append(table := np.broadcast_to(array, shape))
-            tables[places[name]] = table.ctypes.data, *(stride // table.itemsize for stride in table.strides)
+    lengths = np.diff(times)
+    tables, arrays = tables_of(vehicle, values, (vehicles, len(times)))
+    places = places_of(vehicle.layout)
     recorded = np.array([places[name] for name in record], np.intc)
-    result = np.empty((len(record), *shape))
+    result = np.empty((len(record), vehicles, len(times)))
     failed = np.empty(vehicles, np.intp)
     run = load_library(vehicle, LANES_FILE).simulate_in_lanes if lanes else load_library(vehicle).simulate
     run.restype = ctypes.c_int if lanes else None
-    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (tables, times, recorded, result, failed)]
-    stop = ctypes.c_int(0)
+    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (tables, times, lengths, recorded, result, failed)]
 
-    def run_part(first: int) -> None:
-        sizes = len(times), vehicles, first, min(first + size, vehicles), len(record)
-        if run(*pointers, *map(ctypes.c_ssize_t, sizes), ctypes.byref(stop)) == 0:
+    def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
+        sizes = map(ctypes.c_ssize_t, (len(times), vehicles, first, last, len(record)))
+        if run(*pointers, *sizes, ctypes.byref(stop), *([None] if lanes else [])) == 0:
             raise MemoryError
 
-    workers = min(workers or usable_cores(), vehicles)
-    size = -(-vehicles // (_PARTS * workers))
-    if lanes:
-        size = max(size, min(_FULL, -(-vehicles // workers)))
-    firsts = range(0, vehicles, size)
-    if vehicles * len(times) <= (_BRIEF if workers == 1 else _SHORT):
-        size = vehicles
-        run_part(0)
-    else:
-        _run_parts(run_part, firsts, workers, stop)
+    on_cores(run_part, vehicles, len(times), workers, lanes=lanes)
     for one in np.flatnonzero(failed < len(times)):
         result[:, one, failed[one] :] = np.nan
     return Trajectories(result, failed)
 
 
-def _run_parts(run_part: Callable[[int], None], firsts: range, workers: int, stop: ctypes.c_int) -> None:
-    """Run the parts in threads. C runs without Python's lock, so they run at the same time. Ctrl-C ends them."""
+def on_cores(
+    run_part: Callable[[int, int, ctypes.c_int], None],
+    vehicles: int,
+    times: int,
+    workers: int | None = None,
+    *,
+    lanes: bool = False,
+) -> None:
+    """Call a function for parts of the vehicles, each from a first one to before a last one, on all cores.
+
+    C runs without Python's lock, so the parts run at the same time. Ctrl-C ends them: their third argument becomes 1.
+    """
+    workers = min(workers or usable_cores(), vehicles)
+    stop = ctypes.c_int(0)
+    if vehicles * times <= (_BRIEF if workers == 1 else _SHORT):
+        run_part(0, vehicles, stop)
+        return
+    size = -(-vehicles // (_PARTS * workers))
+    if lanes:
+        size = max(size, min(_FULL, -(-vehicles // workers)))
     with ThreadPoolExecutor(workers) as pool:
-        parts = [pool.submit(run_part, first) for first in firsts]
+        firsts = range(0, vehicles, size)
+        parts = [pool.submit(run_part, first, min(first + size, vehicles), stop) for first in firsts]
         try:
             while wait(parts, _POLL).not_done:
                 pass

@@ -1,23 +1,69 @@
-"""Step one vehicle again and again with the FMU's own C, as a simulation that waits for its commands needs it."""
+"""Step vehicles again and again with the FMU's own C, as a simulation that waits for its commands needs it.
+
+Each vehicle goes on from where it was, with all that its states do not tell: the commands that wait for the dead time,
+and the turns of its heading.
+"""
 
 import ctypes
-from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from math import isfinite
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import numbers_of, places_of, tables_of
+from rov_fmu.c.simulation import Array, on_cores, places_of, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
-class Stepper:
-    """One vehicle that is stepped from time 0 on. The inputs are held over each step, and each step is exact.
+class _Going:
+    """Vehicles of the same layout that go on from where they were.
 
-    All arrays and pointers are made once, so a step costs little more than its computation.
+    C works in their memory, an array, so that Python frees it, and a copy of this object is a copy of the vehicles.
     """
+
+    def __init__(self, vehicle: Vehicle, count: int, file: Path) -> None:
+        self.vehicle, self._file = vehicle, file
+        library = load_library(vehicle, file)
+        library.lone_size.restype = ctypes.c_size_t
+        self._memory = np.zeros((count, library.lone_size() // 8))
+        self._connect()
+
+    def _connect(self) -> None:
+        """Find the functions of the library, and the variables of each vehicle at the beginning of its memory."""
+        layout, library = self.vehicle.layout, load_library(self.vehicle, self._file)
+        library.lone_step.restype = ctypes.c_bool
+        inputs, states = len(layout.inputs), len(layout.state)
+        begin, width = self._memory.ctypes.data, self._memory.strides[0]
+        self._c = library, [ctypes.c_void_p(begin + n * width) for n in range(len(self._memory))]
+        self._variables = self._memory[:, : len(places_of(layout))]
+        self.inputs = self._memory[:, :inputs]
+        """The inputs (vehicles x inputs), which are held until they are set."""
+        self.states = self._memory[:, inputs : inputs + states]
+        """The states (vehicles x states), which may be set."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        made = ("_c", "_variables", "inputs", "states")
+        return {name: value for name, value in vars(self).items() if name not in made}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._connect()
+
+    def begin(self, values: Mapping[str, Any], which: Sequence[int] = (0,)) -> None:
+        """Let some vehicles begin anew, with no command on its way. `values` are those of `simulate`, for these."""
+        library, addresses = self._c
+        tables, arrays = tables_of(self.vehicle, values, (len(which), 1))
+        for n, vehicle in enumerate(which):
+            library.lone_begin(addresses[vehicle], ctypes.c_void_p(tables.ctypes.data), ctypes.c_ssize_t(n))
+        del arrays  # their addresses stood in the tables
+
+
+class Stepper(_Going):
+    """One vehicle that is stepped from time 0 on, with the bits of the FMU. Each step is exact."""
 
     def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
         """Begin at time 0 s. `start` contains inputs and states in SI units, and Euler angles at the start, by name.
@@ -25,61 +71,58 @@ class Stepper:
         Others have their usual values. `record` names the variables that each step returns. The arguments are not
         checked. Raises BuildError when the engine cannot be compiled.
         """
-        layout = vehicle.layout
-        self._commands = tuple(layout.commands)
-        self._dead_time = vehicle["T_d"] if layout.has_dead_time else 0.0
-        # this object keeps the commands that wait, so the engine gets a vehicle without a dead time
-        vehicle = Vehicle(replace(layout, has_dead_time=False), vehicle.coefficients)
-        places, states = places_of(vehicle.layout), [*vehicle.layout.state]
-        self._numbers = numbers_of(vehicle, start)
-        continued = [f"{name}_0" for name in vehicle.layout.continued]  # the heading of a vehicle with an attitude
-        tables = tables_of(self._numbers)
-        kept = [*states, *vehicle.layout.continued]
-        recorded = np.array([places[name] for name in (*kept, *record)], np.intc)
-        self._kept = np.array([places[name] for name in (*states, *continued)])
-        self._inputs = {name: places[name] for name in vehicle.layout.inputs}
-        self._result = np.empty((len(recorded), 2))
-        self._times = np.zeros(2)
-        self._failed = np.empty(1, np.intp)
-        self._arrays = tables, recorded, ctypes.c_int(0)  # keeps the arrays alive while C uses their addresses
-        self._simulate = load_library(vehicle).simulate
-        self._simulate.restype = None
-        used = (tables, self._times, recorded, self._result, self._failed)
-        sizes = map(ctypes.c_ssize_t, (2, 1, 0, 1, len(recorded)))
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in used]
-        self._arguments = (*pointers, *sizes, ctypes.byref(self._arrays[2]))
-        self._waiting: deque[tuple[float, list[float]]] = deque()
+        places = places_of(vehicle.layout)
+        self._recorded = np.array([places[name] for name in record], int)
         self.time = 0.0
         """The time, s."""
+        super().__init__(vehicle, 1, ENGINE_FILE)
+        self.begin(start)
 
-    def step(self, commands: Sequence[float], h: float) -> list[float]:
-        """Hold the commands, in the order of `layout.commands`, for h > 0 seconds. Return the recorded variables.
+    def step(self, inputs: Sequence[float], h: float) -> list[float]:
+        """Hold the inputs for h > 0 seconds, and return the recorded variables at the end.
 
-        They are those at the end of the step. Raises OverflowError if the motion cannot be computed.
+        `inputs` are the commands, or all inputs, in the order of `layout.inputs`, which begins with the commands. The
+        others stay as they are. Raises OverflowError if the motion cannot be computed.
         """
-        end = self.time + h
-        if not self._dead_time:
-            self._act(commands)
-            return self._move(end)
-        self._waiting.append((self.time + self._dead_time, [*commands]))
-        while self._waiting and self._waiting[0][0] < end:
-            arrival, acting = self._waiting.popleft()
-            if arrival > self.time:
-                self._move(arrival)
-            self._act(acting)
-        return self._move(end)
-
-    def _act(self, commands: Sequence[float]) -> None:
-        for name, value in zip(self._commands, commands, strict=True):
-            self._numbers[self._inputs[name]] = value
-
-    def _move(self, end: float) -> list[float]:
-        self._times[1] = end - self.time
-        self._simulate(*self._arguments)
-        results: list[float] = self._result[:, 1].tolist()
-        if self._failed[0] < 2 or not all(map(isfinite, results)):
+        library, (address,) = self._c
+        self.inputs[0, : len(inputs)] = inputs
+        done = library.lone_step(address, ctypes.c_double(self.time), ctypes.c_double(h))
+        results = self.recorded()
+        if not done or not all(map(isfinite, results)):
             raise OverflowError(f"the motion cannot be computed from {self.time:g} s on")
-        count = len(self._kept)
-        self._numbers[self._kept] = results[:count]
-        self.time = end
-        return results[count:]
+        self.time += h
+        return results
+
+    def recorded(self) -> list[float]:
+        """Return the recorded variables now."""
+        library, (address,) = self._c
+        library.lone_calculate(address)
+        results: list[float] = self._variables[0].take(self._recorded).tolist()
+        return results
+
+
+class LaneStepper(_Going):
+    """Many vehicles that are stepped together, in the lanes of vectors on all cores, as `simulate` does with `lanes`.
+
+    They begin at rest with the usual inputs. Raises BuildError when the engine cannot be compiled.
+    """
+
+    def __init__(self, vehicle: Vehicle, count: int) -> None:
+        super().__init__(vehicle, count, LANES_FILE)
+        self.begin({}, range(count))
+
+    def step(self, h: float) -> NDArray[np.bool_]:
+        """Step all vehicles over h > 0 seconds. Return True for those whose motion cannot be computed; they stay."""
+        library, addresses = self._c
+        count = len(addresses)
+        times, length, failed = np.zeros(2), np.array([h]), np.empty(count, np.intp)  # each has a time of its own
+        nothing = ctypes.c_void_p()
+        before = [nothing, *(ctypes.c_void_p(one.ctypes.data) for one in (times, length))]
+        after = [nothing, nothing, ctypes.c_void_p(failed.ctypes.data)]
+
+        def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
+            sizes = map(ctypes.c_ssize_t, (2, count, first, last, 0))
+            library.simulate_in_lanes(*before, *after, *sizes, ctypes.byref(stop), addresses[0])
+
+        on_cores(run_part, count, 2, lanes=True)
+        return failed < 2
