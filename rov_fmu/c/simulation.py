@@ -111,7 +111,7 @@ def simulate(
     record = list(vehicle.layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
     lengths = np.diff(times)
-    tables, arrays = tables_of(vehicle, values, (vehicles, len(times)))
+    tables, _alive = tables_of(vehicle, values, (vehicles, len(times)))
     places = places_of(vehicle.layout)
     recorded = np.array([places[name] for name in record], np.intc)
     result = np.empty((len(record), vehicles, len(times)))

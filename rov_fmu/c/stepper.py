@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import Array, on_cores, places_of, tables_of
+from rov_fmu.c.simulation import on_cores, places_of, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -56,10 +56,9 @@ class _Going:
     def begin(self, values: Mapping[str, Any], which: Sequence[int] = (0,)) -> None:
         """Let some vehicles begin anew, with no command on its way. `values` are those of `simulate`, for these."""
         library, addresses = self._c
-        tables, arrays = tables_of(self.vehicle, values, (len(which), 1))
+        tables, _alive = tables_of(self.vehicle, values, (len(which), 1))
         for n, vehicle in enumerate(which):
             library.lone_begin(addresses[vehicle], ctypes.c_void_p(tables.ctypes.data), ctypes.c_ssize_t(n))
-        del arrays  # their addresses stood in the tables
 
 
 class Stepper(_Going):

@@ -90,14 +90,6 @@ class ThrustTable:
         """
         return float(interpolated(command, (self.commands, self.forces, self.slopes)))
 
-    def slope(self, command: float) -> float:
-        """Return the derivative of `force` with respect to the command."""
-        n = min(max(bisect_right(self.commands, command) - 1, 0), len(self.commands) - 2)
-        h = self.commands[n + 1] - self.commands[n]
-        t, rise = (command - self.commands[n]) / h, self.forces[n + 1] - self.forces[n]
-        a, b = h * self.slopes[n], h * self.slopes[n + 1]
-        return (a + t * (2.0 * (3.0 * rise - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * rise))) / h
-
 
 @dataclass(frozen=True)
 class CurrentTable:

@@ -94,11 +94,11 @@ def checked_values(
 
 
 def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> dict[str, Array]:
-    """Return the states and the Euler angles at the start as arrays, by name.
+    """Return the states, the Euler angles and the delayed commands at the start as arrays, by name.
 
     Raises InputError if one cannot be used, or if the attitude is given both as a quaternion and as angles.
     """
-    states = checked_values("start", given, layout.state | layout.initial, many=many)
+    states = checked_values("start", given, layout.state | layout.initial | layout.delayed, many=many)
     if quaternion := [states[name] for name in QUATERNION if name in states]:
         if angles := states.keys() & layout.initial.keys() - {"psi_0"}:
             raise InputError(
@@ -142,6 +142,15 @@ def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -
         for beyond in _beyond(values[name], layout.commands[name]):
             warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
     return times, values
+
+
+def held_inputs(layout: Layout, inputs: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of all inputs of a step, in the order of the layout: those that are given, and the usual ones.
+
+    Raises InputError. Warns about commands that saturate.
+    """
+    _, values = checked_inputs(layout, np.zeros(1), inputs, many=False)
+    return {**layout.usual_inputs, **{name: value.item() for name, value in values.items()}}
 
 
 def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:

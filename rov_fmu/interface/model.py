@@ -3,8 +3,6 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from math import inf
-from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -29,9 +27,11 @@ from rov_fmu.interface.arguments import (
     checked_values,
     checked_workers,
     duration_times,
+    held_inputs,
     number_of_vehicles,
 )
 from rov_fmu.interface.result import Result
+from rov_fmu.interface.stepper import VehicleStepper, checked_length
 from rov_fmu.io.messages import InputError, only, shown
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
@@ -85,7 +85,8 @@ class VehicleModel(Vehicle):
         `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
         pitch begins at the Euler angles phi_0, theta_0 and psi_0 (rad), which `start` may contain, too. They are 0 by
         default: level and heading north. Instead of them, `start` may contain the quaternion, and psi_0, which selects
-        the number of full turns of the heading.
+        the number of full turns of the heading. With a dead time, it may contain the delayed commands, which act at the
+        first time; by default, no command acts yet.
 
         `record` names the variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the
         outputs of the FMU: states and thrust.
@@ -209,14 +210,26 @@ class VehicleModel(Vehicle):
         """Return the states after h > 0 seconds with the inputs held, exact up to rounding.
 
         `inputs` are those of `simulate` as numbers, also along axes: `vehicle.step({"surge": 0.3}, state, 0.1)`. The
-        other inputs have their usual values, and the states that `state` does not give are those at rest. Without a
-        dead time, repeated steps give the motion that `simulate` gives.
+        other inputs have their usual values, and the states that `state` does not give are those at rest. Commands act
+        at once, unless the delayed commands are given, too. This is the second implementation, in Python: it needs no
+        compiler and takes milliseconds. For loops there is `stepper`.
 
         Raises InputError about an argument that cannot be used.
         """
-        if not (isinstance(h, Real) and 0.0 < h < inf):
-            raise InputError(f"h = {shown(h)}: must be a time above 0, s")
-        return super().step(self._all_inputs(inputs), self._all_states(state), h)
+        return super().step(self._all_inputs(inputs), self._all_states(state), checked_length(h))
+
+    def stepper(self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None) -> VehicleStepper:
+        """Return the vehicle at time 0 s, to be stepped in a loop: with the results of `simulate` to the last bit.
+
+        It goes on from where it was, with everything that its states do not tell, such as commands that wait for the
+        dead time. `start` and `record` are those of `simulate`.
+
+        Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
+        """
+        check_coefficients(self.layout, self.coefficients)
+        begin = {name: value.item() for name, value in checked_start(start, self.layout, many=False).items()}
+        names = [v.name for v in variables(self) if v.causality != "parameter"]
+        return VehicleStepper(self, begin, checked_record(record, self.layout, names))
 
     def derivatives(self, inputs: Mapping[str, float], state: Mapping[str, float]) -> dict[str, float]:
         """Return the time derivatives of the states by their names. The arguments are those of `step`."""
@@ -237,8 +250,7 @@ class VehicleModel(Vehicle):
         layout = self.layout
         delayed = {name: value for name, value in inputs.items() if name in layout.delayed}
         given = {name: value for name, value in inputs.items() if name not in delayed}
-        _, values = checked_inputs(layout, np.zeros(1), given, many=False)
-        return {**layout.usual_inputs, **{name: value.item() for name, value in values.items()}, **delayed}
+        return {**held_inputs(layout, given), **delayed}
 
     def _all_states(self, state: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all states, and the heading of a vehicle with an attitude if it is given."""
@@ -290,7 +302,8 @@ class VehicleModel(Vehicle):
         vehicles = number_of_vehicles(values)
         try:
             attitude = QUATERNION if layout.has_attitude else ()
-            others = (*attitude, *(() if many else layout.commands))
+            going = (*layout.state, *layout.continued, *layout.delayed)
+            others = attitude if many else (*going, *layout.commands)
             recording = [*recorded, *(name for name in others if name not in recorded)]
             trajectories = simulate(
                 self, step_times, values, recording, vehicles=vehicles, workers=workers, lanes=lanes
@@ -304,13 +317,14 @@ class VehicleModel(Vehicle):
         if attitude:
             self._warn_if_turned_over(step_times, trajectories.values[[recording.index(name) for name in attitude]])
         rows = trajectories.values
+        ends = {name: (row if many else row[0])[..., -1][()] for name, row in zip(recording, rows, strict=True)}
         if len(step_times) > len(times):
             rows = rows[..., np.searchsorted(step_times, times)]
         return Result(
             times,
             {name: row if many else row[0] for name, row in zip(recorded, rows, strict=False)},
             {name: units[name] for name in recorded},
-            tuple(name for name in recorded if name in layout.state),
+            {f"{name}_0" if name in layout.continued else name: ends[name] for name in going if name in ends},
             np.flatnonzero(trajectories.failed < len(step_times)),
             {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
             "us" if layout.pulse else "1",

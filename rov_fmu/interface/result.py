@@ -58,8 +58,12 @@ class Result(Mapping[str, Array]):
     """The arrays by name."""
     units: Mapping[str, str]
     """The SI unit of each variable, by its name; "1" for commands that are fractions."""
-    states: tuple[str, ...]
-    """The recorded variables that are states."""
+    final: Mapping[str, Array]
+    """The states at the last time, by name: the `start` of a simulation that continues this one.
+
+    It also contains the heading psi_0 of a vehicle with roll or pitch, and the commands that act after the dead time,
+    but not those that still wait for it: `VehicleModel.stepper` keeps them. Of many vehicles, it has what was
+    recorded."""
     failed: NDArray[np.intp]
     """The numbers of the vehicles whose motion could not be computed to the end; their arrays end with NaN."""
     commands: Mapping[str, Array] = field(default_factory=dict)
@@ -90,17 +94,6 @@ class Result(Mapping[str, Array]):
     def names(self) -> tuple[str, ...]:
         """The names of the recorded variables."""
         return tuple(self.arrays)
-
-    @property
-    def final(self) -> dict[str, Array]:
-        """The recorded states at the last time, by name: the `start` of a simulation that continues this one.
-
-        For a vehicle with roll or pitch, it also contains psi_0, so that the heading continues. It does not contain
-        changes of commands that are still waiting for the dead time.
-        """
-        ends = {name: values[..., -1][()] for name, values in self.arrays.items()}
-        start = {name: ends[name] for name in self.states}
-        return start | ({"psi_0": ends["psi"]} if {*QUATERNION, "psi"} <= ends.keys() else {})
 
     def to_dataframe(self) -> "pd.DataFrame":
         """Return a pandas data frame with a column for each variable.

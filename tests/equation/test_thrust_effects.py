@@ -83,8 +83,6 @@ def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
     forces = [table.force(c) for c in commands]
     assert forces == pytest.approx(PchipInterpolator(*zip(*points, strict=True))(commands), rel=1e-13, abs=1e-13)
     assert (np.diff(forces) >= 0.0).all()
-    slopes = PchipInterpolator(*zip(*points, strict=True)).derivative()(commands)
-    assert [table.slope(c) for c in commands] == pytest.approx(slopes, rel=1e-12, abs=1e-12)
     assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
 
 

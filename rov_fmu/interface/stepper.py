@@ -1,0 +1,52 @@
+"""A vehicle that is stepped in the loop of a program, such as a controller."""
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from numbers import Real
+
+from rov_fmu.c.stepper import Stepper
+from rov_fmu.interface.arguments import held_inputs
+from rov_fmu.io.messages import InputError, shown
+from rov_fmu.vehicle.vehicle import Vehicle
+
+
+class VehicleStepper:
+    """A vehicle that is stepped again and again by the C code of the FMU; `VehicleModel.stepper` makes one.
+
+    `copy.deepcopy` makes a second one, which goes its own way from there.
+    """
+
+    def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
+        self._stepper, self._record = Stepper(vehicle, start, record), tuple(record)
+
+    @property
+    def time(self) -> float:
+        """The time since the start, s."""
+        return self._stepper.time
+
+    @property
+    def now(self) -> dict[str, float]:
+        """The recorded variables now, by name."""
+        return dict(zip(self._record, self._stepper.recorded(), strict=True))
+
+    def step(self, inputs: Mapping[str, float], h: float) -> dict[str, float]:
+        """Hold inputs for h > 0 seconds, and return the recorded variables at the end, by name.
+
+        `inputs` are those of `simulate` as numbers, also along axes: `stepper.step({"surge": 0.3}, 0.1)`. The other
+        inputs have their usual values.
+
+        Raises InputError about an argument that cannot be used, or if the motion cannot be computed.
+        """
+        h = checked_length(h)
+        values = [*held_inputs(self._stepper.vehicle.layout, inputs).values()]
+        try:
+            return dict(zip(self._record, self._stepper.step(values, h), strict=True))
+        except OverflowError as error:
+            raise InputError(f"{error}: it overflows, or never settles and needs shorter steps than {h:g} s") from error
+
+
+def checked_length(h: float) -> float:
+    """Return the length of a step, s. Raises InputError if it is not above 0."""
+    if not (isinstance(h, Real) and 0.0 < h < inf):
+        raise InputError(f"h = {shown(h)}: must be a time above 0, s")
+    return float(h)
