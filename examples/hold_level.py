@@ -3,7 +3,6 @@
 The law is that of `verification/references/autopilot/ardusub.py`. The page that flies holds the Heavy in the same way.
 """
 
-import warnings
 from collections.abc import Callable
 from math import cos, degrees, sin
 
@@ -15,16 +14,14 @@ STEP = 0.02
 
 
 def fly(seconds: float, forward: float, hold: Hold | None, print_line: Callable[[str], None] = print) -> float:
-    """Fly the Heavy ahead from a depth of 1 m in steps of `simulate`, and return the largest tilt, rad.
+    """Fly the Heavy ahead from a depth of 1 m, and return the largest tilt, rad.
 
     `forward` is the stick at the end of its way. Without a hold, it alone drives the motors.
     """
-    vehicle = rov_fmu.load("bluerov2_heavy")
-    state: dict[str, float] = {"z": 1.0}
-    run = vehicle.simulate([0.0, STEP], start=state)
+    heavy = rov_fmu.load("bluerov2_heavy").stepper(start={"z": 1.0})
+    now = heavy.now
     sinking = most = stick = 0.0
     for step in range(round(seconds / STEP)):
-        now = {name: float(run[name][-1]) for name in run.names}
         phi, theta = now["phi"], now["theta"]
         down = -sin(theta) * now["u"] + cos(theta) * (sin(phi) * now["v"] + cos(phi) * now["w"])
         motion = Motion(
@@ -34,13 +31,12 @@ def fly(seconds: float, forward: float, hold: Hold | None, print_line: Callable[
         stick += STEP / (STEP + STICK) * (forward - stick)
         outputs = hold.outputs(motion, stick, 0.0, STEP) if hold else [stick * f[4] for f in VECTORED_6DOF]
         commands = {f"u_{n}": output for n, output in enumerate(outputs, 1)}
-        run = vehicle.simulate([0.0, STEP], commands, start=run.final)
+        now = heavy.step(commands, STEP)
         if (step + 1) % round(5.0 / STEP) == 0:
             print_line(f"{(step + 1) * STEP:4.0f} s: {now['x']:5.1f} m ahead, depth {now['z']:5.2f} m")
     return most
 
 
 if __name__ == "__main__":
-    warnings.filterwarnings("ignore", ".*turns over")
     for words, law in (("held level", Hold()), ("raw thrusters", None)):
         print(f"{words}: the largest tilt is {degrees(fly(20.0, 1.0, law)):.0f} degrees")

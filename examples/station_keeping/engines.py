@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from examples.systems import PARAMETER_SET
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -34,22 +34,21 @@ def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
     layout, given = rov.layout, values["rov"]
     rov = rov.replaced({name: given[name] for name in layout.coefficients})
     inputs = dict.fromkeys(layout.inputs, 0.0) | {name: given[name] for name in layout.inputs if name in given}
-    state = dict.fromkeys(layout.state, 0.0)
+    stepper, state = Stepper(rov, inputs, [*layout.state]), dict.fromkeys(layout.state, 0.0)
     autopilot = Autopilot(instance_name="autopilot")
     for name, value in values["autopilot"].items():
         setattr(autopilot, name, value)
 
-    def commands() -> dict[str, float]:
-        return inputs | {name: getattr(autopilot, name) for name in layout.commands}
+    def commands() -> list[float]:
+        return [getattr(autopilot, name) for name in layout.commands]
 
     rows = []
-    step = np.array([0.0, STEP])
     for n in range(STEPS):
         autopilot.z, autopilot.psi = state["z"], state["psi"]
         before = commands()
         autopilot.do_step(n * STEP, STEP)
-        after = simulate(rov, step, {**(commands() if sequential else before), **state}).values[:, 0, -1]
-        state = dict(zip(layout.state, after.tolist(), strict=True))
+        after = stepper.step(commands() if sequential else before, STEP)
+        state = dict(zip(layout.state, after, strict=True))
         now = {"rov": state, "autopilot": vars(autopilot)}
         rows.append([now[component][name] for component, name in NAMES])
     return _trajectory(rows)

@@ -18,6 +18,7 @@ from pathlib import Path
 from fat_macho import FatWriter
 from platformdirs import user_cache_path
 
+from rov_fmu.c.own_files import own_folder
 from rov_fmu.io.child_process import cause, kill
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
 from rov_fmu.io.messages import MOST, listed
@@ -285,17 +286,15 @@ def _compiled(
 
 
 def _cache() -> str:
-    """Return the compiler's cache folder: the usual one, or a temporary one if that cannot be written.
+    """Return the compiler's cache folder: the usual one, or a temporary one unless this user alone can write that.
 
-    Without a folder that it can write, the compiler may try for ever.
+    Without a folder that it can write, the compiler may try for ever. What it finds there becomes part of a library.
     """
     folder = Path(os.environ.get(_CACHE_VARIABLE) or user_cache_path("zig", appauthor=False)).absolute()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return str(folder)
+        return str(own_folder(folder))
     except OSError as error:
-        reason = f"{folder}: the compiler's cache cannot be written there: {error.strerror}"
+        reason = f"{folder}: the compiler's cache cannot be there: {error.strerror}"
         remedy = f"A temporary one is used, which makes compiling slow; {_CACHE_VARIABLE} can name another folder"
         warnings.warn(f"{reason}. {remedy}", UserWarning, stacklevel=2)
         return _temporary_cache()

@@ -5,6 +5,7 @@ import hashlib
 import json
 import platform
 import sys
+import warnings
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -23,6 +24,7 @@ from rov_fmu.c.compile import (
     compile_engine,
     engine_flags,
 )
+from rov_fmu.c.own_files import is_own_file, own_folder
 from rov_fmu.c.source import sources
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
@@ -60,14 +62,18 @@ def _load(texts: dict[str, str]) -> ctypes.CDLL:
     """Load the library of these sources from the cache folder, or from a temporary one when that fails."""
     key = _key(texts)
     content = None
-    with suppress(OSError):
-        folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in folder.glob(f"{key}-*"):
-            if path.name == _name(key, path.read_bytes()):  # otherwise the library is damaged
+    folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
+    try:
+        own = own_folder(folder)
+        for path in own.glob(f"{key}-*"):
+            if is_own_file(path) and path.name == _name(key, path.read_bytes()):  # otherwise the library is damaged
                 return ctypes.CDLL(str(path))
         content = compile_engine(texts)
-        return ctypes.CDLL(str(_write(folder, key, content)))
+        return ctypes.CDLL(str(_write(own, key, content)))
+    except OSError as error:
+        reason = f"{folder}: the compiled engine cannot be kept there: {error.strerror or error}"
+        remedy = "It is compiled for this process alone, which takes some seconds"
+        warnings.warn(f"{reason}. {remedy}", UserWarning, stacklevel=2)
     with temporary_folder("rov-fmu-") as temporary:
         return ctypes.CDLL(str(_write(Path(temporary), key, content or compile_engine(texts))))
 
@@ -96,7 +102,10 @@ def _processor() -> str:
 def _write(folder: Path, key: str, content: bytes) -> Path:
     """Write a library whole or not at all. Another process may write the same library at the same time."""
     path = folder / _name(key, content)
+    if path.is_symlink() or (path.exists() and not is_own_file(path)):
+        path.unlink()
     write_whole(Output(path, content))
+    path.chmod(0o600)  # whatever the umask is
     return path
 
 

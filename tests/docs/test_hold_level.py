@@ -2,14 +2,10 @@
 
 from math import degrees, pi
 
-import pytest
-
 from examples.hold_level import fly
 from verification.references.autopilot.ardusub import Hold
 
 
-@pytest.mark.long
-@pytest.mark.filterwarnings("ignore:.*turns over")
 def test_the_example_flies_level() -> None:
     lines: list[str] = []
     assert degrees(fly(5.0, 1.0, Hold(), lines.append)) < 35.0
