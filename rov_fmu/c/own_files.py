@@ -20,16 +20,16 @@ def own_folder(folder: Path) -> Path:
     owns or can write it or a folder above it. Of a folder above it with the sticky bit, such as /tmp, everybody may
     write other entries.
     """
-    for missing in reversed([place for place in (folder, *folder.parents) if not place.exists()]):
-        missing.mkdir(mode=0o700, exist_ok=True)
     real = Path(os.path.realpath(folder))
-    if sys.platform != "win32":
-        for place in (real, *real.parents):
-            found = place.stat()
-            if found.st_uid != os.geteuid() and (place == real or found.st_uid != 0):
-                raise PermissionError(errno.EPERM, f"{place} belongs to another user")
-            if _others_write(place, found) and (place == real or not found.st_mode & stat.S_ISVTX):
-                raise PermissionError(errno.EPERM, f"other users can write {place}")
+    there = [place for place in (real, *real.parents) if place.exists()]
+    for place in there if sys.platform != "win32" else ():
+        found = place.stat()
+        if found.st_uid != os.geteuid() and (place == real or found.st_uid != 0):
+            raise PermissionError(errno.EPERM, f"{place} belongs to another user")
+        if _others_write(place, found) and (place == real or not found.st_mode & stat.S_ISVTX):
+            raise PermissionError(errno.EPERM, f"other users can write {place}")
+    for place in reversed([real, *real.parents][: -len(there)]):
+        place.mkdir(mode=0o700, exist_ok=True)
     with tempfile.TemporaryFile(dir=real):
         return real
 

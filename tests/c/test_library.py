@@ -1,4 +1,4 @@
-"""The engine's library is compiled once for each layout, kept in the cache, and never loaded when damaged or foreign."""
+"""The library of the engine is compiled once for each layout, and never loaded when it is damaged or foreign."""
 
 import ctypes
 import importlib.util
