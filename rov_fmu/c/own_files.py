@@ -22,12 +22,13 @@ def own_folder(folder: Path) -> Path:
     """
     real = Path(os.path.realpath(folder))
     there = [place for place in (real, *real.parents) if place.exists()]
-    for place in there if sys.platform != "win32" else ():
-        found = place.stat()
-        if found.st_uid != os.geteuid() and (place == real or found.st_uid != 0):
-            raise PermissionError(errno.EPERM, f"{place} belongs to another user")
-        if _others_write(place, found) and (place == real or not found.st_mode & stat.S_ISVTX):
-            raise PermissionError(errno.EPERM, f"other users can write {place}")
+    if sys.platform != "win32":
+        for place in there:
+            found = place.stat()
+            if found.st_uid != os.geteuid() and (place == real or found.st_uid != 0):
+                raise PermissionError(errno.EPERM, f"{place} belongs to another user")
+            if _others_write(place, found) and (place == real or not found.st_mode & stat.S_ISVTX):
+                raise PermissionError(errno.EPERM, f"other users can write {place}")
     for place in reversed([real, *real.parents][: -len(there)]):
         place.mkdir(mode=0o700, exist_ok=True)
     with tempfile.TemporaryFile(dir=real):
