@@ -1,5 +1,6 @@
 """The Gymnasium environments: Gymnasium's own checker, and the vector environment against the single one."""
 
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from gymnasium.utils.env_checker import check_env
 import rov_fmu
 from rov_fmu.bridges.gym import RovEnv, RovVectorEnv
 from rov_fmu.io.messages import InputError
+from tests.vehicles import THRUST_EFFECTS
 
 SCALE = 1e-12
 """Many vehicles are stepped in the lanes of vectors, whose rounding errors differ from those of the FMU."""
@@ -69,6 +71,42 @@ def test_an_episode_ends_where_a_state_leaves_its_bound_and_the_others_go_on() -
         [[False, False, False], [False, False, False]],
         [[False, False, False], [False, True, False]],
     ]
+
+
+def _flown(env: RovVectorEnv, actions: Any, steps: int) -> Any:
+    """Return the states after some steps (vehicles x states), of which none ends an episode."""
+    for n in range(steps):
+        states, _, terminated, truncated, _ = env.step(actions[:, n])
+        assert not (terminated | truncated).any()
+    return states
+
+
+@pytest.mark.parametrize("dead_time", [0.03, 0.1, 0.25])
+def test_commands_that_wait_for_the_dead_time_arrive_in_later_steps(dead_time: float) -> None:
+    """A new episode begins with no command on its way. A copy of the environment goes on like the environment."""
+    vehicle = rov_fmu.load(THRUST_EFFECTS).with_(T_d=dead_time)
+    env = RovVectorEnv(vehicle, 3, steps=8)
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 10, len(env.commands)))
+
+    def expected(start: Any, steps: int, at: float = 0.0) -> Any:
+        inputs = {name: actions[:, :, n] for n, name in enumerate(env.commands)}
+        run = vehicle.simulate_many(
+            at + 0.1 * np.arange(10), inputs, start=dict(zip(env.states, start.T, strict=True)), record=env.states
+        )
+        return np.array([run[name][:, steps] for name in env.states]).T
+
+    for seed in (1, 2):
+        start, _ = env.reset(seed=seed)
+        np.testing.assert_allclose(_flown(env, actions, 5), expected(start, 5), rtol=1e-11, atol=1e-11)
+    twin = deepcopy(env)
+    there, here = (_flown(one, actions[:, 5:], 2) for one in (twin, env))
+    np.testing.assert_array_equal(here, there)
+    np.testing.assert_allclose(here, expected(start, 7), rtol=1e-11, atol=1e-11)
+    assert env.step(actions[:, 7])[3].all()
+    start = env.step(actions[:, 8])[0]
+    np.testing.assert_allclose(_flown(env, actions, 7), expected(start, 7), rtol=1e-11, atol=1e-11)
+    env.state[1] = start[0]
+    assert env.step(np.ones((3, len(env.commands))))[0][1] != pytest.approx(start[0])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.messages import FileError, InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
-from tests.vehicles import SIX, a_vehicle, pulsed
+from tests.vehicles import SIX, THRUST_EFFECTS, a_vehicle, pulsed
 
 TIMES = [0.0, 1.0, 2.0]
 AHEAD = {"u_l": 0.3, "u_r": 0.3}
@@ -144,6 +145,36 @@ def test_a_simulation_goes_on_where_another_one_ended(videoray: VehicleModel, si
         assert all(np.array_equal(values[1:], then[name]) for name, values in whole.items())
 
 
+def test_it_goes_on_with_its_lag_and_with_the_commands_that_act_whatever_was_recorded() -> None:
+    late = rov_fmu.load(THRUST_EFFECTS)
+    whole = late.simulate([0.0, 1.0, 1.05], {"u_l": [0.5, 0.3, 0.0]}, record="u")
+    first = late.simulate([0.0, 1.0], {"u_l": 0.5}, record="u")
+    assert first.final.keys() >= {"F_l", "delayed_u_l"}
+    then = late.simulate([1.0, 1.05], {"u_l": 0.3}, start=first.final, record="u")
+    assert then["u"].tolist() == whole["u"][1:].tolist()
+
+
+def test_a_loop_of_steps_gives_the_results_of_one_simulation(six: VehicleModel) -> None:
+    """The first vehicle turns several times, and the commands of the second one wait."""
+    times, values = 0.07 * np.arange(60), 0.6 * np.sin(np.arange(60.0))
+    cases: dict[str, tuple[VehicleModel, dict[str, float]]] = {
+        "K_ext": (six, {"N_ext": 60.0}),
+        "u_l": (rov_fmu.load(THRUST_EFFECTS), {"V_N": 0.1}),
+    }
+    for name, (vehicle, held) in cases.items():
+        run = vehicle.simulate(times, {name: values, **held}, start={"x": 1.0})
+        stepper = vehicle.stepper(start={"x": 1.0})
+        assert stepper.now == {name: run[name][0] for name in run.names}
+        for n, h in enumerate(np.diff(times).tolist()):
+            assert stepper.step({name: values[n], **held}, h) == stepper.now
+            for state in (*vehicle.layout.state, *vehicle.layout.continued):
+                assert stepper.now[state] == run[state][n + 1], (state, n)
+            if n == 30:
+                assert deepcopy(stepper).step({}, 1.0) != stepper.now
+        assert stepper.time == pytest.approx(times[-1])
+        assert vehicle is not six or np.ptp(run["psi"]) > 7.0
+
+
 def test_a_vehicle_that_rolls_starts_at_its_angles_or_at_its_quaternion(six: VehicleModel) -> None:
     angles = {"phi_0": 0.3, "theta_0": -0.7, "psi_0": 9.0}
     first = six.simulate([0.0, 1.0], {"N_ext": 5.0}, start={**angles, "p": 0.5})
@@ -245,6 +276,23 @@ WRONG: dict[str, tuple[Call, str]] = {
         "a_d_u: has values for 0 vehicles",
     ),
     "a step of no length": (lambda v: v.step({}, {}, 0.0), r"h = 0\.0: must be a time above 0, s$"),
+    "a step of a stepper of no length": (
+        lambda v: v.stepper().step({}, -1.0),
+        r"h = -1\.0: must be a time above 0, s$",
+    ),
+    "an unknown input of a stepper": (
+        lambda v: v.stepper().step({"ul": 1}, 0.1),
+        r"inputs\['ul'\]: .* did you mean u_l?",
+    ),
+    "an unknown start of a stepper": (
+        lambda v: v.stepper(start={"U": 1}),
+        r"start\['U'\]: .* no such state, only u, w",
+    ),
+    "an unknown variable of a stepper": (lambda v: v.stepper(record="U"), "record: the vehicle has no variable 'U'"),
+    "a stepper that is too fast": (
+        lambda v: v.stepper(start={"u": 1e200}).step({}, 2.0),
+        r"the motion cannot be computed from 0 s on: it overflows, or .* and needs shorter steps than 2 s$",
+    ),
     "a step from an unknown state": (lambda v: v.step({}, {"U": 1}, 1.0), r"state\['U'\]: .* no such state, only u, w"),
     "many in one file": (
         lambda v: v.to_mcap(v.simulate_many(TIMES, coefficients={"a_d_u": [1, 2]})),
