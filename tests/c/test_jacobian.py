@@ -1,4 +1,4 @@
-"""The Jacobians of a step against the variational equation, with CasADi's derivatives of the rates and DOP853."""
+"""The Jacobians of a step against 50 digits, and the variational equation with CasADi's derivatives and DOP853."""
 
 import random
 from typing import Any
@@ -6,6 +6,8 @@ from typing import Any
 import casadi
 import numpy as np
 import pytest
+from mpmath import mp
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu.bridges import arrays
@@ -14,8 +16,10 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.test_thrust_effects import NOW, ROV
 from tests.vehicles import SIX, VEHICLES, VIDEORAY, at_rest, random_inputs, random_state, still
+from verification.references import reference
 
 SWIFT = VEHICLES["lag without coupling"].with_(T_t200=0.001)
+Array = NDArray[np.float64]
 ALL = {**VEHICLES, "six_coupled": SIX, "a very short lag": SWIFT}
 H = 0.5
 
@@ -67,6 +71,58 @@ def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
         assert np.allclose(
             np.hstack((found.states, found.inputs, found.coefficients)), derivatives, rtol=1e-6, atol=1e-6
         )
+
+
+Values = dict[str, Any]
+
+
+def _of(rov: Vehicle, values: Values) -> tuple[Vehicle, Values, Values]:
+    """Return a vehicle with coefficients of these values, its inputs and its states."""
+    parts = (rov.coefficients, rov.layout.inputs, rov.layout.state)
+    coefficients, inputs, state = ({name: values[name] for name in part} for part in parts)
+    return rov.replaced(coefficients), inputs, state
+
+
+def _exact(rov: Vehicle, values: Values, name: str, side: int) -> list[float]:
+    """Return the slopes of the states after H along a number, to one side of it, from the motion to 50 digits."""
+    with mp.workdps(50):
+        apart = side * mp.mpf(10) ** -20
+        here, there = (
+            reference.step(*_of(rov, {**values, name: mp.mpf(values[name]) + d}), H).state for d in (0, apart)
+        )
+        return [float((there[one] - here[one]) / apart) for one in rov.layout.state]
+
+
+def _found(rov: Vehicle, values: Values) -> dict[str, Array]:
+    """Return the derivatives of the states after H by the names of the numbers."""
+    found = step_jacobian(*_of(rov, values), H, [*rov.coefficients])
+    names = [*rov.layout.state, *rov.layout.inputs, *rov.coefficients]
+    return dict(zip(names, np.hstack((found.states, found.inputs, found.coefficients)).T, strict=True))
+
+
+def test_the_derivatives_have_an_error_near_rounding() -> None:
+    values = {**VIDEORAY.coefficients, **still(VIDEORAY), **at_rest(VIDEORAY)}
+    values |= {"u_l": 0.6, "u_r": 0.3, "u_t": -0.4, "X_ext": 0.3, "u": 0.3, "w": -0.1, "r": 0.2, "psi": 0.3}
+    found = _found(VIDEORAY, values)
+    for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.inputs, "a_d_u", "m_rov"):
+        assert found[name] == pytest.approx(_exact(VIDEORAY, values, name, 1), rel=2e-13, abs=2e-13), name
+
+
+KINKED = VEHICLES["heave only"].with_(c_0_t200=0.004)
+KINKS = {"u_5": (0.0, 0.004, -0.004, 1.0, -1.0), "w": (0.0,), "c_0_t200": (0.3, 0.0)}
+"""The numbers at which this vehicle's thrust curve or drag has a kink. Its dead band is narrower than the differences
+of a smooth motion."""
+
+
+@pytest.mark.parametrize(("name", "kink"), [(name, kink) for name, kinks in KINKS.items() for kink in kinks])
+def test_a_derivative_near_a_kink_is_that_of_one_side(name: str, kink: float) -> None:
+    values = {**KINKED.coefficients, **still(KINKED), **at_rest(KINKED), "u_5": 0.3, "u_6": 0.3}
+    for beyond in (0.0, 1e-4, -1e-4, 1e-3, -1e-3, 5e-3, -5e-3):
+        values[name] = kink + beyond
+        if values["c_0_t200"] >= 0.0:
+            column = _found(KINKED, values)[name]
+            error = min(np.abs(column - _exact(KINKED, values, name, side)).max() for side in (1, -1))
+            assert error < 1e-9, beyond
 
 
 def test_the_thrust_of_tables_is_differentiated_and_commands_act_at_once() -> None:
