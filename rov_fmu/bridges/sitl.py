@@ -171,7 +171,7 @@ class Flight:
         try:
             at = dict(zip(self._names, self._stepper.step(commands, h), strict=True))
         except OverflowError as error:
-            raise InputError(f"VEHICLE: {error}: it overflows") from error
+            raise InputError(f"VEHICLE: {error}") from error
         values, motion = self._measured(at)
         if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
             values["battery"] = battery

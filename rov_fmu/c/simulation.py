@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rov_fmu.c.compile import LANES_FILE
 from rov_fmu.c.library import load_library
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -129,6 +130,12 @@ def simulate(
     for one in np.flatnonzero(failed < len(times)):
         result[:, one, failed[one] :] = np.nan
     return Trajectories(result, failed)
+
+
+def reasons(layout: Layout, h: float) -> str:
+    """Return why the motion in a step of h seconds may be one that cannot be computed."""
+    waiting = f"; at most {MOST_WAITING} changes of commands can wait for the dead time" if layout.delayed else ""
+    return f"it overflows, or never settles and needs shorter steps than {h:g} s{waiting}"
 
 
 def on_cores(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import on_cores, places_of, tables_of
+from rov_fmu.c.simulation import on_cores, places_of, reasons, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -88,7 +88,8 @@ class Stepper(_Going):
         done = library.lone_step(address, ctypes.c_double(self.time), ctypes.c_double(h))
         results = self.recorded()
         if not done or not all(map(isfinite, results)):
-            raise OverflowError(f"the motion cannot be computed from {self.time:g} s on")
+            reason = reasons(self.vehicle.layout, h)
+            raise OverflowError(f"the motion cannot be computed from {self.time:g} s on: {reason}")
         self.time += h
         return results
 

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 
 from rov_fmu.bridges import arrays
 from rov_fmu.bridges.arrays import force_names
-from rov_fmu.c.simulation import Array, simulate, usable_cores
+from rov_fmu.c.simulation import Array, reasons, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.equation.step import MOST_WAITING
 from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
     Inputs,
@@ -101,10 +100,8 @@ class VehicleModel(Vehicle):
         if len(result.failed):
             first = int(np.argmax(np.isnan(next(iter(result.values())))))
             length = result.time[first] - result.time[first - 1]
-            reason = f"it overflows, or never settles and needs shorter steps than {length:g} s"
-            if self.layout.has_dead_time:
-                reason += f"; at most {MOST_WAITING} changes of commands can wait for the dead time"
-            raise InputError(f"the motion cannot be computed up to time[{first}] = {result.time[first]:g} s: {reason}")
+            until = f"time[{first}] = {result.time[first]:g} s"
+            raise InputError(f"the motion cannot be computed up to {until}: {reasons(self.layout, length)}")
         return result
 
     def _warn_if_turned_over(self, times: Array, quaternion: Array) -> None:

@@ -42,7 +42,7 @@ class VehicleStepper:
         try:
             return dict(zip(self._record, self._stepper.step(values, h), strict=True))
         except OverflowError as error:
-            raise InputError(f"{error}: it overflows, or never settles and needs shorter steps than {h:g} s") from error
+            raise InputError(str(error)) from error
 
 
 def checked_length(h: float) -> float:
