@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.bridges.sitl_frames import Servos
 from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
@@ -22,6 +21,7 @@ from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, write_whole
+from rov_fmu.tank.readers.ardusub_frames import Servos
 from rov_fmu.vehicle.vehicle import Vehicle
 
 GRAVITY = 9.80665

@@ -10,7 +10,6 @@ from socket import AF_INET, SOCK_DGRAM, socket
 import numpy as np
 
 from rov_fmu.bridges.sitl import Connection, Setup
-from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
@@ -20,6 +19,7 @@ from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, servos_of
 
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""

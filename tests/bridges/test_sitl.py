@@ -21,12 +21,11 @@ from scipy.spatial.transform import Rotation
 
 import rov_fmu
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
-from rov_fmu.bridges.sitl_frames import FRAMES, servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.beginning import load_tests
+from rov_fmu.tank.readers.ardusub_frames import servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import ArduSub, packet, parsed
@@ -34,7 +33,6 @@ from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import pulsed
-from verification.references.autopilot.ardusub import VECTORED_6DOF
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -357,38 +355,6 @@ def test_holds_its_place_in_a_current() -> None:
     assert max(np.hypot(at["position"][0], at["position"][1]) for at in held) < 0.3
 
 
-# ---- Frames and servos -----------------------------------------------------------------------------------------------
-
-
-def test_the_motors_of_the_heavy_push_as_ardusub_means_them_to() -> None:
-    servos = servos_of(HEAVY.layout, None, {})
-    thrusters = {f"u_{t.name}": t for t in HEAVY.layout.thrusters}
-    assert {servos[name][0] for name in thrusters} == {*range(1, 9)}
-    for name, thruster in thrusters.items():
-        servo, sign = servos[name]
-        effects = [sign * thruster.effect(axis) for axis in (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)]
-        effects[3] *= -1.0  # the throttle is positive upward
-        for factor, effect in zip(VECTORED_6DOF[servo - 1], effects, strict=True):
-            assert factor == 0 or np.sign(effect) == factor
-
-
-def test_frames_and_tables() -> None:
-    motors = {name: len(FRAMES[name]) for name in ("simplerov_3", "simplerov_4", "simplerov_5", "bluerov1", "vectored")}
-    assert motors == {"simplerov_3": 3, "simplerov_4": 4, "simplerov_5": 5, "bluerov1": 6, "vectored": 6}
-    videoray = load_vehicle(SHIPPED["videoray"]).layout
-    assert servos_of(videoray, None, {}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (3, 1.0)}
-    assert servos_of(videoray, "simplerov_3", {5: "-t"}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (5, -1.0)}
-    assert servos_of(videoray, None, {4: "l"}) == {"u_l": (4, 1.0)}
-    bluerov2 = servos_of(load_vehicle(SHIPPED["bluerov2"]).layout, None, {})
-    assert {name: servo for name, (servo, _) in bluerov2.items()} == {f"u_{n}": n for n in range(1, 7)}
-    heavy = servos_of(HEAVY.layout, "vectored", {4: "-7"})
-    assert heavy["u_7"] == (4, -1.0)
-    assert {name: servo for name, (servo, _) in heavy.items()} == {
-        **{f"u_{n}": n for n in (1, 2, 3, 5, 6)},
-        "u_7": 4,
-    }, "servo 4 no longer drives u_4"
-
-
 # ---- The command -----------------------------------------------------------------------------------------------------
 
 
@@ -455,7 +421,7 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
     [
         (
             "videoray --frame vectord",
-            "--frame 'vectord': must be one of vectored, vectored_6dof, vectored_6dof_90deg, bluerov1, simplerov_3, "
+            "--frame 'vectord': must be one of bluerov1, vectored, vectored_6dof, vectored_6dof_90deg, simplerov_3, "
             "simplerov_4, simplerov_5; did you mean vectored?",
         ),
         ("videoray --frame vectored", "--frame vectored: the motors of this frame do not push"),
