@@ -255,6 +255,7 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
     assert connection.logs == [tmp_path / f"dive_{n}.csv" for n in range(3, MOST_LOGS + 3)]
     assert len(list(tmp_path.iterdir())) == MOST_LOGS + 2
     assert [hint.partition(",")[0] for hint in hints] == ["packets of other senders", "a run has 20 logs with 1"]
+    assert hints[0].endswith("An autopilot that was started again is followed when the old one has been silent for 5 s")
 
 
 def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -268,6 +269,42 @@ def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: 
     lengths = [len((tmp_path / name).read_text("utf-8").splitlines()) for name in ("dive.csv", "dive_2.csv")]
     assert lengths == [1 + 4, 1 + 5]
     assert [hint.partition(":")[0] for hint in hints] == ["a run has 20 logs with 1,000,000 rows in all at most"]
+
+
+NO_PULSES = "no pulses come to servos 7 and 8 (u_7 and u_8): does ArduSub have FRAME_CONFIG 2 (vectored_6dof)?"
+TOO_MANY = "the pulses of {} change, but no thruster of the vehicle follows them: does ArduSub have FRAME_CONFIG {}?"
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "motors", "moving", "said"),
+    [
+        ("bluerov2_heavy", 6, False, [NO_PULSES]),
+        ("bluerov2_heavy", 8, True, []),
+        ("bluerov2", 8, False, []),  # such as a gripper at rest
+        ("bluerov2", 8, True, [TOO_MANY.format("servos 7 and 8", "1 (vectored)")]),
+        ("videoray", 4, True, [TOO_MANY.format("servo 4", "4 (simplerov_3)")]),
+    ],
+)
+def test_servos_that_do_not_fit_the_vehicle_are_named_once(
+    vehicle: str, motors: int, moving: bool, said: list[str]
+) -> None:
+    """In a flight of more than 1 s they are named then, otherwise at its end; pulses that come late count."""
+    for frames in (120, 20):
+        hints: list[str] = []
+        connection = Connection(setup_of(load_vehicle(SHIPPED[vehicle])), hints.append)
+        for count in range(frames):
+            pulses = [1500 + moving * (count % 7)] * motors if count > 3 else []
+            connection.answer(packet(50, count, [*pulses, *[0] * (16 - len(pulses))]), HERE)
+        assert hints == (said if frames == 120 else [])
+        connection.end()
+        connection.end()
+        assert hints == said
+
+
+def test_a_vehicle_without_roll_gets_a_word_about_the_roll_integrator(capsys: pytest.CaptureFixture[str]) -> None:
+    for vehicle, is_told in (("bluerov2", True), ("bluerov2_heavy", False), ("videoray", False)):
+        assert main(["sitl", vehicle, "--duration", "0.01", "--port", "0"]) == 0
+        assert ("ATC_RAT_RLL_I 0" in capsys.readouterr().err) == is_told, vehicle
 
 
 # ---- Motion ----------------------------------------------------------------------------------------------------------

@@ -53,19 +53,19 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
         servos[key] = servo, -1.0 if name.startswith("-") else 1.0
     if frame is None and table:
         return servos
-    name = frame or next(iter(fitting(layout)), None)
-    motors = name and _matched(layout, FRAMES[name], table)
-    if not (name and motors):
+    own = frame or next(iter(fitting(layout)), None)
+    matched = own and _matched(layout, FRAMES[own], table)
+    if not matched:
         if frame:
             raise InputError(f"--frame {frame}: the motors of this frame do not push as the thrusters do{_ADVICE}")
         raise InputError(f"VEHICLE: none of ArduSub's frames has these thrusters{_ADVICE}")
-    driven, open_servos = motors
+    driven, open_servos = matched
     free = {key: motor for key, motor in driven.items() if motor[0] not in table and key not in servos}
     if doubtful := {key: number for key, (number, _) in free.items() if number in open_servos}:
         numbers, keys = listed(map(str, sorted(doubtful.values()))), listed(sorted(doubtful))
-        example = f"--frame {name} --servo {min(doubtful.values())}={min(doubtful).removeprefix('u_')}"
+        example = f"--frame {own} --servo {min(doubtful.values())}={min(doubtful).removeprefix('u_')}"
         raise InputError(
-            f"--frame {name}: which of the servos {numbers} drives {keys} does not follow from the torques of these "
+            f"--frame {own}: which of the servos {numbers} drives {keys} does not follow from the torques of these "
             f"thrusters: write for example {example}, or their positions into the vehicle file"
         )
     return free | servos
@@ -85,6 +85,12 @@ def fitting(layout: Layout) -> list[str]:
 def config_of(frame: str) -> str:
     """Return a frame with its parameter: `FRAME_CONFIG 1 (vectored)`."""
     return f"FRAME_CONFIG {[*FRAMES].index(frame)} ({frame})"
+
+
+def question_of(layout: Layout) -> str:
+    """Return the question whether ArduSub has the frame that fits a vehicle."""
+    own = listed(map(config_of, fitting(layout)), "or")
+    return f"does ArduSub have {own}?" if own else "does FRAME_CONFIG of ArduSub fit this vehicle?"
 
 
 def _matched(

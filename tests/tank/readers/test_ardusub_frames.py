@@ -69,12 +69,12 @@ def with_thrusters(thrusters: Sequence[Thruster]) -> Layout:
 def a_thruster(name: str, motor: Sequence[float], sign: float, chance: Random) -> Thruster:
     """A thruster with the force of a motor, at a random place where its torque has the signs of the motor's factors."""
     roll, pitch, yaw, up, forward, lateral = motor
-    direction = [sign * size * chance.uniform(0.5, 2.0) for size in (forward, lateral, -up)]
+    x, y, z = (sign * size * chance.uniform(0.5, 2.0) for size in (forward, lateral, -up))
     while True:
-        place = [chance.uniform(-0.5, 0.5) for _ in range(3)]
-        torque = np.cross(place, direction) * sign
+        place = chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5), chance.uniform(-0.5, 0.5)
+        torque = np.cross(place, (x, y, z)) * sign
         if all(not factor or factor * own > 1e-3 for factor, own in zip((roll, pitch, yaw), torque, strict=True)):
-            return thruster(name, "t200", (*direction,), (*place,))
+            return thruster(name, "t200", (x, y, z), place)
 
 
 def test_the_frames_are_those_of_ardusub_in_the_order_of_frame_config() -> None:
