@@ -23,6 +23,7 @@ from rov_fmu.identify.unexplained.disturbances import disturbances, followed, un
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
+from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -106,13 +107,14 @@ def _axis(
     answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1])
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
+    misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.drivers(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     return AxisResult(
         axis=axis,
         verdict=assess.verdict(
-            own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting
+            own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting, misfits
         ),
         answers=answers,
         known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),

@@ -89,6 +89,9 @@ class _Range:
         return f"{words} {noun if self.high == 1 else plural}"
 
 
+MISFITS = ("motors without thruster", "thrusters without pulse")
+"""The kinds of findings about logs whose motors are not the thrusters of the vehicle."""
+
 SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
@@ -161,6 +164,13 @@ SENTENCES: dict[str, SentenceForm] = {
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "several vehicles": (
         "{files}: the log has the vehicles {vehicles}. {vehicle} is used; [logs] of rov.toml can name another"
+    ),
+    "motors without thruster": (
+        "{files}: the commands of {whose} change, but the vehicle has no thruster for them, so that forces and "
+        "inertias come out wrong{frames}"
+    ),
+    "thrusters without pulse": (
+        "{files}: no pulses come to the thrusters {whose}, so that forces and inertias come out wrong{frames}"
     ),
     "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
     "reversed motors": "{files}: parameters of the autopilot reverse the thrusters {thrusters}",

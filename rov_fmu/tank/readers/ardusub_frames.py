@@ -1,6 +1,6 @@
 """The frames of ArduSub, and which servo drives which input of a vehicle."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import FAINT, Layout, Thruster
 from rov_fmu.io.messages import InputError, listed, only
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding, about
 
 _AXES = (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)
 _TORQUES = 3
@@ -91,6 +92,31 @@ def question_of(layout: Layout) -> str:
     """Return the question whether ArduSub has the frame that fits a vehicle."""
     own = listed(map(config_of, fitting(layout)), "or")
     return f"does ArduSub have {own}?" if own else "does FRAME_CONFIG of ArduSub fit this vehicle?"
+
+
+def misfits(
+    file: str, layout: Layout, without_pulse: Sequence[str], extra: Mapping[str, int], config: float | None
+) -> Iterator[Finding]:
+    """Yield findings if the motors of a log are not the thrusters of a vehicle, one for each axis that it concerns.
+
+    `without_pulse` has the names of thrusters, `extra` the motors of the log for which there is no thruster, by words
+    about them, and `config` is the FRAME_CONFIG of the log, or None.
+    """
+    frame = [*FRAMES][int(config)] if config is not None and 0.0 <= config < len(FRAMES) else ""
+    motors = FRAMES.get(frame, ())
+    frames = [f"the log has {config_of(frame)}"] if frame else []
+    frames += [f"{config_of(own)} fits the vehicle" for own in fitting(layout) if own != frame]
+    words = f": {', and '.join(frames)}" if frames else ""
+    silent = [t for t in layout.thrusters if t.name in without_pulse]
+    factors = [motors[n - 1] if n <= len(motors) else "+" * len(_AXES) for n in extra.values()]
+    pushed = {axis for t in silent for axis in _AXES if abs(t.effect(axis)) > FAINT}
+    pulled = {axis for motor in factors for axis, factor in zip(_AXES, motor, strict=True) if factor != "."}
+    for kind, concerned, whose in (
+        ("thrusters without pulse", pushed, listed(without_pulse)),
+        ("motors without thruster", pulled, listed(extra)),
+    ):
+        names = [form.axis.name for form in layout.axes if form.axis in concerned] or [""]
+        yield from (about(file, kind, name, whose=whose, frames=words) for name in names if whose)
 
 
 def _matched(

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -13,9 +14,13 @@ from hypothesis import strategies as st
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.io.messages import InputError
+from rov_fmu.tank.findings import MISFITS as KINDS
+from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, config_of, fitting, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.tank.logs import read_log
+from tests.tank.readers.writers import attitude, dataflash, packed, parameter, rcou, servos, write_tlog
 from tests.vehicles import thruster
 from verification.references.autopilot.ardusub import VECTORED_6DOF
 
@@ -161,3 +166,95 @@ def test_tables_replace_the_frame_or_change_it() -> None:
         **{f"u_{n}": n for n in (1, 2, 3, 5, 6)},
         "u_7": 4,
     }, "servo 4 no longer drives u_4"
+
+
+# ---- Logs of other vehicles ------------------------------------------------------------------------------------------
+
+
+def functions(*motors: int) -> dict[str, float]:
+    """The parameters of servos 1, 2, ..., each of which drives a motor, or a camera (7) for 0."""
+    return {f"SERVO{n}_FUNCTION": 32.0 + motor if motor else 7.0 for n, motor in enumerate(motors, 1)}
+
+
+BEYOND = "change, but the vehicle has no thruster for them, so that forces and inertias come out wrong"
+SILENT = "no pulses come to the thrusters {}, so that forces and inertias come out wrong"
+HAS_2, FITS_1, FITS_2 = (
+    "the log has FRAME_CONFIG 2 (vectored_6dof)",
+    "FRAME_CONFIG 1 (vectored) fits the vehicle",
+    "FRAME_CONFIG 2 (vectored_6dof) fits the vehicle",
+)
+ASSIGNED = "motor 7 (SERVO7_FUNCTION 39) and motor 8 (SERVO8_FUNCTION 40)"
+EIGHT, SIX = functions(*range(1, 9)), functions(1, 2, 3, 4, 5, 6, 0, 0)
+ALL = "surge, sway, heave, yaw"
+# The vehicle, the outputs that change, those that rest at 1500 us, the parameters, the words, and the axes.
+MISFITS: dict[str, tuple[Layout, Sequence[int], Sequence[int], dict[str, float], str, str]] = {
+    "eight motors, six thrusters": (
+        BLUEROV2,
+        range(5, 9),
+        range(1, 5),
+        {**EIGHT, "FRAME_CONFIG": 2},
+        f"the commands of {ASSIGNED} {BEYOND}: {HAS_2}, and {FITS_1}",
+        "heave",
+    ),
+    "no frame": (
+        BLUEROV2,
+        range(5, 9),
+        range(1, 5),
+        EIGHT,
+        f"the commands of {ASSIGNED} {BEYOND}: {FITS_1}",
+        ALL,
+    ),
+    "no parameters": (
+        BLUEROV2,
+        range(5, 9),
+        range(1, 5),
+        {},
+        f"the commands of output 7 and output 8 {BEYOND}: {FITS_1}",
+        ALL,
+    ),
+    "motors that rest": (BLUEROV2, [5, 6], [1, 2, 3, 4, 7, 8], {**EIGHT, "FRAME_CONFIG": 2}, "", ""),
+    "a camera": (BLUEROV2, range(5, 9), range(1, 5), SIX, "", ""),
+    "all motors": (HEAVY, range(1, 9), [], {**EIGHT, "FRAME_CONFIG": 2}, "", ""),
+    "six motors, eight thrusters": (
+        HEAVY,
+        range(1, 7),
+        [],
+        {**functions(*range(1, 7)), "FRAME_CONFIG": 1},
+        f"{SILENT.format('7 and 8')}: the log has FRAME_CONFIG 1 (vectored), and {FITS_2}",
+        "heave, roll, pitch",
+    ),
+    "six motors and a camera, eight thrusters": (
+        HEAVY,
+        range(1, 9),
+        [],
+        SIX,
+        f"{SILENT.format('7 and 8')}: {FITS_2}",
+        "heave, roll, pitch",
+    ),
+    "an unknown frame": (VIDEORAY, range(1, 5), [], {"FRAME_CONFIG": 99}, f"output 4 {BEYOND}: FRAME_CONFIG 4 (", "*"),
+}
+
+
+@pytest.mark.parametrize("name", [".tlog", ".bin"])
+@pytest.mark.parametrize("case", MISFITS)
+def test_motors_of_a_log_that_are_not_the_thrusters_are_named(case: str, name: str, tmp_path: Path) -> None:
+    layout, changing, resting, parameters, words, axes = MISFITS[case]
+    path = tmp_path / f"dive{name}"
+    rows = [[0] * 14 for _ in range(40)]
+    for n, row in enumerate(rows):
+        for number in (*changing, *resting):
+            row[number - 1] = 1500 + (10 * (n % 20) if number in changing else 0)
+    if name == ".tlog":
+        sent = [parameter(key, value) for key, value in parameters.items()]
+        for n, row in enumerate(rows):
+            sent += [servos(2.0 + 0.1 * n, *row), attitude(2.0 + 0.1 * n, 0.01 * n)]
+        write_tlog(path, sent)
+    else:
+        told = [packed("PARM", 10**6, key.encode(), value, 0.0) for key, value in parameters.items()]
+        dataflash(path, [*told, *(rcou(2.0 + 0.1 * n, *row) for n, row in enumerate(rows))])
+    found = [finding for finding in read_log(path, layout).findings if finding.kind in KINDS]
+    said = sentences(found, SENTENCES)
+    assert len(said) == bool(words)
+    assert all(line.startswith(f"{path.name}: ") and words in line for line in said)
+    if axes != "*":
+        assert ", ".join(finding.axis for finding in found) == axes
