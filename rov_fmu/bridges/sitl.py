@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import StringIO
-from itertools import takewhile
+from itertools import count, takewhile
 from math import cos, inf, pi, sin
 from pathlib import Path
 from socket import socket
@@ -22,7 +22,7 @@ from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.tank.readers.ardusub_frames import Servos, question_of
+from rov_fmu.tank.readers.ardusub_frames import Servos, motors_of, question_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 GRAVITY = 9.80665
@@ -141,9 +141,10 @@ class Log:
 class Outputs:
     """Which servos have pulses: those that the vehicle needs, and those that follow them and move."""
 
-    def __init__(self, servos: Servos) -> None:
-        """Begin without any pulse."""
+    def __init__(self, servos: Servos, motors: int) -> None:
+        """Begin without any pulse. ArduSub may drive so many motors, of which a vehicle may lack the last ones."""
         self._drives = {number: name for name, (number, _) in servos.items()}
+        self._last = max(*self._drives, motors)
         self._silent = {*self._drives}
         self._moving: set[int] = set()
         self._first: dict[int, int] = {}
@@ -154,7 +155,7 @@ class Outputs:
     def add(self, h: float, pulses: tuple[int, ...]) -> None:
         """Add a step of h seconds."""
         self._silent -= {number for number in self._silent if pulses[number - 1] not in NO_OUTPUT}
-        for number in range(max(self._drives) + 1, len(pulses) + 1):
+        for number in range(self._last + 1, len(pulses) + 1):
             pulse = pulses[number - 1]
             if pulse not in NO_OUTPUT and self._first.setdefault(number, pulse) != pulse:
                 self._moving.add(number)
@@ -166,10 +167,9 @@ class Outputs:
         if self._silent and (at_end or self._time >= _LATE):
             silent = sorted(self._silent)
             yield "no pulses come to {} ({})", _numbered(silent), listed(self._drives[number] for number in silent)
-        if self._moving and (at_end or self._moving_time >= _LATE):
-            last = max(self._drives)
-            if extra := [*takewhile(self._moving.__contains__, range(last + 1, max(self._moving) + 1))]:
-                yield "the pulses of {} change, but no thruster of the vehicle follows them", _numbered(extra)
+        is_told = at_end or self._moving_time >= _LATE
+        if is_told and (extra := [*takewhile(self._moving.__contains__, count(self._last + 1))]):
+            yield "the pulses of {} change, but no thruster of the vehicle follows them", _numbered(extra)
 
 
 def _numbered(servos: list[int]) -> str:
@@ -188,7 +188,7 @@ class Flight:
             self._names += [name for name in (*layout.state, *layout.calculated) if name not in self._names]
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
-        self.outputs = Outputs(setup.servos)
+        self.outputs = Outputs(setup.servos, motors_of(layout))
         self._held = {**layout.usual_inputs, **setup.start}
         self._draws = [
             (current, layout.gains[thruster])

@@ -174,6 +174,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "beyond full thrust",
             "constant motion",
             "constant push",
+            "free decay",
             "cancelling thrusters",
             "gaps",
             "source of commands",

@@ -121,6 +121,10 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: nothing is learnt about {axes}: no thruster drives it, and the effect of fins is not fitted"
     ),
     "constant push": "{files}: nothing is learnt about {axes}: the thrust along it never changes",
+    "free decay": (
+        "{files}: the motion in {axes} slows down without thrust, which tells drag relative to inertia, but not the "
+        "velocities that the thrusters give"
+    ),
     "cancelling thrusters": ("{files}: nothing is learnt about {axes}: its thrusters cancel each other all the time"),
     "axis not pushed": (
         "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "

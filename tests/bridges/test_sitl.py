@@ -32,7 +32,7 @@ from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
-from tests.vehicles import pulsed
+from tests.vehicles import pulsed, thruster
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -271,6 +271,15 @@ def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: 
     assert [hint.partition(":")[0] for hint in hints] == ["a run has 20 logs with 1,000,000 rows in all at most"]
 
 
+def _simple() -> Vehicle:
+    """Return a vehicle of the frame simplerov_4: two thrusters push ahead and two down, each on another side."""
+    places = {"a": ((1.0, 0.0, 0.0), 0.2), "b": ((1.0, 0.0, 0.0), -0.2), "c": ((0.0, 0.0, 1.0), 0.2)}
+    places["d"] = (0.0, 0.0, 1.0), -0.2
+    thrusters = tuple(thruster(name, "t200", to, (0.0, y, 0.0)) for name, (to, y) in places.items())
+    return Vehicle(replace(HEAVY.layout, thrusters=thrusters), HEAVY.coefficients)
+
+
+SIMPLE = _simple()
 NO_PULSES = "no pulses come to servos 7 and 8 (u_7 and u_8): does ArduSub have FRAME_CONFIG 2 (vectored_6dof)?"
 TOO_MANY = "the pulses of {} change, but no thruster of the vehicle follows them: does ArduSub have FRAME_CONFIG {}?"
 
@@ -283,6 +292,8 @@ TOO_MANY = "the pulses of {} change, but no thruster of the vehicle follows them
         ("bluerov2", 8, False, []),  # such as a gripper at rest
         ("bluerov2", 8, True, [TOO_MANY.format("servos 7 and 8", "1 (vectored)")]),
         ("videoray", 4, True, [TOO_MANY.format("servo 4", "4 (simplerov_3)")]),
+        ("simplerov_4", 5, True, []),  # ArduSub drives five motors in this frame
+        ("simplerov_4", 6, True, [TOO_MANY.format("servo 6", "5 (simplerov_4)")]),
     ],
 )
 def test_servos_that_do_not_fit_the_vehicle_are_named_once(
@@ -291,7 +302,8 @@ def test_servos_that_do_not_fit_the_vehicle_are_named_once(
     """In a flight of more than 1 s they are named then, otherwise at its end; pulses that come late count."""
     for frames in (120, 20):
         hints: list[str] = []
-        connection = Connection(setup_of(load_vehicle(SHIPPED[vehicle])), hints.append)
+        rov = SIMPLE if vehicle == "simplerov_4" else load_vehicle(SHIPPED[vehicle])
+        connection = Connection(setup_of(rov), hints.append)
         for count in range(frames):
             pulses = [1500 + moving * (count % 7)] * motors if count > 3 else []
             connection.answer(packet(50, count, [*pulses, *[0] * (16 - len(pulses))]), HERE)

@@ -26,7 +26,9 @@ FRAMES: Mapping[str, Sequence[str]] = {
 """The signs of the factors of each motor for roll, pitch, yaw, throttle (up), forward and lateral (to starboard).
 
 They are those of `AP_Motors6DOF::setup_motors` in ArduPilot 4.7. The first frame is FRAME_CONFIG 0, the next one 1, and
-so on. ArduSub sets up the five motors of `simplerov_5` for `simplerov_4`, too."""
+so on."""
+_ALSO_DRIVEN = {"simplerov_4": 5}
+"""The last motor that ArduSub drives in a frame, where a vehicle with this frame does not have it."""
 
 Servos = Mapping[str, tuple[int, float]]
 """For each input of the vehicle that a servo drives, the number of the servo from 1 on, and 1, or -1 if reversed."""
@@ -94,6 +96,11 @@ def question_of(layout: Layout) -> str:
     return f"does ArduSub have {own}?" if own else "does FRAME_CONFIG of ArduSub fit this vehicle?"
 
 
+def motors_of(layout: Layout) -> int:
+    """Return the number of the last motor that ArduSub drives in a frame that fits a vehicle; 0 if none fits."""
+    return max((_ALSO_DRIVEN.get(name, len(FRAMES[name])) for name in fitting(layout)), default=0)
+
+
 def misfits(
     file: str, layout: Layout, without_pulse: Sequence[str], extra: Mapping[str, int], config: float | None
 ) -> Iterator[Finding]:
@@ -104,8 +111,11 @@ def misfits(
     """
     frame = [*FRAMES][int(config)] if config is not None and 0.0 <= config < len(FRAMES) else ""
     motors = FRAMES.get(frame, ())
+    fits = fitting(layout)
+    if frame in fits:
+        extra = {words: motor for words, motor in extra.items() if motor > motors_of(layout)}
     frames = [f"the log has {config_of(frame)}"] if frame else []
-    frames += [f"{config_of(own)} fits the vehicle" for own in fitting(layout) if own != frame]
+    frames += [f"{config_of(own)} fits the vehicle" for own in fits if own != frame]
     words = f": {', and '.join(frames)}" if frames else ""
     silent = [t for t in layout.thrusters if t.name in without_pulse]
     factors = [motors[n - 1] if n <= len(motors) else "+" * len(_AXES) for n in extra.values()]

@@ -176,6 +176,9 @@ def functions(*motors: int) -> dict[str, float]:
     return {f"SERVO{n}_FUNCTION": 32.0 + motor if motor else 7.0 for n, motor in enumerate(motors, 1)}
 
 
+SIMPLE = with_thrusters(
+    [a_thruster("abcd"[n], motor, 1.0, Random(n)) for n, motor in enumerate(ARDUSUB["simplerov_4"])]
+)
 BEYOND = "change, but the vehicle has no thruster for them, so that forces and inertias come out wrong"
 SILENT = "no pulses come to the thrusters {}, so that forces and inertias come out wrong"
 HAS_2, FITS_1, FITS_2 = (
@@ -230,6 +233,14 @@ MISFITS: dict[str, tuple[Layout, Sequence[int], Sequence[int], dict[str, float],
         SIX,
         f"{SILENT.format('7 and 8')}: {FITS_2}",
         "heave, roll, pitch",
+    ),
+    "a motor of the frame that the vehicle lacks": (
+        SIMPLE,
+        range(1, 6),
+        [],
+        {**functions(*range(1, 6)), "FRAME_CONFIG": 5},
+        "",
+        "",
     ),
     "an unknown frame": (VIDEORAY, range(1, 5), [], {"FRAME_CONFIG": 99}, f"output 4 {BEYOND}: FRAME_CONFIG 4 (", "*"),
 }
