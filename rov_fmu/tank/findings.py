@@ -170,8 +170,8 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: the log has the vehicles {vehicles}. {vehicle} is used; [logs] of rov.toml can name another"
     ),
     "motors without thruster": (
-        "{files}: the commands of {whose} change, but the vehicle has no thruster for them, so that forces and "
-        "inertias come out wrong{frames}"
+        "{files}: there are commands of {whose}, but the vehicle has no thruster for them, so that forces and inertias "
+        "come out wrong{frames}"
     ),
     "thrusters without pulse": (
         "{files}: no pulses come to the thrusters {whose}, so that forces and inertias come out wrong{frames}"

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout, Thruster
 from rov_fmu.io.messages import InputError
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import MISFITS as KINDS
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, config_of, fitting, servos_of
@@ -179,7 +180,7 @@ def functions(*motors: int) -> dict[str, float]:
 SIMPLE = with_thrusters(
     [a_thruster("abcd"[n], motor, 1.0, Random(n)) for n, motor in enumerate(ARDUSUB["simplerov_4"])]
 )
-BEYOND = "change, but the vehicle has no thruster for them, so that forces and inertias come out wrong"
+BEYOND = ", but the vehicle has no thruster for them, so that forces and inertias come out wrong"
 SILENT = "no pulses come to the thrusters {}, so that forces and inertias come out wrong"
 HAS_2, FITS_1, FITS_2 = (
     "the log has FRAME_CONFIG 2 (vectored_6dof)",
@@ -196,7 +197,7 @@ MISFITS: dict[str, tuple[Layout, Sequence[int], Sequence[int], dict[str, float],
         range(5, 9),
         range(1, 5),
         {**EIGHT, "FRAME_CONFIG": 2},
-        f"the commands of {ASSIGNED} {BEYOND}: {HAS_2}, and {FITS_1}",
+        f"there are commands of {ASSIGNED}{BEYOND}: {HAS_2}, and {FITS_1}",
         "heave",
     ),
     "no frame": (
@@ -204,7 +205,7 @@ MISFITS: dict[str, tuple[Layout, Sequence[int], Sequence[int], dict[str, float],
         range(5, 9),
         range(1, 5),
         EIGHT,
-        f"the commands of {ASSIGNED} {BEYOND}: {FITS_1}",
+        f"there are commands of {ASSIGNED}{BEYOND}: {FITS_1}",
         ALL,
     ),
     "no parameters": (
@@ -212,7 +213,7 @@ MISFITS: dict[str, tuple[Layout, Sequence[int], Sequence[int], dict[str, float],
         range(5, 9),
         range(1, 5),
         {},
-        f"the commands of output 7 and output 8 {BEYOND}: {FITS_1}",
+        f"there are commands of output 7 and output 8{BEYOND}: {FITS_1}",
         ALL,
     ),
     "motors that rest": (BLUEROV2, [5, 6], [1, 2, 3, 4, 7, 8], {**EIGHT, "FRAME_CONFIG": 2}, "", ""),
@@ -242,7 +243,7 @@ MISFITS: dict[str, tuple[Layout, Sequence[int], Sequence[int], dict[str, float],
         "",
         "",
     ),
-    "an unknown frame": (VIDEORAY, range(1, 5), [], {"FRAME_CONFIG": 99}, f"output 4 {BEYOND}: FRAME_CONFIG 4 (", "*"),
+    "an unknown frame": (VIDEORAY, range(1, 5), [], {"FRAME_CONFIG": 99}, f"output 4{BEYOND}: FRAME_CONFIG 4 (", "*"),
 }
 
 
@@ -269,3 +270,19 @@ def test_motors_of_a_log_that_are_not_the_thrusters_are_named(case: str, name: s
     assert all(line.startswith(f"{path.name}: ") and words in line for line in said)
     if axes != "*":
         assert ", ".join(finding.axis for finding in found) == axes
+
+
+def test_columns_of_numbered_thrusters_that_the_vehicle_lacks_are_named(tmp_path: Path) -> None:
+    header = ",".join(["time [s]", *(f"u_{n} [%]" for n in range(1, 9)), "u_light [%]", "depth [m]"])
+    path = tmp_path / "dive.csv"
+    np.savetxt(path, _rows(), "%.4g", ",", header=header, comments="")
+    for layout, words in ((BLUEROV2, f"'u_7 [%]' and 'u_8 [%]'{BEYOND}: {FITS_1}"), (HEAVY, "")):
+        found = [finding for finding in read_log(path, layout).findings if finding.kind in KINDS]
+        (said,) = sentences(found, SENTENCES) or ("",)
+        assert said.endswith(words)
+        assert len(found) == (len(layout.axes) if words else 0)
+
+
+def _rows() -> Array:
+    time = 0.1 * np.arange(40.0)
+    return np.column_stack([time, *[20.0 * np.sin(time + n) for n in range(9)], 2.0 + 0.1 * time])
