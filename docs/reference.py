@@ -25,6 +25,7 @@ from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.templates import number
 from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
 from rov_fmu.tank import catalogue
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, fitting
 from rov_fmu.vehicle.json_schema import json_schema
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -32,7 +33,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 Table = list[tuple[str, ...]]
 _NAMES = (
     *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "api.md", "vehicles.md"),
-    *("identify-formats.md", "identify-method.md"),
+    *("identify-formats.md", "identify-method.md", "ardusub.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
@@ -54,7 +55,7 @@ def tables() -> dict[str, Table]:
     categories: Table = [("category", "what"), ("---",) * 2]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
-    found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors()}
+    found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
     plans: dict[str, type[Strict]] = {
         "plan": Plan,
         "varied": Varied,
@@ -72,6 +73,16 @@ def _priors() -> Table:
     """Return the deviations of the priors of an identification, with their keys in rov.toml."""
     rows = ((f"`{key}`", f"{prior.deviation:g}", prior.words, prior.reason) for key, prior in PRIORS.items())
     return [("key", "deviation", "of", "reason"), ("---",) * 4, *rows]
+
+
+def _frames() -> Table:
+    """Return the frames of ArduSub, with the vehicles that ship and fit them."""
+    shipped = {name: fitting(load_vehicle(path).layout) for name, path in SHIPPED.items()}
+    rows: Table = [("`FRAME_CONFIG`", "frame", "motors", "vehicles that ship"), ("---",) * 4]
+    for config, (frame, motors) in enumerate(FRAMES.items()):
+        own = ", ".join(f"`{name}`" for name, frames in shipped.items() if frame in frames)
+        rows.append((str(config), f"`{frame}`", str(len(motors)), own))
+    return rows
 
 
 def _axis() -> Table:

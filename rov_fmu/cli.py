@@ -466,7 +466,7 @@ def _open(path: Path, option: str) -> None:
 @click.option(
     "--port",
     type=_number("a whole number from 0 to 65535", 0, 65535, int),
-    default=str(9002),
+    default="9002",  # to which ArduPilot sends its servo packets
     show_default=True,
     help="UDP port to listen on; 0 takes a free one.",
 )

@@ -2,10 +2,11 @@
 
 import os
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import StringIO
+from itertools import count, takewhile
 from math import cos, inf, pi, sin
 from pathlib import Path
 from socket import socket
@@ -14,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.bridges.sitl_frames import Servos
 from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
-from rov_fmu.io.messages import InputError
+from rov_fmu.io.messages import InputError, listed
 from rov_fmu.io.output import Output, write_whole
+from rov_fmu.tank.readers.ardusub_frames import Servos, motors_of, question_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 GRAVITY = 9.80665
@@ -33,6 +34,12 @@ _LONGEST_RANGE = 100.0
 _DATAGRAM = 65536
 _SILENCE = 5.0
 """The real time without a step after which the autopilot counts as silent, s. It repeats a packet after 1 s."""
+_OTHERS = (
+    "packets of other senders, such as {}, are ignored, because {} is followed. An autopilot that was started again is "
+    f"followed when the old one has been silent for {_SILENCE:g} s"
+)
+_LATE = 1.0
+"""The time of the simulation after which it is said that the servos do not fit, s."""
 MOST_LOGS = 20
 """The largest number of logs of one run."""
 MOST_ROWS = 1_000_000
@@ -131,6 +138,44 @@ class Log:
         return motion_mcap(self._vehicle, time, values | {name: command_of(values[name]) for name in layout.commands})
 
 
+class Outputs:
+    """Which servos have pulses: those that the vehicle needs, and those that follow them and move."""
+
+    def __init__(self, servos: Servos, motors: int) -> None:
+        """Begin without any pulse. ArduSub may drive so many motors, of which a vehicle may lack the last ones."""
+        self._drives = {number: name for name, (number, _) in servos.items()}
+        self._last = max(*self._drives, motors)
+        self._silent = {*self._drives}
+        self._moving: set[int] = set()
+        self._first: dict[int, int] = {}
+        """The first pulse of each servo after those of the vehicle, µs."""
+        self._time = self._moving_time = 0.0
+        """The times since a servo of the vehicle had a pulse, and since another one moved, s."""
+
+    def add(self, h: float, pulses: tuple[int, ...]) -> None:
+        """Add a step of h seconds."""
+        self._silent -= {number for number in self._silent if pulses[number - 1] not in NO_OUTPUT}
+        for number in range(self._last + 1, len(pulses) + 1):
+            pulse = pulses[number - 1]
+            if pulse not in NO_OUTPUT and self._first.setdefault(number, pulse) != pulse:
+                self._moving.add(number)
+        self._time += h if len(self._silent) < len(self._drives) else 0.0
+        self._moving_time += h if self._moving else 0.0
+
+    def doubts(self, *, at_end: bool = False) -> Iterator[tuple[str, ...]]:
+        """Yield words and what they need, if the autopilot drives fewer or more servos than the vehicle has."""
+        if self._silent and (at_end or self._time >= _LATE):
+            silent = sorted(self._silent)
+            yield "no pulses come to {} ({})", _numbered(silent), listed(self._drives[number] for number in silent)
+        is_told = at_end or self._moving_time >= _LATE
+        if is_told and (extra := [*takewhile(self._moving.__contains__, count(self._last + 1))]):
+            yield "the pulses of {} change, but no thruster of the vehicle follows them", _numbered(extra)
+
+
+def _numbered(servos: list[int]) -> str:
+    return f"servo{'s' if len(servos) > 1 else ''} {listed(map(str, servos))}"
+
+
 class Flight:
     """One flight: a vehicle that follows the servo packets of an autopilot."""
 
@@ -143,6 +188,7 @@ class Flight:
             self._names += [name for name in (*layout.state, *layout.calculated) if name not in self._names]
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
+        self.outputs = Outputs(setup.servos, motors_of(layout))
         self._held = {**layout.usual_inputs, **setup.start}
         self._draws = [
             (current, layout.gains[thruster])
@@ -172,6 +218,7 @@ class Flight:
             at = dict(zip(self._names, self._stepper.step(commands, h), strict=True))
         except OverflowError as error:
             raise InputError(f"VEHICLE: {error}") from error
+        self.outputs.add(h, packet.pulses)
         values, motion = self._measured(at)
         if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
             values["battery"] = battery
@@ -257,6 +304,7 @@ class Connection:
         """
         self._setup, self._hint, self._clock = setup, hint, clock
         self._hinted: set[str] = set()
+        self._question = question_of(setup.vehicle.layout)
         self._answer = b""
         self._sender: Address | None = None
         self._last_step = clock()
@@ -295,12 +343,18 @@ class Connection:
         self._last_step = self._clock()
         if kind is Kind.RESTART:
             self._passed += self.flight.time
-            self.write_log()
+            self.end()
             self.traffic.restarts += 1
             self.flight = self._begin()
         self.traffic.frames += 1
         self._answer = self.flight.step(packet)
+        self._doubt()
         return self._answer
+
+    def _doubt(self, *, at_end: bool = False) -> None:
+        """Say which servos do not fit the vehicle."""
+        for words, *values in self.flight.outputs.doubts(at_end=at_end):
+            self._say_once(f"{words}: {self._question}", *values)
 
     def _kind(self, packet: ServoPacket, sender: Address) -> Kind:
         """Return what to do with a packet. Only the first sender is followed.
@@ -315,7 +369,7 @@ class Connection:
             kind = Kind.RESTART
         else:
             other, own = (f"{host}:{port}" for host, port, *_ in (sender, self._sender))
-            self._say_once("packets of other senders, such as {}, are ignored, because {} is followed", other, own)
+            self._say_once(_OTHERS, other, own)
             return Kind.STRANGE
         if kind is not Kind.STRANGE:
             self._sender = sender
@@ -335,6 +389,12 @@ class Connection:
         """Return the time since the start, s: that of all flights, and the real time of silences."""
         silence = self._silence() if self._sender else self._clock() - self._last_step
         return self._passed + self.flight.time + silence
+
+    def end(self) -> None:
+        """End the flight: say what is left to say, and write its log. Raises WriteError."""
+        if self.flight.time:
+            self._doubt(at_end=True)
+        self.write_log()
 
     def write_log(self) -> None:
         """Write the log of the flight, if it has a complete row, under a name that is free. Raises WriteError."""

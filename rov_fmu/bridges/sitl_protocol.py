@@ -12,8 +12,6 @@ from typing import Any
 
 from rov_fmu.io.csv_table import NO_OUTPUT
 
-PORT = 9002
-"""The UDP port to which ArduPilot sends its servo packets."""
 _HEAD = struct.Struct("<HHI")
 _CHANNELS = {18458: 16, 29569: 32}
 """The number of channels in a packet, by its magic number."""

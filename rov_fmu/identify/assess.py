@@ -361,18 +361,21 @@ def verdict(
     slips: Sequence[Slip] = (),
     steady: Sequence[Point] = (),
     effects: Sequence[Effect] = (),
+    misfits: Sequence[str] = (),
 ) -> Verdict:
     """Return whether the model of an axis may be trusted.
 
     It is judged by its predictions, its intervals, what is unknown, two starts, mistakes in the files of the axis, the
-    steady velocities of its tables, each predicted without the rows of the same command, and the sizes of effects.
+    steady velocities of its tables, each predicted without the rows of the same command, the sizes of effects, and
+    `misfits`, the logs whose motors are not the thrusters along the axis.
     """
-    word, reasons = "good", []
+    reasons = [f"The motors of {file} are not the thrusters of the vehicle." for file in misfits]
+    word: Word = "do not use" if misfits else "good"
 
     def lower(to: Word, reason: str) -> None:
         nonlocal word
         order: list[Word] = ["good", "usable", "do not use"]
-        word = max(word, to, key=order.index)  # type: ignore[arg-type]
+        word = max(word, to, key=order.index)
         reasons.append(reason)
 
     judged = [p for p in found if p.is_judged]
@@ -414,4 +417,4 @@ def verdict(
         lower("do not use", "Two starts of the fit led to different vehicles.")
     if not reasons:
         reasons.append("The tables determine the steady velocities; no unseen motion was predicted.")
-    return Verdict(word, tuple(reasons))  # type: ignore[arg-type]
+    return Verdict(word, tuple(reasons))

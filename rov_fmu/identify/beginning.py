@@ -13,7 +13,7 @@ from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrow
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
-from rov_fmu.identify.likelihood.records import SampledLog, driven_axes, recorded, typical
+from rov_fmu.identify.likelihood.records import SampledLog, changes, driven_axes, recorded, typical, velocities
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
@@ -350,12 +350,15 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
 
 
 def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
-    """Return drag and β from a large velocity and the thrust in the tests, as the centre of their prior."""
+    """Return drag and β from a large velocity and the thrust in the tests, as the centre of their prior.
+
+    Where no test has thrust, the force is that which slows the vehicle down.
+    """
     points = [(abs(row.value), row.command) for name, rows in tests.rows("steady") if name == axis.name for row in rows]
     V = max((value for value, _ in points), default=0.0) or typical(logs, axis) or 1.0
     forces = [abs(vehicle.force(axis, command)) for _, command in points] or [*_forces(vehicle, axis, logs)]
     F = float(np.quantile(forces, 0.9)) if forces else 0.0
-    F = F or 0.3 * vehicle.strongest(axis) or 1.0
+    F = F or _drag_force(vehicle, axis, logs) or 0.3 * vehicle.strongest(axis) or 1.0
     a, b = _QUADRATIC * F / V**2, (1.0 - _QUADRATIC) * F / V
     pairs = {"a_d": a, "b_d": b, f"a_d{REVERSE}": a, f"b_d{REVERSE}": b}
     if axis.coefficient("m_a") not in vehicle.coefficients:
@@ -372,6 +375,18 @@ def _forces(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterato
     for one in (one for one in logs if axis.name in one.layout.kinds):
         some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]
         yield from filter(None, np.abs(one.thrust(vehicle.coefficients, axis, some)).tolist())
+
+
+def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> float:
+    """Return the drag along an axis at a large velocity by how fast the vehicle slows down, N or N m; 0 if unknown."""
+    largest = 0.0
+    for channel in (m.channel for one in logs for m in one.measured if m.sensor.axis is axis):
+        time, speeds = velocities(channel)
+        if len(speeds):
+            slower = -changes(time, np.abs(speeds)) / changes(time, time)
+            largest = max(largest, float(np.max(slower, initial=0.0)))
+    is_whole = axis.coefficient("m_a") in vehicle.coefficients
+    return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.kinds[axis.name]) * largest
 
 
 def _table_rows(tests: Tests, vehicle: Vehicle) -> Iterator[TableRow]:

@@ -32,7 +32,7 @@ from rov_fmu.io.messages import listed
 from rov_fmu.tank import findings
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import Finding, SentenceForm
+from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.uncertainty import significant, with_interval
@@ -145,7 +145,7 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         ),
     },
 }
-_FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip")
+_FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip", *MISFITS)
 """The warnings that stand first: wrong predictions, and wrong or missing data."""
 _READ: dict[Heading, frozenset[str]] = {
     "Doubts": frozenset(
@@ -174,6 +174,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "beyond full thrust",
             "constant motion",
             "constant push",
+            "free decay",
             "cancelling thrusters",
             "gaps",
             "source of commands",

@@ -23,6 +23,7 @@ from rov_fmu.identify.unexplained.disturbances import disturbances, followed, un
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
+from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -103,23 +104,33 @@ def _axis(
     effects: Sequence[Effect],
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
-    answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1])
+    is_told = _is_thrust_told(tests, vehicle, axis)
+    answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1]) if is_told else ()
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
+    misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.drivers(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
+    limits = tests.given.description.tables.limits
     return AxisResult(
         axis=axis,
         verdict=assess.verdict(
-            own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting
+            own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting, misfits
         ),
         answers=answers,
         known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),
         predictions=own,
         points=(*steady, *times),
-        next_test=next_test(fit.objective, fit.averaged, axis, tests.given.description.tables.limits, answers),
+        next_test=next_test(fit.objective, fit.averaged, axis, limits, answers) if is_told else None,
     )
+
+
+def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:
+    """Return False if the thrust along an axis is the largest force of the logs, and none of them has any."""
+    drivers = {thruster.name for thruster in vehicle.layout.drivers(axis)}
+    largest = (most for log in tests.folder.logs if log.commands for most in log.commands.largest.items())
+    return not vehicle.layout.has_wrench or any(most for name, most in largest if name in drivers)
 
 
 def _those_of(coefficients: Mapping[str, Coefficient], part: Part, *more: str) -> tuple[Coefficient, ...]:

@@ -10,8 +10,8 @@ from socket import AF_INET, SOCK_DGRAM, socket
 import numpy as np
 
 from rov_fmu.bridges.sitl import Connection, Setup
-from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
-from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.catalogue import HEAVE, ROLL
+from rov_fmu.equation.layout import FAINT, Layout
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings
@@ -20,6 +20,7 @@ from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, servos_of
 
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
@@ -60,10 +61,12 @@ def serve(path: Path, options: Options) -> None:
         address, port = server.getsockname()
         for line in _listed(setup.servos, setup.vehicle.layout):
             paragraph(console(), line)
+        if _rolls_alone(setup):
+            print_message(f"rov-fmu: {_NO_ROLL}")
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
 
         def end() -> None:
-            connection.write_log()
+            connection.end()
             paragraph(console(), _summary(connection))
             if connection.logs:
                 inspect = shell_words("rov-fmu", "identify", "--inspect", connection.logs[0])
@@ -121,6 +124,19 @@ def _listed(servos: Servos, layout: Layout) -> Iterator[str]:
     for name, (number, sign) in sorted(servos.items(), key=lambda item: item[1]):
         words = layout.commands[name].description.removeprefix("Command ").partition(";")[0]
         yield f"servo {number} drives {words}{', reversed' if sign < 0 else ''}"
+
+
+def _rolls_alone(setup: Setup) -> bool:
+    """Return True if the autopilot tries to roll a vehicle that has no roll."""
+    layout = setup.vehicle.layout
+    driven = [t for t in layout.thrusters if f"u_{t.name}" in setup.servos]
+    return not layout.has(ROLL) and any(abs(t.effect(ROLL)) > FAINT and t.effect(HEAVE) for t in driven)
+
+
+_NO_ROLL = (
+    "this vehicle has no roll, so ArduSub's roll integrator winds up: its vertical thrusters push against each other "
+    "with up to 18 %. ATC_RAT_RLL_I 0 should prevent it, which has not been tried"
+)
 
 
 def _summary(connection: Connection) -> str:

@@ -39,8 +39,12 @@ _MOST_MOTORS = 12
 """The largest number of motors that an autopilot drives."""
 _BY_SERVO = 8.0, 9.0
 """The values of MOT_PWM_TYPE with which the parameters of the servo define the range and the direction of a motor."""
-_ARDUPILOT_MOTOR, _PX4_MOTOR = 32, 100
-"""The function of output x that drives motor n is n more than this."""
+_OFTEN = 0.5
+"""An output of which no parameter tells what it drives is a motor's if it changes so often, relative to the others."""
+_ARDUPILOT_MOTORS = (*range(33, 41), *range(82, 86))
+"""The functions of outputs of ArduPilot that drive the motors 1, 2, ... 12."""
+_PX4_MOTOR = 100
+"""The function of output x of PX4 that drives motor n is n more than this."""
 
 
 _Pulse = Annotated[Finite, Field(gt=0.0, le=1e4)] | None
@@ -128,6 +132,22 @@ class _Outputs:
         return sum(spread(values) for _, values in self.series.values())
 
 
+@dataclass(frozen=True)
+class Function:
+    """What an output drives."""
+
+    output: int
+    motor: int
+    """0 for an output that drives no motor."""
+    parameter: str = ""
+    """The parameter that says so, such as `SERVO7_FUNCTION 39`; empty if none does."""
+
+    @property
+    def words(self) -> str:
+        """The motor with its parameter, or the output."""
+        return f"motor {self.motor} ({self.parameter})" if self.parameter else f"output {self.output}"
+
+
 @dataclass(frozen=True, eq=False)
 class Commanded:
     """The commands of a log, and who sent them."""
@@ -139,6 +159,10 @@ class Commanded:
     other_vehicles: Collection[str] = ()
     """The other vehicles that have commands."""
     findings: Sequence[Finding] = ()
+    without_pulse: Sequence[str] = ()
+    """The thrusters that never get a pulse, although others do."""
+    without_thruster: Sequence[Function] = ()
+    """The outputs that drive motors for which the vehicle has no thruster."""
 
 
 def commands_of(
@@ -153,15 +177,20 @@ def commands_of(
     vehicle = max(own, key=lambda outputs: outputs.messages).source.vehicle
     own = [outputs for outputs in own if outputs.source.vehicle == vehicle]
     best = _best(own, len(thrusters), parameters)
-    numbers = _motors(best, len(thrusters), parameters)
+    functions = _functions(parameters)
+    numbers = _motors(best, len(thrusters), functions)
     names = thrusters or [str(n) for n in range(1, len(numbers) + 1)]
-    if missing := [name for name, number in zip(names, numbers, strict=True) if number not in best.series]:
+    if missing := [name for name, n in zip(names, numbers, strict=True) if n and n not in best.series]:
         count = f"{shown(best.source.topic)} has {len(best.series)} outputs"
         raise DataFileError(f"{path}: no output of thruster {listed(missing)}: {count}")
     vehicles = {outputs.source.vehicle for outputs in candidates}
     findings = [*_choice(path, best, own, sorted(vehicles))]
-    series, meanings = _fractions(path, best, dict(zip(names, numbers, strict=True)), parameters, keys)
-    return Commanded(series, best.source, vehicles - {vehicle}, [*findings, *meanings])
+    by_name = dict(zip(names, numbers, strict=True))
+    series, meanings = _fractions(path, best, by_name, parameters, keys)
+    used = {*best.used} if _are_pulses(path, best) else {*numbers} - {0}
+    without = [name for name, n in by_name.items() if n not in used] if used & {*numbers} else []
+    extra = [*_without_thruster(best, numbers, functions)]
+    return Commanded(series, best.source, vehicles - {vehicle}, [*findings, *meanings], without, extra)
 
 
 def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], keys: LogKeys) -> Commanded:
@@ -259,15 +288,48 @@ def _motor_module(parameters: Parameters) -> str:
     return f"instance {driving.index(True)}" if any(driving) else "none"
 
 
-def _motors(outputs: _Outputs, thrusters: int, parameters: Parameters) -> list[int]:
-    """Return the number of the output of each motor, in the order of the motors."""
-    assigned: dict[int, int] = {}
+def _functions(parameters: Parameters) -> dict[int, Function]:
+    """Return what the outputs drive, by the number of the output, as far as the parameters tell it."""
+    found = {}
     for match, function in parameters.functions(r"(?:SERVO|PWM_(MAIN|AUX)_FUNC)(\d+)(?(1)|_FUNCTION)"):
-        motor = int(function) - (_PX4_MOTOR if match[1] else _ARDUPILOT_MOTOR)
-        if 0 < motor <= _MOST_MOTORS:
-            assigned[motor] = int(match[2])
+        motors = range(_PX4_MOTOR + 1, _PX4_MOTOR + 1 + _MOST_MOTORS) if match[1] else _ARDUPILOT_MOTORS
+        motor = motors.index(int(function)) + 1 if function in motors else 0
+        if motor or not match[1]:  # an output of PX4 that drives no motor may be another one of the same number
+            found[int(match[2])] = Function(int(match[2]), motor, f"{match[0]} {function:g}")
+    return found
+
+
+def _motors(outputs: _Outputs, thrusters: int, functions: Mapping[int, Function]) -> list[int]:
+    """Return the number of the output of each motor, in the order of the motors; 0 for a motor without an output."""
+    assigned = {of.motor: of.output for of in functions.values() if of.motor}
     count = thrusters or max(assigned, default=0) or max(outputs.used, default=0)
-    return [assigned.get(motor, motor) for motor in range(1, count + 1)]
+    others = {of.output for of in functions.values()} if assigned else set()
+    return [assigned.get(motor, 0 if motor in others else motor) for motor in range(1, count + 1)]
+
+
+def _without_thruster(
+    outputs: _Outputs, numbers: Sequence[int], functions: Mapping[int, Function]
+) -> Iterator[Function]:
+    """Yield the outputs that drive motors, but that no thruster takes.
+
+    They change, and a parameter says that they drive motors. If none tells what an output drives, it changes about as
+    often as those of the thrusters, as lights and cameras do not.
+    """
+    counts = {n: _changes_of(values) for n, (_, values) in outputs.series.items()}
+    changing = [counts[n] for n in numbers if counts.get(n)]
+    usual = float(np.median(changing)) if changing else np.inf
+    for n, count in counts.items():
+        own = functions.get(n) or Function(n, n if count >= _OFTEN * usual else 0)
+        if count and own.motor and n not in numbers:
+            yield own
+
+
+def _changes_of(values: Array) -> int:
+    """Return how often an output changes, without the times at which it has no pulse."""
+    there = values[np.isfinite(values)]
+    if (np.abs(there) > 1.0).any():
+        there = there[~np.isin(there, NO_OUTPUT)]
+    return int(np.count_nonzero(np.diff(there)))
 
 
 # ---- What the numbers mean -------------------------------------------------------------------------------------------
@@ -278,9 +340,12 @@ def _fractions(
 ) -> tuple[dict[str, Series], list[Finding]]:
     """Return the fractions of the full command of each thruster, not yet limited to ±1, and what had to be decided.
 
-    `numbers` has the number of the output of each thruster, in the order of the motors. Raises DataFileError.
+    `numbers` has the number of the output of each thruster, in the order of the motors, or 0. Raises DataFileError.
     """
-    series = {name: (outputs.series[n][0], np.nan_to_num(outputs.series[n][1])) for name, n in numbers.items()}
+    time, _ = next(iter(outputs.series.values()))
+    nothing = time, np.zeros(len(time))
+    series = {name: outputs.series[n] if n else nothing for name, n in numbers.items()}
+    series = {name: (time, np.nan_to_num(values)) for name, (time, values) in series.items()}
     findings = []
     if outputs.rule.unit != "1" and "MOT_1_DIRECTION" not in parameters.told:
         findings.append(about(path.name, "unknown direction"))

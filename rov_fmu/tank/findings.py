@@ -89,6 +89,9 @@ class _Range:
         return f"{words} {noun if self.high == 1 else plural}"
 
 
+MISFITS = ("motors without thruster", "thrusters without pulse")
+"""The kinds of findings about logs whose motors are not the thrusters of the vehicle."""
+
 SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
@@ -118,6 +121,10 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: nothing is learnt about {axes}: no thruster drives it, and the effect of fins is not fitted"
     ),
     "constant push": "{files}: nothing is learnt about {axes}: the thrust along it never changes",
+    "free decay": (
+        "{files}: the motion in {axes} slows down without thrust, which tells drag relative to inertia, but not the "
+        "velocities that the thrusters give"
+    ),
     "cancelling thrusters": ("{files}: nothing is learnt about {axes}: its thrusters cancel each other all the time"),
     "axis not pushed": (
         "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "
@@ -161,6 +168,13 @@ SENTENCES: dict[str, SentenceForm] = {
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "several vehicles": (
         "{files}: the log has the vehicles {vehicles}. {vehicle} is used; [logs] of rov.toml can name another"
+    ),
+    "motors without thruster": (
+        "{files}: there are commands of {whose}, but the vehicle has no thruster for them, so that forces and inertias "
+        "come out wrong{frames}"
+    ),
+    "thrusters without pulse": (
+        "{files}: no pulses come to the thrusters {whose}, so that forces and inertias come out wrong{frames}"
     ),
     "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
     "reversed motors": "{files}: parameters of the autopilot reverse the thrusters {thrusters}",

@@ -26,6 +26,7 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.commands import LogKeys, Series, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
+from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
 from rov_fmu.tank.readers.tables import read_table
@@ -72,9 +73,12 @@ def _log(
         commanded = wrench_of(path.with_name(file), topics, forces, keys)
     else:
         commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
+    extra = {of.words: of.motor for of in commanded.without_thruster}
+    config = piece.parameters.last("FRAME_CONFIG")
     source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
     findings = [*content.findings * is_first, *commanded.findings, *_findings(file, layout, series, labels)]
+    findings += misfits(file, layout, commanded.without_pulse, extra, config)
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
     used = {channel.source.topic for channel in channels} | {source.topic}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}

@@ -21,20 +21,18 @@ from scipy.spatial.transform import Rotation
 
 import rov_fmu
 from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
-from rov_fmu.bridges.sitl_frames import FRAMES, servos_of
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.beginning import load_tests
+from rov_fmu.tank.readers.ardusub_frames import servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
-from tests.vehicles import pulsed
-from verification.references.autopilot.ardusub import VECTORED_6DOF
+from tests.vehicles import pulsed, thruster
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -257,6 +255,7 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
     assert connection.logs == [tmp_path / f"dive_{n}.csv" for n in range(3, MOST_LOGS + 3)]
     assert len(list(tmp_path.iterdir())) == MOST_LOGS + 2
     assert [hint.partition(",")[0] for hint in hints] == ["packets of other senders", "a run has 20 logs with 1"]
+    assert hints[0].endswith("An autopilot that was started again is followed when the old one has been silent for 5 s")
 
 
 def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -270,6 +269,54 @@ def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: 
     lengths = [len((tmp_path / name).read_text("utf-8").splitlines()) for name in ("dive.csv", "dive_2.csv")]
     assert lengths == [1 + 4, 1 + 5]
     assert [hint.partition(":")[0] for hint in hints] == ["a run has 20 logs with 1,000,000 rows in all at most"]
+
+
+def _simple() -> Vehicle:
+    """Return a vehicle of the frame simplerov_4: two thrusters push ahead and two down, each on another side."""
+    places = {"a": ((1.0, 0.0, 0.0), 0.2), "b": ((1.0, 0.0, 0.0), -0.2), "c": ((0.0, 0.0, 1.0), 0.2)}
+    places["d"] = (0.0, 0.0, 1.0), -0.2
+    thrusters = tuple(thruster(name, "t200", to, (0.0, y, 0.0)) for name, (to, y) in places.items())
+    return Vehicle(replace(HEAVY.layout, thrusters=thrusters), HEAVY.coefficients)
+
+
+SIMPLE = _simple()
+NO_PULSES = "no pulses come to servos 7 and 8 (u_7 and u_8): does ArduSub have FRAME_CONFIG 2 (vectored_6dof)?"
+TOO_MANY = "the pulses of {} change, but no thruster of the vehicle follows them: does ArduSub have FRAME_CONFIG {}?"
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "motors", "moving", "said"),
+    [
+        ("bluerov2_heavy", 6, False, [NO_PULSES]),
+        ("bluerov2_heavy", 8, True, []),
+        ("bluerov2", 8, False, []),  # such as a gripper at rest
+        ("bluerov2", 8, True, [TOO_MANY.format("servos 7 and 8", "1 (vectored)")]),
+        ("videoray", 4, True, [TOO_MANY.format("servo 4", "4 (simplerov_3)")]),
+        ("simplerov_4", 5, True, []),  # ArduSub drives five motors in this frame
+        ("simplerov_4", 6, True, [TOO_MANY.format("servo 6", "5 (simplerov_4)")]),
+    ],
+)
+def test_servos_that_do_not_fit_the_vehicle_are_named_once(
+    vehicle: str, motors: int, moving: bool, said: list[str]
+) -> None:
+    """In a flight of more than 1 s they are named then, otherwise at its end; pulses that come late count."""
+    for frames in (120, 20):
+        hints: list[str] = []
+        rov = SIMPLE if vehicle == "simplerov_4" else load_vehicle(SHIPPED[vehicle])
+        connection = Connection(setup_of(rov), hints.append)
+        for count in range(frames):
+            pulses = [1500 + moving * (count % 7)] * motors if count > 3 else []
+            connection.answer(packet(50, count, [*pulses, *[0] * (16 - len(pulses))]), HERE)
+        assert hints == (said if frames == 120 else [])
+        connection.end()
+        connection.end()
+        assert hints == said
+
+
+def test_a_vehicle_without_roll_gets_a_word_about_the_roll_integrator(capsys: pytest.CaptureFixture[str]) -> None:
+    for vehicle, is_told in (("bluerov2", True), ("bluerov2_heavy", False), ("videoray", False)):
+        assert main(["sitl", vehicle, "--duration", "0.01", "--port", "0"]) == 0
+        assert ("ATC_RAT_RLL_I 0" in capsys.readouterr().err) == is_told, vehicle
 
 
 # ---- Motion ----------------------------------------------------------------------------------------------------------
@@ -357,38 +404,6 @@ def test_holds_its_place_in_a_current() -> None:
     assert max(np.hypot(at["position"][0], at["position"][1]) for at in held) < 0.3
 
 
-# ---- Frames and servos -----------------------------------------------------------------------------------------------
-
-
-def test_the_motors_of_the_heavy_push_as_ardusub_means_them_to() -> None:
-    servos = servos_of(HEAVY.layout, None, {})
-    thrusters = {f"u_{t.name}": t for t in HEAVY.layout.thrusters}
-    assert {servos[name][0] for name in thrusters} == {*range(1, 9)}
-    for name, thruster in thrusters.items():
-        servo, sign = servos[name]
-        effects = [sign * thruster.effect(axis) for axis in (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)]
-        effects[3] *= -1.0  # the throttle is positive upward
-        for factor, effect in zip(VECTORED_6DOF[servo - 1], effects, strict=True):
-            assert factor == 0 or np.sign(effect) == factor
-
-
-def test_frames_and_tables() -> None:
-    motors = {name: len(FRAMES[name]) for name in ("simplerov_3", "simplerov_4", "simplerov_5", "bluerov1", "vectored")}
-    assert motors == {"simplerov_3": 3, "simplerov_4": 4, "simplerov_5": 5, "bluerov1": 6, "vectored": 6}
-    videoray = load_vehicle(SHIPPED["videoray"]).layout
-    assert servos_of(videoray, None, {}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (3, 1.0)}
-    assert servos_of(videoray, "simplerov_3", {5: "-t"}) == {"u_r": (1, 1.0), "u_l": (2, 1.0), "u_t": (5, -1.0)}
-    assert servos_of(videoray, None, {4: "l"}) == {"u_l": (4, 1.0)}
-    bluerov2 = servos_of(load_vehicle(SHIPPED["bluerov2"]).layout, None, {})
-    assert {name: servo for name, (servo, _) in bluerov2.items()} == {f"u_{n}": n for n in range(1, 7)}
-    heavy = servos_of(HEAVY.layout, "vectored", {4: "-7"})
-    assert heavy["u_7"] == (4, -1.0)
-    assert {name: servo for name, (servo, _) in heavy.items()} == {
-        **{f"u_{n}": n for n in (1, 2, 3, 5, 6)},
-        "u_7": 4,
-    }, "servo 4 no longer drives u_4"
-
-
 # ---- The command -----------------------------------------------------------------------------------------------------
 
 
@@ -455,7 +470,7 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
     [
         (
             "videoray --frame vectord",
-            "--frame 'vectord': must be one of vectored, vectored_6dof, vectored_6dof_90deg, bluerov1, simplerov_3, "
+            "--frame 'vectord': must be one of bluerov1, vectored, vectored_6dof, vectored_6dof_90deg, simplerov_3, "
             "simplerov_4, simplerov_5; did you mean vectored?",
         ),
         ("videoray --frame vectored", "--frame vectored: the motors of this frame do not push"),

@@ -81,6 +81,12 @@ def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: st
     assert (judged.word, judged.reasons) == (word, tuple(filter(None, [COVERED, reason])))
 
 
+def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted() -> None:
+    judged = verdict([DEPTH], results.answers(1.0, 0.02), [], 0.0, misfits=["dive.tlog"])
+    words = "The motors of dive.tlog are not the thrusters of the vehicle."
+    assert (judged.word, judged.reasons) == ("do not use", (words, COVERED))
+
+
 def test_the_limits_of_a_verdict() -> None:
     """The coverage, half the width of the best interval of V_ss, and the error of a table of V_ss without its row."""
     limits: list[tuple[str, Any, tuple[float, ...]]] = [

@@ -11,35 +11,12 @@ from rov_fmu.equation.catalogue import SURGE, YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
+from tests.paper.test_paper import TABLE_9
 from tests.vehicles import sources_of
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 WITH_SHIPPED_FOLDERS = re.sub(r'^(data|pictures) = "', r'\1 = "videoray/', TEXT, flags=re.MULTILINE)
 """The VideoRay's file with names of folders that are valid from any place."""
-
-# The coefficients of Table 9, written here again to check the vehicle file.
-TABLE_9 = {
-    "m_rov": 6.57,
-    "I_r": 0.105,
-    "R": 0.22,
-    "gamma": 0.423,
-    "a_t_rear": 42.9,
-    "b_t_rear": 2.711,
-    "a_t_top": 6.494,
-    "b_t_top": 0.0513,
-    "a_d_u": 3.159,
-    "b_d_u": 9.379,
-    "a_d_w": 18.72,
-    "b_d_w": 0.6324,
-    "a_d_r": 0.1246,
-    "b_d_r": 0.103,
-    "alpha_u": 1.1,
-    "beta_u": 1.0,
-    "alpha_w": 1.14,
-    "beta_w": 0.59,
-    "alpha_r": 1.2,
-    "beta_r": 0.12,
-}
 
 
 def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:

@@ -24,12 +24,17 @@ FASTEST = 20.0
 """Samples per second and sensor that are kept; faster ones are averaged in groups."""
 THINNED = 5.0
 """The same for a first, quick fit, which takes single samples and no averages."""
+FREE_DECAY = "free decay"
+"""The kind of the finding about a log in which a vehicle slows down without thrust."""
 _CALM = 0.3
 """The standard deviation of an unknown velocity at the start, m/s or rad/s."""
 _LEVEL = 0.1
 """The standard deviation of an unknown angle at the start, rad."""
 _LEAST_CHANGE = 0.001
 """The least relative change of the voltage that begins a new row of inputs."""
+_LEAST_SPEED, _SLOWED = 0.1, 0.5
+"""A vehicle slows down by itself if it is faster than the first number at the beginning, m/s or rad/s, and if less than
+this share of the speed is left at the end."""
 _LEAST_PUSH = 0.02
 """The smallest change of thrust that tests an axis, as a share of full thrust. Smaller changes are due to a heading or
 depth controller, or to rounded pulses."""
@@ -102,10 +107,12 @@ def recorded(log: Log, layout: Layout) -> SampledLog | None:
 def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
     """Return the axes of the layout that a log tests, and findings about channels and axes of which it tells nothing.
 
-    A log tests an axis if it measures a motion along it that changes, and if the thrust along it changes. The channels
-    of the other axes still tell how the vehicle moved.
+    A log tests an axis if it measures a motion along it that changes, and if the thrust along it changes, or if the
+    vehicle slows down without any: a free decay tells drag relative to inertia. The channels of the other axes still
+    tell how the vehicle moved.
     """
     measured: dict[Axis, str] = {}
+    slowing: dict[Axis, bool] = {}
     findings = []
     for axis, channel in _channels(log, layout):
         found = Finding("gaps", axis.name, file=channel.file or log.file, names={"quantity": channel.quantity.name})
@@ -114,15 +121,16 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
             findings.append(replace(found, kind=kind, numbers=numbers))
             continue
         measured.setdefault(axis, found.file)
+        slowing[axis] = slowing.get(axis, False) or _slows_down(channel)
         if places := gaps(channel.time, channel.values):
             assert log.commands
             begin = float(log.commands.rows[0])
             told = [f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in places]
             names = {**found.names, "gaps": ", ".join(first_of(told, MOST))}
             findings.append(replace(found, names=names, numbers={"count": len(places)}))
-    unpushed = {axis: kind for axis in measured if (kind := _why_not_tested(log, layout, axis))}
-    findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in unpushed.items()]
-    return [axis for axis in measured if axis not in unpushed], findings
+    kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
+    findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
+    return [axis for axis in measured if kinds.get(axis) in (None, FREE_DECAY)], findings
 
 
 def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:
@@ -145,8 +153,18 @@ def _why_left_out(channel: Channel) -> str:
     return "" if np.ptp(channel.values) > 0.0 else "constant motion"
 
 
-def _why_not_tested(log: Log, layout: Layout, axis: Axis) -> str:
-    """Return the kind of the finding that says why the thrust does not test an axis; empty if it does.
+def _slows_down(channel: Channel) -> bool:
+    """Return True if a motion is much slower in the last quarter than in the first one. An oscillation may fade."""
+    speeds = np.abs(velocities(channel)[1])
+    quarter = len(speeds) // 4
+    if not quarter:
+        return False
+    first, last = (float(np.quantile(some, 0.9)) for some in (speeds[:quarter], speeds[-quarter:]))
+    return first > _LEAST_SPEED and last < _SLOWED * first
+
+
+def _without_thrust(log: Log, layout: Layout, axis: Axis, slows_down: bool) -> str:
+    """Return the kind of the finding about an axis along which the thrust does not change; empty if it does.
 
     The thrust must change whatever the coefficients of the thrust curves are. It has a linear and a quadratic term in
     each direction. For the thrusters of one curve, the sum of one of these terms must change. In a log of one command,
@@ -154,11 +172,15 @@ def _why_not_tested(log: Log, layout: Layout, axis: Axis) -> str:
     """
     commands, drivers = log.commands, layout.drivers(axis)
     assert commands
+    if log.follows_axis and commands.value.any():
+        return ""
+    of = dict(zip(commands.thrusters, commands.at(commands.time).T, strict=True))
+    if slows_down and not any(np.abs(of[t.name]).max() > _LEAST_PUSH for t in drivers if t.name in of):
+        return FREE_DECAY
     if log.follows_axis:
-        return "" if commands.value.any() else "constant push"
+        return "constant push"
     if not drivers:
         return "no thruster"
-    of = dict(zip(commands.thrusters, commands.at(commands.time).T, strict=True))
     strongest = max(abs(t.effect(axis)) for t in drivers)
     for curve in {t.curve for t in drivers}:
         own = [(t.effect(axis) / strongest, of[t.name]) for t in drivers if t.curve == curve and t.name in of]
@@ -264,6 +286,10 @@ def _start(measured: Sequence[SampledChannel], layout: Layout) -> tuple[dict[str
         axis = form.axis
         if value := of(axis, is_velocity=True):
             start[axis.velocity], errors[axis.velocity] = value[0], value[1] + 0.1 * _CALM
+        elif (m := first.get((axis.name, False))) and (axis in (HEAVE, YAW) or len(layout.axes) == 1):
+            _, speeds = velocities(m.channel)
+            if len(speeds) and abs(speeds[0]) > 2.0 * _CALM:  # the vehicle moves already
+                start[axis.velocity], errors[axis.velocity] = float(speeds[0]), _CALM + 0.5 * abs(float(speeds[0]))
         position = DRIFTS[axis.place]
         if not axis.is_rotation and position in layout.state:
             if value := of(axis, is_velocity=False):
@@ -293,16 +319,17 @@ def _quaternion(phi: float, theta: float, psi: float) -> dict[str, float]:
 
 def typical(some: Sequence[SampledLog], axis: Axis) -> float:
     """Return a large velocity along an axis in the logs, m/s or rad/s: the 90 % quantile of its size; 0 if unknown."""
-    found = []
-    for one in some:
-        for m in one.measured:
-            if m.sensor.axis is axis:
-                time, values = m.channel.time, m.channel.values
-                if not m.sensor.is_velocity:
-                    values = changes(time, values) / changes(time, time)
-                if len(values):
-                    found.append(float(np.quantile(np.abs(values), 0.9)))
-    return max(found, default=0.0)
+    speeds = (np.abs(velocities(m.channel)[1]) for one in some for m in one.measured if m.sensor.axis is axis)
+    return max((float(np.quantile(of_one, 0.9)) for of_one in speeds if len(of_one)), default=0.0)
+
+
+def velocities(channel: Channel) -> tuple[Array, Array]:
+    """Return times, and the velocity then: as measured, or by how much a position changes in the next second."""
+    time, values = channel.time, channel.values
+    if channel.quantity.is_velocity:
+        return time, values
+    later = changes(time, values)
+    return time[: len(later)], later / changes(time, time)
 
 
 def changes(time: Array, values: Array) -> Array:

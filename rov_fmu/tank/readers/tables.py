@@ -5,6 +5,7 @@ log of one axis, or a column for each input of the vehicle (`u_<name>`), or a co
 that cannot be used are left out and counted.
 """
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -49,6 +50,7 @@ from rov_fmu.tank.columns import (
 )
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
+from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece
 
 _MOST_UNORDERED = 0.2
@@ -57,6 +59,8 @@ _IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in 
 """The ends of headers in pulse widths, such as "PWM (us)": such a column may have commands."""
 _ELSEWHERE = "; if another file of the same dive has it, [dives] in rov.toml joins the files"
 """The end of a message about a log that has commands or motion, but not both."""
+_NUMBERED = re.compile(r"\s*u_([0-9]{1,2})\s*\[[^\]]+\]\s*")
+"""The header of the command of a numbered thruster."""
 _SLOW, _SHORTEST = 0.1, 1e-5
 """A log with fewer rows per second than the first number, or with shorter intervals than the second, s, has times in
 another unit than its header says, in all likelihood."""
@@ -119,6 +123,7 @@ def read_table(
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, commanding)
     _tell_headers(content, table, known)
+    content.findings += _without_thruster(table, layout)
     if unlikely:
         content.findings.append(unlikely)
     return content, {header: entry for name, header in table.headers.items() if (entry := known[name].entry)}
@@ -251,6 +256,14 @@ def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColum
         if title not in table.headers.values() and (one := wanted.get(title.strip().casefold())):
             better = shown(f"{title.strip()} [{next(iter(one.column.units))}]")
             content.findings.append(about(table.path.name, "column without unit", column=shown(title), header=better))
+
+
+def _without_thruster(table: Columns, layout: Layout) -> Iterator[Finding]:
+    """Yield findings about columns such as `u_7 [%]` of a log whose other commands are those of numbered thrusters."""
+    if any(_NUMBERED.fullmatch(title) for title in table.headers.values()):
+        others = (title for title in table.header if title not in table.headers.values())
+        extra = {shown(title): int(match[1]) for title in others if (match := _NUMBERED.fullmatch(title))}
+        yield from misfits(table.path.name, layout, [], extra, None)
 
 
 def _unlikely_rate(table: Columns, time: Array) -> Finding | None:

@@ -21,6 +21,11 @@ from tests.vehicles import VIDEORAY
 TIME: Array = np.linspace(0.0, 19.9, 200)
 STEP: Array = np.where(TIME > 5.0, 0.4, 0.0)
 MOTION: Mapping[str, Array] = {"surge velocity": 0.1 * STEP, "depth": 0.3 * TIME, "heading": 0.2 * np.sin(TIME)}
+FADING: Array = 0.3 * np.exp(-0.2 * TIME)
+DECAYS = (
+    "the motion in {} slows down without thrust, which tells drag relative to inertia, but not the velocities that the "
+    "thrusters give"
+)
 
 
 def dive(left: Array, right: Array, top: Array, *channels: Channel) -> Log:
@@ -52,6 +57,34 @@ CASES: Mapping[str, tuple[Log, list[str], list[str]]] = {
         [],
         ["nothing is learnt about heave: the thrust along it never changes"],
     ),
+    "free decays": (
+        dive(0.0 * STEP, 0.0 * STEP, STEP, channel("surge velocity", TIME, FADING), *moving("depth")),
+        ["surge", "heave"],
+        [DECAYS.format("surge")],
+    ),
+    "a free decay by a position": (
+        dive(0.0 * STEP, 0.0 * STEP, STEP, channel("heading", TIME, np.cumsum(0.1 * FADING))),
+        ["yaw"],
+        [DECAYS.format("yaw")],
+    ),
+    "a swing that fades": (
+        dive(0.0 * STEP, 0.0 * STEP, STEP, channel("yaw velocity", TIME, FADING * np.sin(3.0 * TIME))),
+        ["yaw"],
+        [DECAYS.format("yaw")],
+    ),
+    **{
+        f"no free decay: {words}": (
+            dive(push, push, 0.0 * STEP, channel("surge velocity", TIME, speed)),
+            [],
+            ["nothing is learnt about surge: the thrust along it never changes"],
+        )
+        for words, push, speed in (
+            ("too slow", 0.0 * STEP, 0.3 * FADING),
+            ("it drifts on", 0.0 * STEP, 0.4 - 0.2 * TIME / 19.9),
+            ("it gets faster", 0.0 * STEP, FADING[::-1]),
+            ("a constant thrust", 0.3 + 0.0 * STEP, FADING),
+        )
+    },
     "a sensor that stands still": (
         dive(STEP, STEP, STEP, channel("depth", TIME, 0.0 * TIME + 1.5), *moving("surge velocity")),
         ["surge"],
@@ -120,6 +153,15 @@ def test_the_filter_reads_averages_of_fast_samples_and_all_slow_ones() -> None:
     assert [*full.since] == [0.0, TIME[50]]
     assert full.inputs[:, [*VIDEORAY.layout.inputs].index("u_l")].tolist() == [0.0, 0.4]
     assert [typical([one], axis) for axis in (HEAVE, SURGE, YAW)] == pytest.approx([0.3, 0.04, 0.0], rel=0.1)
+
+
+@pytest.mark.parametrize(("speed", "start", "error"), [(0.8, 0.8, 0.7), (0.5, 0.0, 0.3)])
+def test_a_vehicle_that_moves_at_the_start_begins_with_the_velocity_of_its_position(
+    speed: float, start: float, error: float
+) -> None:
+    one = recorded(dive(STEP, STEP, STEP, channel("depth", TIME, 1.0 + speed * TIME)), VIDEORAY.layout)
+    assert one
+    assert (one.record.start["w"], one.record.errors["w"]) == pytest.approx((start, error))
 
 
 def test_a_voltage_has_a_row_for_each_thousandth_and_tilt_is_an_input() -> None:

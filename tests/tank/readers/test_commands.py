@@ -82,7 +82,7 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
     "the twelfth motor": (
         TWO,
         "",
-        "SERVO2_FUNCTION=44",
+        "SERVO2_FUNCTION=85",
         "log: no output of thruster 3, 4, 5, 6, 7, 8, 9, 10 and 11: 'SERVO_OUTPUT_RAW' has 2 outputs",
     ),
     "AUX, by its twelfth motor": (PX4, "a", "PWM_MAIN_FUNC1=113 PWM_AUX_FUNC1=112", "(instance 1)"),
