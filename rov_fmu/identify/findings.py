@@ -156,6 +156,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "aligned clock",
             "unknown direction",
             "unknown velocity",
+            "late command",
             "depth by pressure",
         }
     ),
@@ -166,7 +167,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "rows sorted",
             "time stamps merged",
             "rows without time",
-            "rows without command",
+            "rows before commands",
             "torn rows",
             "unread cells",
             "no pulse",

@@ -12,7 +12,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import BodyForce, Layout
 from rov_fmu.tank.channels import channels_of, of_scalar
-from rov_fmu.tank.clocks import in_rows
+from rov_fmu.tank.clocks import LATE, in_rows
 from rov_fmu.tank.columns import (
     COMMAND,
     INPUTS,
@@ -105,20 +105,28 @@ def _meant(piece: Piece, entries: Mapping[str, Entry]) -> tuple[list[Channel], d
         for field, values in topic.full_fields():
             if entry := entries.get(field):
                 converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
+                told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
                 if entry.quantity:
                     source = replace(topic.source, topic=field)
                     channels += of_scalar(entry.quantity, source, topic.time, converted)
-                else:
+                elif told.any():
                     labels[entry.name] = field
-                    commands[entry.name] = topic.time, np.nan_to_num(converted)
+                    time = topic.time if told.all() else topic.time[told]
+                    commands[entry.name] = time, np.nan_to_num(converted[told])
     return channels, commands, labels
 
 
 def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str]) -> Iterator[Finding]:
-    """Yield a finding for each column or thruster with commands beyond ±1, which become ±1, and for each without any.
+    """Yield a finding for each column or thruster with commands beyond ±1, which become ±1, and for each without any,
+    or without any at first.
 
     `labels` has the column or field of each input, thruster or axis that rov.toml or a table names.
     """
+    first = min((time[0] for time, _ in series.values()), default=0.0)
+    for name, (time, _) in series.items():
+        if time[0] > first + LATE:
+            at = f"{time[0] - first:.4g}"
+            yield about(file, "late command", column=labels.get(name, f"thruster {name}"), at=at)
     for name, (_, values) in series.items() if not layout.has_wrench else ():
         if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
             yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)

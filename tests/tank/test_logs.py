@@ -50,20 +50,19 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
         ("rows sorted", 1),
         ("time stamps merged", 2),
         ("rows without time", 2),
-        ("rows without command", 3),
         ("torn rows", 1),
+        ("unread cells", 1),
         ("unread cells", 1),
     ]
     assert {finding.file for finding in log.findings} == {"log.csv"}
-    assert log.findings[-1].names == {"column": "depth [cm]"}
+    assert [one.names for one in log.findings[-2:]] == [{"column": "command [%]"}, {"column": "depth [cm]"}]
     depth = used(log.log, "depth")
-    assert depth.time[depth.there] == pytest.approx(0.1 * np.arange(N))
-    expected = 0.01 * np.arange(N)
-    expected[19] = 0.77
-    assert measured(log.log, "depth") == pytest.approx(expected)
-    assert commanded(log.log, COMMAND, depth.time[depth.there]) == pytest.approx(
-        [0.25 if n == 19 else STEP[n] for n in range(N)]
-    )
+    in_order = 0.01 * np.arange(N)
+    in_order[19] = 0.77
+    held = [0.25 if n == 19 else STEP[n] for n in range(N)]
+    assert depth.time[depth.there] == pytest.approx([*0.1 * np.arange(21), 2.05, 2.06, 2.07, *0.1 * np.arange(21, N)])
+    assert measured(log.log, "depth") == pytest.approx([*in_order[:21], *[0.05] * 3, *in_order[21:]])
+    assert commanded(log.log, COMMAND, depth.time[depth.there]) == pytest.approx([*held[:21], *[0.3] * 3, *held[21:]])
 
 
 def test_a_measurement_without_a_unit_is_told(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
@@ -196,43 +197,61 @@ def _no_axis_in_name(path: Path, layout: Layout) -> str:
 
 
 def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], commanding: Sequence[str]) -> None:
-    """Add the rows with a time and commands between the restarts of the clock, and what was left out or sorted.
+    """Add the rows with a time between the restarts of the clock, and what was left out or sorted. Raises
+    DataFileError.
 
-    Raises DataFileError.
+    A row without a command keeps its measurements: in many tables, each message has a row of its own. Rows before the
+    first command are only counted, because nothing is learnt from them.
     """
     timed = np.isfinite(columns["time"])
-    rows = np.flatnonzero(np.all([np.isfinite(columns[name]) for name in ("time", *commanding)], axis=0))
-    if not rows.size:
+    told = np.any([np.isfinite(columns[name]) for name in commanding or ["time"]], axis=0) & timed
+    if not told.any():
         what = "both a time and a command" if commanding else "a time"
         for name in (name for name in ("time", *commanding) if table.unread[name]):
             reason = f"is no {'time' if name == 'time' else 'number'}, and no row has {what}"
             raise table.error(table.unread[name][0], name, reason)
         raise DataFileError(f"{table.path}: no row has {what}")
-    late: list[int] = []
+    rows = np.flatnonzero(timed)
+    starts, late = _order(columns, rows)
+    if len(late) > _MOST_UNORDERED * rows.size:
+        reason = "the time goes back and does not return. Are there two logs in one file?"
+        raise table.error(int(late[0]), "time", reason)
     merged, since = rows.size, 0.0
-    for own in np.split(rows, restart_rows(columns["time"][rows])):
+    for own in np.split(rows, starts):
         times = columns["time"][own]
-        late += own[times < np.maximum.accumulate(times)].tolist()
         # One column after the other, because a log may be as large as the memory allows.
         fields = {table.headers[name]: ascending(times, values[own])[1] for name, values in columns.items()}
         time = fields.pop(table.headers["time"])
         content.pieces.append(Piece([Topic(Source(""), time, fields)], since=since))
         merged -= len(time)
         since += float(time[-1] - time[0])
-    if len(late) > _MOST_UNORDERED * rows.size:
-        reason = "the time goes back and does not return. Are there two logs in one file?"
-        raise table.error(late[0], "time", reason)
     content.count("rows sorted", len(late))
     content.count("time stamps merged", merged)
     content.count("rows without time", int((~timed).sum()))
-    content.count("rows without command", int(timed.sum()) - rows.size)
+    content.count("rows before commands", int((columns["time"][rows] < columns["time"][told].min()).sum()))
+
+
+def _order(columns: Mapping[str, Array], rows: NDArray[np.intp]) -> tuple[list[int], NDArray[np.intp]]:
+    """Return the places in `rows` at which the clock restarts, and the rows that only are out of order.
+
+    Both show in the times at which a column has numbers. Tables of several sensors may stand one after the other in a
+    file: each begins with an earlier time than that at which the one before it ended.
+    """
+    time, late, is_restarted = columns["time"], [rows[:0]], False
+    there = {name: np.isfinite(values[rows]) for name, values in columns.items() if name != "time"}
+    for known in {mask.tobytes(): mask for mask in there.values()}.values():
+        own = rows[known]
+        places = restart_rows(time[own])
+        is_restarted |= bool(places)
+        late += [part[time[part] < np.maximum.accumulate(time[part])] for part in np.split(own, places) if len(part)]
+    return restart_rows(time[rows]) if is_restarted else [], np.unique(np.concatenate(late))
 
 
 def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> None:
     """Add what the cells tell: too many in a row, no numbers, and no pulses."""
     content.count("torn rows", table.torn)
     for name, rows in table.unread.items():
-        if name not in ("time", *commanding):
+        if name != "time":
             content.count("unread cells", len(rows), column=table.headers[name])
     for name in (name for name in commanding if table.units[name] in PULSES):
         count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
