@@ -90,10 +90,12 @@ def in_rows(series: Mapping[Name, tuple[Array, Array]]) -> tuple[Array, dict[Nam
 
     A series that begins more than a second after the first one is 0 until then.
     """
-    first = min(time[0] for time, _ in series.values())
-    late = {name for name, (time, _) in series.items() if time[0] > first + LATE}
+    begins = {name: float(time[0]) for name, (time, _) in series.items()}
+    late = min(begins.values()) + LATE
     clocks = {id(time): time for time, _ in series.values()}  # the columns of a table share one array of times
     rows = np.unique(np.concatenate([*clocks.values()]))
-    rows = rows[rows >= max(time[0] for name, (time, _) in series.items() if name not in late)]
+    rows = rows[rows >= max(begin for begin in begins.values() if begin <= late)]
     values = {name: held(time, numbers, rows) for name, (time, numbers) in series.items()}
-    return rows, {name: values[name] * (rows >= series[name][0][0]) if name in late else values[name] for name in values}
+    return rows, {
+        name: np.where(rows < begins[name], 0.0, own) if begins[name] > late else own for name, own in values.items()
+    }

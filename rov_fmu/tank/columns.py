@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
+    COMMANDS,
     FORCE_UNITS,
     NEUTRAL,
     PULSES,
@@ -24,7 +25,6 @@ from rov_fmu.io.csv_table import (
     DataFileError,
     KnownColumns,
     pulses,
-    shares,
 )
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
@@ -49,16 +49,16 @@ def seconds(text: str) -> float:
 COMMAND = "command"
 """The column with the command of an axis, or of all thrusters of a curve."""
 FRACTION = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
-HELD_COMMAND = replace(FRACTION, least=1e-4, conversions=dict.fromkeys(PULSES, pulses))
+HELD_COMMAND = replace(FRACTION, least=1e-4, conversions=COMMANDS)
 TIME = Column(TIMES, minimum=-1e10, maximum=1e10, parse=seconds)  # some loggers count from 1970
 
 
 def logged_command(keys: LogKeys = NO_KEYS) -> Column:
     """Return the column of a command in a log. A pulse in µs has the neutral and the span of the keys unless the header
     has others; a force in N needs the force of full thrust, as in [N 50]."""
-    usual = (keys.neutral or NEUTRAL, keys.span or SPAN)
-    conversions = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual)) | dict.fromkeys(("N", "N.m"), shares)
-    return replace(FRACTION, optional=True, conversions=conversions)
+    usual = (NEUTRAL if keys.neutral is None else keys.neutral, keys.span or SPAN)
+    of_keys = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual))
+    return replace(FRACTION, optional=True, conversions={**COMMANDS, **of_keys})
 
 
 def in_degrees(unit: str) -> tuple[float, str]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
+    COMMANDS,
     NEUTRAL,
     NO_OUTPUT,
     NUMBER,
@@ -31,7 +32,7 @@ from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, restart_rows
+from rov_fmu.tank.clocks import AGAIN, LATE, LEAST_AFTER, ascending, restart_rows
 from rov_fmu.tank.columns import (
     AXIS,
     COMMAND,
@@ -70,9 +71,11 @@ def rules_of_page() -> dict[str, Any]:
         "times": TIMES,
         "fractions": FRACTION.units,
         "pulses": {"units": PULSES, "neutral": NEUTRAL, "span": SPAN, "none": NO_OUTPUT},
+        "forces": [unit for unit in COMMANDS if unit not in PULSES],
         "renamed": WELL_KNOWN,
         "slips": SLIPS,
         "mostUnordered": _MOST_UNORDERED,
+        "late": LATE,
         "leastAfter": LEAST_AFTER,
         "again": AGAIN,
         "leastSamples": LEAST_SAMPLES,
@@ -118,7 +121,7 @@ def read_table(
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
     content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
-    _tell_cells(content, table, commanding)
+    _tell_cells(content, table, commanding, names.keys.neutral)
     _tell_headers(content, table, known)
     if unlikely:
         content.findings.append(unlikely)
@@ -247,15 +250,19 @@ def _order(columns: Mapping[str, Array], rows: NDArray[np.intp]) -> tuple[list[i
     return restart_rows(time[rows]) if is_restarted else [], np.unique(np.concatenate(late))
 
 
-def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> None:
-    """Add what the cells tell: too many in a row, no numbers, and no pulses."""
+def _tell_cells(content: Content, table: Columns, commanding: Sequence[str], neutral: float | None) -> None:
+    """Add what the cells tell: too many in a row, no numbers, and no pulses. `neutral` is that of rov.toml, µs."""
     content.count("torn rows", table.torn)
     for name, rows in table.unread.items():
         if name != "time":
             content.count("unread cells", len(rows), column=table.headers[name])
-    for name in (name for name in commanding if table.units[name] in PULSES):
-        count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
-        content.count("no pulse", count, column=table.headers[name])
+    for name in commanding:
+        unit, *numbers = table.units[name].split()
+        if unit in PULSES:
+            none = {*NO_OUTPUT} - {float(numbers[0]) if numbers else neutral}
+            texts = zip(table.texts(name), table.values[name], strict=True)
+            count = sum(bool(text) and command == 0.0 and float(text) in none for (text,), command in texts)
+            content.count("no pulse", count, column=table.headers[name])
 
 
 def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:
