@@ -157,6 +157,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "unknown direction",
             "unknown velocity",
             "late command",
+            "at rest",
             "depth by pressure",
         }
     ),

@@ -126,6 +126,8 @@ class Entry:
     """None for a command."""
     convert: Conversion | None = None
     """The conversion of the numbers; None where they have the unit of the column already."""
+    is_pulse: bool = False
+    """True for a pulse, µs, whose neutral nobody states."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,8 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
                 mistakes.append(key_line(f"{table}.{source}", str(error), title))
                 continue
             if found and table == "topics" and (entry := of_logs[found.name].entry):
-                entries[source] = replace(entry, convert=found.convert)
+                is_pulse = found.unit in PULSES and not found.numbers and tables.logs.neutral is None
+                entries[source] = replace(entry, convert=found.convert, is_pulse=is_pulse)
     return Names({**WELL_KNOWN, **tables.columns}, entries, tables.logs), mistakes
 
 

@@ -144,6 +144,14 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
     ),
     "range of pulses": "{files}: full thrust is {low} and {high} us, and no thrust {neutral} us",
+    "at rest": (
+        "{files}: no thrust is {rest} us, because the outputs rest there and never at 1500 us. If that is wrong, write "
+        "neutral = 1500 into [logs] of rov.toml"
+    ),
+    "perhaps at rest": (
+        "{files}: no output ever rests at 1500 us, which is taken as no thrust, and most stay at {rest} us. If that is "
+        "no thrust, write neutral = {key} into [logs] of rov.toml"
+    ),
     "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "time of arrival": (

@@ -11,6 +11,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import BodyForce, Layout
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import LATE, in_rows
 from rov_fmu.tank.columns import (
@@ -23,7 +24,7 @@ from rov_fmu.tank.columns import (
     is_of_inputs,
     thruster_commands,
 )
-from rov_fmu.tank.commands import LogKeys, Series, commands_of, wrench_of
+from rov_fmu.tank.commands import LogKeys, Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.content import Content, Piece, described
@@ -64,7 +65,9 @@ def _log(
     """Return the log of a piece: what `entries` say of its fields, and what is recognised besides."""
     is_first = piece is content.pieces[0]
     file = path.name if is_first else f"{path.name} (from {piece.since:.4g} s)"
-    named, told, labels = _meant(piece, entries)
+    fields = {field: values for topic in piece.topics for field, values in topic.full_fields() if field in entries}
+    rests, at_neutral = at_rest(file, {field: values for field, values in fields.items() if entries[field].is_pulse})
+    named, told, labels = _meant(piece, entries, rests)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
     if layout.has_wrench:
@@ -74,7 +77,12 @@ def _log(
         commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
     source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
-    findings = [*content.findings * is_first, *commanded.findings, *_findings(file, layout, series, labels)]
+    findings = [
+        *content.findings * is_first,
+        *at_neutral,
+        *commanded.findings,
+        *_findings(file, layout, series, labels),
+    ]
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
     used = {channel.source.topic for channel in channels} | {source.topic}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}
@@ -96,14 +104,21 @@ def _log(
     )
 
 
-def _meant(piece: Piece, entries: Mapping[str, Entry]) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
-    """Return the channels and the commands that `entries` say that fields are, and the fields of the commands."""
+def _meant(
+    piece: Piece, entries: Mapping[str, Entry], rests: Mapping[str, float]
+) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
+    """Return the channels and the commands that `entries` say that fields are, and the fields of the commands.
+
+    `rests` has the pulses of no thrust by field, µs, where they are not the usual one.
+    """
     channels: list[Channel] = []
     commands: dict[str, Series] = {}
     labels: dict[str, str] = {}
     for topic in piece.topics:
         for field, values in topic.full_fields():
             if entry := entries.get(field):
+                if field in rests:
+                    values = np.where(np.isin(values, NO_OUTPUT), values, values - rests[field] + NEUTRAL)
                 converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
                 told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
                 if entry.quantity:

@@ -7,6 +7,7 @@ that cannot be used are left out and counted.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -49,6 +50,7 @@ from rov_fmu.tank.columns import (
     known_columns,
     refuse_slips,
 )
+from rov_fmu.tank.commands import at_rest
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
@@ -115,13 +117,25 @@ def read_table(
     )
     commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
+    pulses = _pulses(table, commanding)
+    unstated = [name for name in pulses if table.units[name] in PULSES] if names.keys.neutral is None else []
+    rests, told = at_rest(path.name, {name: pulses[name] for name in unstated})
+    if rests:
+        stated = {table.headers[name]: f"[us {rest:g} {names.keys.span or SPAN:g}]" for name, rest in rests.items()}
+        titles = {title: names.columns.get(title, title) for title in table.header}
+        renamed = {title: meant.partition("[")[0] + stated[meant] for title, meant in titles.items() if meant in stated}
+        names = replace(names, columns={**names.columns, **renamed})
+        content, entries = read_table(path, layout, axis, names, open_stream, is_part=is_part)
+        content.findings += told
+        return content, entries
     values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
     content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
-    _tell_cells(content, table, commanding, names.keys.neutral)
+    _tell_cells(content, table, pulses, names.keys.neutral)
+    content.findings += told
     _tell_headers(content, table, known)
     if unlikely:
         content.findings.append(unlikely)
@@ -250,19 +264,26 @@ def _order(columns: Mapping[str, Array], rows: NDArray[np.intp]) -> tuple[list[i
     return restart_rows(time[rows]) if is_restarted else [], np.unique(np.concatenate(late))
 
 
-def _tell_cells(content: Content, table: Columns, commanding: Sequence[str], neutral: float | None) -> None:
+def _tell_cells(content: Content, table: Columns, pulses: Mapping[str, Array], neutral: float | None) -> None:
     """Add what the cells tell: too many in a row, no numbers, and no pulses. `neutral` is that of rov.toml, µs."""
     content.count("torn rows", table.torn)
     for name, rows in table.unread.items():
         if name != "time":
             content.count("unread cells", len(rows), column=table.headers[name])
-    for name in commanding:
-        unit, *numbers = table.units[name].split()
-        if unit in PULSES:
-            none = {*NO_OUTPUT} - {float(numbers[0]) if numbers else neutral}
-            texts = zip(table.texts(name), table.values[name], strict=True)
-            count = sum(bool(text) and command == 0.0 and float(text) in none for (text,), command in texts)
-            content.count("no pulse", count, column=table.headers[name])
+    for name, values in pulses.items():
+        is_none = np.isin(values, NO_OUTPUT) & (np.frombuffer(table.values[name]) == 0.0)
+        _, *numbers = table.units[name].split()
+        is_none &= values != (float(numbers[0]) if numbers else neutral)
+        content.count("no pulse", int(is_none.sum()), column=table.headers[name])
+
+
+def _pulses(table: Columns, commanding: Sequence[str]) -> dict[str, Array]:
+    """Return the pulses of each column that has pulses, as they stand in the file, µs; NaN for blank cells."""
+    names = [name for name in commanding if table.units[name].split()[0] in PULSES]
+    rows = np.fromiter(
+        (float(text or "nan") for texts in (table.texts(*names) if names else ()) for text in texts), float
+    )
+    return dict(zip(names, rows.reshape(-1, max(len(names), 1)).T, strict=False))
 
 
 def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:
