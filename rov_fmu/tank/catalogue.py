@@ -90,6 +90,14 @@ QUANTITIES = {quantity.name: quantity for quantity in _quantities()}
 
 POSITION, EULER, QUATERNION, VELOCITY, RATES = "position", "euler", "quaternion", "velocity", "rates"
 """Vectors: a position; roll, pitch and heading; these as a quaternion w, x, y, z; a linear and an angular velocity."""
+VECTORS = {
+    POSITION: ("depth", "distance"),
+    EULER: ("roll angle", "pitch angle", "heading"),
+    QUATERNION: ("roll angle", "pitch angle", "heading"),
+    VELOCITY: ("surge velocity", "sway velocity", "heave velocity"),
+    RATES: ("roll velocity", "pitch velocity", "yaw velocity"),
+}
+"""The quantities that follow from the vectors."""
 NED, FRD, BY_HEADER = "ned", "frd", ""
 """Frames: north-east-down of the earth; forward, starboard and down of the body; the one that the header of the message
 names, which is of REP 103 unless its name says otherwise."""
@@ -265,6 +273,17 @@ def is_known(kind: str) -> bool:
     kinds = [message.kind for message in (*MESSAGES, *WRENCHES)] + [output.kind for output in OUTPUTS]
     return any(re.fullmatch(pattern, kind) for pattern in kinds)
 
+
+FLAGS = (
+    (r"\b(dvl|velocity|velocities|vel|speed|twist|bottom|lock)\b", VECTORS[VELOCITY]),
+    (r"\b(depth|pressure|baro|barometer)\b", ("depth", "pressure")),
+    (r"\b(heading|compass|magnetometer|yaw)\b", ("heading",)),
+    (r"\b(attitude|ahrs|orientation|imu)\b", VECTORS[EULER]),
+    (r"\b(gyro|rate|rates|imu)\b", VECTORS[RATES]),
+    (r"\b(position|pos|usbl|gps)\b", ("distance", "surge distance", "sway distance")),
+    (r"\b(voltage|battery)\b", ("voltage",)),
+)
+"""The words in names of flags of validity, as regular expressions, and the quantities whose flags these are."""
 
 # ---- Headers ---------------------------------------------------------------------------------------------------------
 

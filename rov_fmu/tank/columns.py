@@ -4,7 +4,7 @@ Numbers are converted to SI units, and commands to fractions of the full command
 so a number outside is a mistake; without bounds, fits could overflow.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 
@@ -188,12 +188,14 @@ _OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kin
 
 @dataclass(frozen=True)
 class Names:
-    """The tables [columns], [topics] and [logs] of rov.toml."""
+    """The tables [columns], [topics], [valid] and [logs] of rov.toml."""
 
     columns: Mapping[str, str] = field(default_factory=lambda: WELL_KNOWN)
     """Headers, by the headers of the CSV files."""
     topics: Mapping[str, Entry] = field(default_factory=dict)
     """Meanings by topic and field: `/bar30/depth.data`."""
+    valid: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """The quantities of which a column or a field is a flag."""
     keys: LogKeys = NO_KEYS
     """What the logs do not tell."""
 
@@ -219,7 +221,7 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
             if found and table == "topics" and (entry := of_logs[found.name].entry):
                 is_pulse = found.unit in PULSES and not found.numbers and tables.logs.neutral is None
                 entries[source] = replace(entry, convert=found.convert, is_pulse=is_pulse)
-    return Names({**WELL_KNOWN, **tables.columns}, entries, tables.logs), mistakes
+    return Names({**WELL_KNOWN, **tables.columns}, entries, tables.valid, tables.logs), mistakes
 
 
 def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:

@@ -115,6 +115,8 @@ class _Outputs:
     """The source, or the first one where each thruster has its own."""
     series: Mapping[int, Series]
     """Times (s) and numbers by the number of the output, from 1."""
+    topics: Collection[str]
+    """The names of the topics with these outputs."""
 
     @property
     def used(self) -> list[int]:
@@ -144,6 +146,8 @@ class Commanded:
     sender: Source | None = None
     other_vehicles: Collection[str] = ()
     """The other vehicles that have commands."""
+    topics: Collection[str] = ()
+    """The names of all topics that have commands, also of those that are not used."""
     findings: Sequence[Finding] = ()
 
 
@@ -167,7 +171,8 @@ def commands_of(
     vehicles = {outputs.source.vehicle for outputs in candidates}
     findings = [*_choice(path, best, own, sorted(vehicles))]
     series, meanings = _fractions(path, best, dict(zip(names, numbers, strict=True)), parameters, keys)
-    return Commanded(series, best.source, vehicles - {vehicle}, [*findings, *meanings])
+    known = {topic for outputs in candidates for topic in outputs.topics}
+    return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings])
 
 
 def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], keys: LogKeys) -> Commanded:
@@ -194,9 +199,8 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     best = max(chosen, key=lambda source: sum(spread(values) for _, values in chosen[source].values()))
     others = [source.topic for source in chosen if source is not best]
     left = f"; not used: {listed(others)}" if others else ""
-    return Commanded(
-        chosen[best], best, findings=[about(path.name, "source of wrench", source=best.topic, others=left)]
-    )
+    findings = [about(path.name, "source of wrench", source=best.topic, others=left)]
+    return Commanded(chosen[best], best, topics={source.topic for source in found}, findings=findings)
 
 
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
@@ -215,10 +219,11 @@ def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Seque
 def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
     """Yield all outputs that may be those of the thrusters, in the order of the catalogue's preference.
 
-    The number of an output is that of its field, or that of the topic where each thruster of a vehicle has its own.
+    The number of an output is that of its field, or that of the topic where each thruster has its own, and the names of
+    these topics differ only in it.
     """
     for rule in OUTPUTS:
-        found: dict[str | Topic, dict[int, tuple[Topic, Array]]] = {}
+        found: dict[tuple[str, str] | Topic, dict[int, tuple[Topic, Array]]] = {}
         for topic in topics:
             name, kind = topic.source.topic, topic.source.kind
             match = re.search(rule.topic, name)
@@ -226,12 +231,13 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
                 continue
             for place, values in topic.fields.items():
                 if of_field := re.fullmatch(rule.field, place):
-                    key, numbered = (topic.source.vehicle, match) if match.groups() else (topic, of_field)
-                    found.setdefault(key, {})[int(numbered[1])] = topic, values
+                    alike = match.groups() and (name[: match.start(1)], name[match.end(1) :])
+                    number = int((match if alike else of_field)[1])
+                    found.setdefault(alike or topic, {})[number] = topic, values
         for by_number in found.values():
             ordered = [by_number[n] for n in sorted(by_number)]
             series = {n: (topic.time, values) for n, (topic, values) in enumerate(ordered, start=1)}
-            yield _Outputs(rule, ordered[0][0].source, series)
+            yield _Outputs(rule, ordered[0][0].source, series, {topic.source.topic for topic, _ in ordered})
 
 
 def _named(

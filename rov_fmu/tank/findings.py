@@ -102,6 +102,11 @@ SENTENCES: dict[str, SentenceForm] = {
     "torn rows": "{files}: {count:#row} with more cells than the header left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "column without unit": "{files}: {column} is not read, because its header has no unit. Write for example {header}",
+    "mark": (
+        "{files}: {count:#value} of {columns} left out, because {what} is far from all others: a mark that nothing was "
+        "measured"
+    ),
+    "invalid": "{files}: {count:#value} of {columns} left out, because {what} says that they are invalid",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
     "beyond full thrust": "{files}: {count:#command} of {column} beyond full thrust taken as full thrust",
     "missing column": (
@@ -169,7 +174,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "several vehicles": (
-        "{files}: the log has the vehicles {vehicles}. {vehicle} is used; [logs] of rov.toml can name another"
+        "{files}: the log has the vehicles {vehicles}. {vehicle} is used; `vehicle` in [logs] of rov.toml names another"
     ),
     "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
     "reversed motors": "{files}: parameters of the autopilot reverse the thrusters {thrusters}",

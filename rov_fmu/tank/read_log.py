@@ -24,9 +24,10 @@ from rov_fmu.tank.columns import (
     is_of_inputs,
     thruster_commands,
 )
-from rov_fmu.tank.commands import LogKeys, Series, at_rest, commands_of, wrench_of
+from rov_fmu.tank.commands import Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
+from rov_fmu.tank.no_measurement import measured_only
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
 from rov_fmu.tank.readers.tables import read_table
@@ -48,9 +49,9 @@ def read_logs(
     if kind.open:
         content, entries = read_table(path, layout, axis, names, kind.open(path), is_part=is_part)
     else:
-        content = read_parsed(path, kind, {name.partition(".")[0] for name in entries})
+        content = read_parsed(path, kind, {name.partition(".")[0] for name in (*entries, *names.valid)})
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
-    return [_log(path, content, piece, layout, entries, names.keys, axis) for piece in content.pieces]
+    return [_log(path, content, piece, layout, entries, names, axis) for piece in content.pieces]
 
 
 def _log(
@@ -59,12 +60,14 @@ def _log(
     piece: Piece,
     layout: Layout,
     entries: Mapping[str, Entry],
-    keys: LogKeys,
+    names: Names,
     axis: Axis | None,
 ) -> Log:
     """Return the log of a piece: what `entries` say of its fields, and what is recognised besides."""
-    is_first = piece is content.pieces[0]
+    is_first, keys = piece is content.pieces[0], names.keys
     file = path.name if is_first else f"{path.name} (from {piece.since:.4g} s)"
+    topics, not_measured = measured_only(file, piece.topics, entries, names.valid)
+    piece = replace(piece, topics=topics)
     fields = {field: values for topic in piece.topics for field, values in topic.full_fields() if field in entries}
     rests, at_neutral = at_rest(file, {field: values for field, values in fields.items() if entries[field].is_pulse})
     named, told, labels = _meant(piece, entries, rests)
@@ -79,12 +82,13 @@ def _log(
     series = told or commanded.series
     findings = [
         *content.findings * is_first,
+        *not_measured,
         *at_neutral,
         *commanded.findings,
         *_findings(file, layout, series, labels),
     ]
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
-    used = {channel.source.topic for channel in channels} | {source.topic}
+    used = {channel.source.topic for channel in channels} | {*commanded.topics}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}
     commands = None
     if series:
@@ -117,9 +121,9 @@ def _meant(
     for topic in piece.topics:
         for field, values in topic.full_fields():
             if entry := entries.get(field):
-                if field in rests:
-                    values = np.where(np.isin(values, NO_OUTPUT), values, values - rests[field] + NEUTRAL)
-                converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
+                moved = rests.get(field, NEUTRAL) - NEUTRAL
+                numbers = np.where(np.isin(values, NO_OUTPUT), values, values - moved) if moved else values
+                converted = np.array([*map(entry.convert, numbers.tolist())]) if entry.convert else values
                 told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
                 if entry.quantity:
                     source = replace(topic.source, topic=field)

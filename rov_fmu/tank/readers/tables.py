@@ -28,6 +28,7 @@ from rov_fmu.io.csv_table import (
     Columns,
     DataFileError,
     read_columns,
+    read_header,
 )
 from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
@@ -53,6 +54,7 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.commands import at_rest
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
+from rov_fmu.tank.no_measurement import FLAG, flag_columns
 from rov_fmu.tank.readers.content import Content, Piece
 
 _MOST_UNORDERED = 0.2
@@ -104,17 +106,20 @@ def read_table(
     `open_stream` opens its lines. A part of a dive may have only commands or only motion.
     """
     known = columns_of_log(layout, axis, names.keys)
+    flags = flag_columns(read_header(path, open_stream), known, names)
+    known |= dict.fromkeys(flags, LogColumn(FLAG))
     check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
         path,
         known_columns(known),
         others=True,
         loose=True,
-        renamed=names.columns,
+        renamed={**names.columns, **{title: f"{name} [1]" for name, title in flags.items()}},
         hint=RENAMING,
         check_header=check,
         open_stream=open_stream,
     )
+    table = replace(table, headers={**table.headers, **flags})
     commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
     pulses = _pulses(table, commanding)
