@@ -231,7 +231,19 @@ NOT_MEASURED = {
 """Words in names of topics of what is wanted and not measured, or not measured of the vehicle."""
 NOT_COMMANDED = {
     *("current", "currents", "temperature", "temp", "rpm", "speed", "duty", "voltage", "power", "status", "state"),
-    *("feedback", "telemetry", "fault", "enabled", "force", "forces", "newton", "newtons", "torque", "wrench"),
+    *(
+        "feedback",
+        "telemetry",
+        "fault",
+        "enabled",
+        "force",
+        "forces",
+        "newton",
+        "newtons",
+        "torque",
+        "wrench",
+        "thrust",
+    ),
     *("battery", "humidity", "rate", "load", "error", "mode", "id", "armed", "cpu", "gain", "light", "lights"),
     *("stick", "joystick"),
 }
@@ -287,7 +299,8 @@ FLAGS = (
 
 # ---- Headers ---------------------------------------------------------------------------------------------------------
 
-COMMANDS = r"\b(thr|thrust(ers?)?|motors?|propellers?|pwm|esc|(servo|cmd|command|u) \d+)\b|^u \w+$"
+THRUSTER = r"\b(thr|thrusters?|motors?|propellers?|pwm|esc)\b"
+COMMANDS = rf"{THRUSTER}|\b(servo|cmd|command|out|outputs?|u) \d+\b|^u \w+$"
 """A regular expression that occurs among the words of an unknown header of a CSV file that is a command."""
 HEADERS = (
     ("time", "time|t|timestamp"),

@@ -54,8 +54,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         VEHICLES,
         "a",
         "",
-        "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; [logs] of rov.toml can "
-        "name another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
+        "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; `vehicle` in "
+        "[logs] of rov.toml names another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
     ),
     "a named vehicle": (VEHICLES, "a", "vehicle=rov_b", "/rov_b/cmd: a 0 -1: | rov_b is used"),
     "an unknown vehicle": (
