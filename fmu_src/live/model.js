@@ -26,8 +26,9 @@
  * slip and what is wrong then; the largest share of rows out of order; what shows that a clock began anew; the samples that a preferred
  * quantity has at least; and the pressures, in Pa, by which a barometer inside the hull and another unit are recognised.
  * @typedef {{number: string, times: Record<string, number>, fractions: Record<string, number>,
- *   pulses: {units: string[], neutral: number, span: number, none: number[]}, renamed: Record<string, string>,
- *   slips: [string[], number, string][], mostUnordered: number, leastAfter: number, again: number, leastSamples: number,
+ *   pulses: {units: string[], neutral: number, span: number, none: number[]}, forces: string[],
+ *   renamed: Record<string, string>,
+ *   slips: [string[], number, string][], mostUnordered: number, late: number, leastAfter: number, again: number, leastSamples: number,
  *   pressures: {atmosphere: number, gradient: number, hull: [number, number], least: number}}} Rules
  */
 /**

@@ -62,17 +62,18 @@ function readRecording(text, name, vehicle) {
     .map((cells) =>
       columns.map((column, n) => (column ? inUnits(column, number(cells[n] ?? ""), cells[n]) : Number.NaN)),
     )
-    .filter((row) => Number.isFinite(row[time]) && commanding.every(({ place }) => Number.isFinite(row[place])));
-  if (usable.length < 2) throw new Unreadable("no two of its rows have a time and a command");
-  const { starts, back } = restarts(
-    usable.map((row) => row[time]),
-    rules,
-  );
-  if (back > rules.mostUnordered * usable.length) {
+    .filter((row) => Number.isFinite(row[time]));
+  const timed = usable.filter((row) => commanding.some(({ place }) => Number.isFinite(row[place])));
+  if (timed.length < 2) throw new Unreadable("no two of its rows have a time and a command");
+  const places = columns.flatMap((column, n) => (column && n !== time ? [n] : []));
+  const clocks = places.map((n) => restarts(timesOf(usable, time, n), rules));
+  if (Math.max(...clocks.map(({ back }) => back)) > rules.mostUnordered * usable.length) {
     throw new Unreadable("its time goes back, and stays back, as with two logs in one file");
   }
-  const rows = usable.slice(0, starts[1]);
-  rows.sort((one, other) => one[time] - other[time]);
+  const isRestarted = clocks.some(({ starts }) => starts.length > 1);
+  const end = isRestarted ? restarts(timesOf(usable, time, time), rules).starts[1] : usable.length;
+  const ordered = usable.slice(0, end).sort((one, other) => one[time] - other[time]);
+  const rows = whileCommanded(ordered, time, commanding, rules);
   const start = rows[0][time];
   if (rows[rows.length - 1][time] - start > 1e5) throw new Unreadable("it lasts longer than a day");
   if (commanding.some(({ kind }) => kind !== commanding[0].kind)) {
@@ -106,6 +107,28 @@ function readRecording(text, name, vehicle) {
 }
 
 /** @typedef {CommandColumn & {place: number}} Commanding A column of commands, and its place in a row. */
+
+/** Returns the times of the rows that have a number in a column. @param {number[][]} rows @param {number} time @param {number} place */
+function timesOf(rows, time, place) {
+  return rows.filter((row) => Number.isFinite(row[place])).map((row) => row[time]);
+}
+
+/** Returns the rows from the first commands on, each with the commands that hold there. A command that begins late is 0 until then, as in
+ * `in_rows` of rov_fmu/tank/clocks.py. @param {number[][]} rows @param {number} time @param {Commanding[]} commanding @param {Rules} rules */
+function whileCommanded(rows, time, commanding, { late }) {
+  const firsts = commanding.map(({ place }) => timesOf(rows, time, place)[0] ?? Number.POSITIVE_INFINITY);
+  const first = Math.min(...firsts);
+  const start = Math.max(...firsts.filter((one) => one <= first + late));
+  const held = commanding.map(() => 0);
+  return rows.flatMap((row) => {
+    const full = [...row];
+    for (const [n, { place }] of commanding.entries()) {
+      if (Number.isFinite(row[place])) held[n] = row[place];
+      full[place] = held[n];
+    }
+    return row[time] < start ? [] : [full];
+  });
+}
 
 /** Returns the commands of the vehicle by which a row's commands are given best. @param {Commanding[]} commanding @param {number[]} row
  * @param {Vehicle} vehicle @returns {Record<string, number>} */
@@ -255,7 +278,7 @@ function columnOf(header, file, vehicle) {
   const parts = /^(.*?)\s*\[(.*)\]$/.exec(plain);
   if (!parts) return null;
   const [title, unit] = [parts[1].trim().toLowerCase().replace(/\s+/g, " "), folded(parts[2].trim())];
-  const none = { unit: unit.split(/\s/)[0], isTime: false, command: null, quantity: null, axis: -1, rank: 0 };
+  const none = { unit, isTime: false, command: null, quantity: null, axis: -1, rank: 0 };
   if (title === "time") {
     const convert = converter(header, vehicle.csv.times, unit, false);
     return convert && { ...none, isTime: true, convert };
@@ -308,12 +331,17 @@ function converter(header, units, unit, isShort) {
 
 /** Returns the conversion from the pulse of a speed controller, or from a force with its full command, or null for another unit.
  * @param {string} unit @param {Rules} rules */
-function special(unit, { pulses }) {
+function special(unit, { pulses, forces }) {
   const [word, ...numbers] = unit.split(/\s+/);
   const [first, second] = numbers.length ? numbers.map(Number) : [pulses.neutral, pulses.span];
-  if (["n", "n.m"].includes(word) && numbers.length === 1 && first > 0) return (/** @type {number} */ x) => x / first;
-  if (!pulses.units.map(folded).includes(word) || !(first > 0) || !second) return null;
-  return (/** @type {number} */ x) => (pulses.none.includes(x) ? 0 : (x - first) / second);
+  if (forces.map(folded).includes(word) && numbers.length === 1 && first > 0) {
+    return (/** @type {number} */ x) => x / first;
+  }
+  if (!pulses.units.map(folded).includes(word) || !Number.isFinite(first) || !second) return null;
+  return (/** @type {number} */ x) => {
+    const command = (x - first) / second;
+    return pulses.none.includes(x) && Math.abs(command) >= 1 ? 0 : command;
+  };
 }
 
 /** @param {number} command */

@@ -156,6 +156,8 @@ _READ: dict[Heading, frozenset[str]] = {
             "aligned clock",
             "unknown direction",
             "unknown velocity",
+            "late command",
+            "at rest",
             "depth by pressure",
         }
     ),
@@ -166,7 +168,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "rows sorted",
             "time stamps merged",
             "rows without time",
-            "rows without command",
+            "rows before commands",
             "torn rows",
             "unread cells",
             "no pulse",

@@ -19,7 +19,7 @@ from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from rov_fmu.tank.folder import PATTERNS, unreadable
-from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
+from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -92,19 +92,13 @@ def _thrusters(
 
     Without such a vehicle, its name is empty.
     """
-    most = max(inspections, key=lambda one: (len(one.commands), _changing(one)))
-    thrusters = [row.name.removeprefix("thruster ") for row in most.commands]
-    if not fitting(thrusters, layouts.values()) and _is_bag(most.path):
-        thrusters = thrusters[: _changing(most)]
+    most = max(inspections, key=lambda one: (len(one.commands), sum(row.low < row.high for row in one.commands)))
+    ends = {row.name.removeprefix("thruster "): (row.low, row.high) for row in most.commands}
+    thrusters = likely_thrusters(ends, layouts.values()) if _is_bag(most.path) else [*ends]
     fits = fitting(thrusters, layouts.values())
     if fits and not {*curves} <= {curve.name for curve in fits.curves}:
         fits = None
     return thrusters, next((name for name, layout in layouts.items() if layout == fits), "")
-
-
-def _changing(inspection: Inspection) -> int:
-    """Return the number of commands up to the last one that changes; more of them may be lights or servos."""
-    return max((n for n, row in enumerate(inspection.commands, start=1) if row.low < row.high), default=0)
 
 
 def write_draft(path: Path, text: str) -> None:

@@ -80,7 +80,7 @@ class Columns:
     headers: Mapping[str, str]
     """The headers of the columns that are read, as the file has them or as they are renamed."""
     units: Mapping[str, str]
-    """The units of the file by column, without numbers that may follow a unit."""
+    """The units of the file by column, with the numbers that follow a unit."""
     values: Mapping[str, "array[float]"]
     """The numbers by column."""
     lines: "array[int]"
@@ -115,6 +115,8 @@ class FileColumn:
     """The conversion of a number to the first unit."""
     factor: float
     """How many of this unit make one of the first unit; 1 if a factor is not enough. Negative with a minus sign."""
+    numbers: tuple[str, ...] = ()
+    """The numbers that follow the unit."""
 
 
 def read_columns(
@@ -172,7 +174,7 @@ def read_columns(
         path,
         titles,
         headers,
-        {column.name: column.unit for column in file_columns.values()},
+        {column.name: " ".join([column.unit, *column.numbers]) for column in file_columns.values()},
         values,
         row_lines,
         unread,
@@ -478,7 +480,7 @@ class KnownColumns:
                 convert, factor = _conversion(unit, numbers, column)
                 if title.startswith("-"):
                     convert, factor = partial(_opposite, convert), -factor
-                return FileColumn(key, column, unit, convert, factor)
+                return FileColumn(key, column, unit, convert, factor, tuple(numbers))
         if key := next((key for key in keys if _folded(key) == name), ""):
             raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(self._columns[key]))}")
         if others:
@@ -559,16 +561,19 @@ PULSES = ("us", "µs")
 def pulses(numbers: tuple[float, ...] = ()) -> Conversion:
     """Return the conversion of a pulse (µs) to a command that is not yet saturated. Raises ValueError.
 
-    The numbers are neutral and span. The span is negative for a thruster that turns in the opposite direction.
+    The numbers are neutral and span. Neutral is 0 where pulses are given relative to it. The span is negative for a
+    thruster that turns in the opposite direction.
     """
     neutral, span = numbers if len(numbers) == 2 else (NEUTRAL, 0.0 if numbers else SPAN)
-    if span == 0.0 or neutral <= 0.0:
-        raise ValueError("must be [us], or [us NEUTRAL SPAN] such as [us 1500 400]")
+    if span == 0.0:
+        raise ValueError("must be [us], or [us NEUTRAL SPAN] with a span other than 0, such as [us 1500 400]")
     return partial(_command, neutral, span)
 
 
 def _command(neutral: float, span: float, pulse: float) -> float:
-    return 0.0 if pulse in NO_OUTPUT else (pulse - neutral) / span
+    """Return a command. A pulse within the span is one, even if it has a value of `NO_OUTPUT`."""
+    command = (pulse - neutral) / span
+    return 0.0 if pulse in NO_OUTPUT and abs(command) >= 1.0 else command
 
 
 # ---- Forces as commands ----------------------------------------------------------------------------------------------
@@ -580,3 +585,9 @@ def shares(numbers: tuple[float, ...] = ()) -> Conversion:
     if len(numbers) != 1 or numbers[0] <= 0.0:
         raise ValueError("must be a unit of force with the force at full command, such as [N 50]")
     return partial(_divided, numbers[0])
+
+
+COMMANDS = dict.fromkeys(PULSES, pulses) | dict.fromkeys((*FORCE_UNITS, "N.m"), shares)
+"""The units of commands that need more than a factor."""
+BEYOND = "is beyond full thrust; [us NEUTRAL SPAN] states another range of pulses, such as [us 0 400] for offsets"
+"""The reason against such a command in a table."""

@@ -90,6 +90,14 @@ QUANTITIES = {quantity.name: quantity for quantity in _quantities()}
 
 POSITION, EULER, QUATERNION, VELOCITY, RATES = "position", "euler", "quaternion", "velocity", "rates"
 """Vectors: a position; roll, pitch and heading; these as a quaternion w, x, y, z; a linear and an angular velocity."""
+VECTORS = {
+    POSITION: ("depth", "distance"),
+    EULER: ("roll angle", "pitch angle", "heading"),
+    QUATERNION: ("roll angle", "pitch angle", "heading"),
+    VELOCITY: ("surge velocity", "sway velocity", "heave velocity"),
+    RATES: ("roll velocity", "pitch velocity", "yaw velocity"),
+}
+"""The quantities that follow from the vectors."""
 NED, FRD, BY_HEADER = "ned", "frd", ""
 """Frames: north-east-down of the earth; forward, starboard and down of the body; the one that the header of the message
 names, which is of REP 103 unless its name says otherwise."""
@@ -223,7 +231,19 @@ NOT_MEASURED = {
 """Words in names of topics of what is wanted and not measured, or not measured of the vehicle."""
 NOT_COMMANDED = {
     *("current", "currents", "temperature", "temp", "rpm", "speed", "duty", "voltage", "power", "status", "state"),
-    *("feedback", "telemetry", "fault", "enabled", "force", "forces", "newton", "newtons", "torque", "wrench"),
+    *(
+        "feedback",
+        "telemetry",
+        "fault",
+        "enabled",
+        "force",
+        "forces",
+        "newton",
+        "newtons",
+        "torque",
+        "wrench",
+        "thrust",
+    ),
     *("battery", "humidity", "rate", "load", "error", "mode", "id", "armed", "cpu", "gain", "light", "lights"),
     *("stick", "joystick"),
 }
@@ -266,9 +286,21 @@ def is_known(kind: str) -> bool:
     return any(re.fullmatch(pattern, kind) for pattern in kinds)
 
 
+FLAGS = (
+    (r"\b(dvl|velocity|velocities|vel|speed|twist|bottom|lock)\b", VECTORS[VELOCITY]),
+    (r"\b(depth|pressure|baro|barometer)\b", ("depth", "pressure")),
+    (r"\b(heading|compass|magnetometer|yaw)\b", ("heading",)),
+    (r"\b(attitude|ahrs|orientation|imu)\b", VECTORS[EULER]),
+    (r"\b(gyro|rate|rates|imu)\b", VECTORS[RATES]),
+    (r"\b(position|pos|usbl|gps)\b", ("distance", "surge distance", "sway distance")),
+    (r"\b(voltage|battery)\b", ("voltage",)),
+)
+"""The words in names of flags of validity, as regular expressions, and the quantities whose flags these are."""
+
 # ---- Headers ---------------------------------------------------------------------------------------------------------
 
-COMMANDS = r"\b(thr|thrust(ers?)?|motors?|propellers?|pwm|esc|(servo|cmd|command|u) \d+)\b|^u \w+$"
+THRUSTER = r"\b(thr|thrusters?|motors?|propellers?|pwm|esc)\b"
+COMMANDS = rf"{THRUSTER}|\b(servo|cmd|command|out|outputs?|u) \d+\b|^u \w+$"
 """A regular expression that occurs among the words of an unknown header of a CSV file that is a command."""
 HEADERS = (
     ("time", "time|t|timestamp"),

@@ -82,7 +82,11 @@ class Topic:
 
     def full_fields(self) -> Iterator[tuple[str, Array]]:
         """Yield the fields with the name of the topic, as rov.toml names them."""
-        return ((f"{self.source.topic}.{field}".removeprefix("."), values) for field, values in self.fields.items())
+        return ((self.full_name(field), values) for field, values in self.fields.items())
+
+    def full_name(self, field: str) -> str:
+        """Return the name of a field with that of the topic, as rov.toml names it."""
+        return f"{self.source.topic}.{field}".removeprefix(".")
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,10 @@ _OTHER_CLOCK = 1.0
 """If the times of messages and of their arrival differ by more than this, they come from different clocks, s."""
 
 
+LATE = 1.0
+"""A command begins late if its first value comes later after that of another one, s."""
+
+
 def restarts(stamps: Iterable[Array]) -> list[float]:
     """Return the arrival times from which clocks restart, s, ascending.
 
@@ -82,8 +86,16 @@ def held(time: Array, values: NDArray[Number], at: Array) -> NDArray[Number]:
 
 
 def in_rows(series: Mapping[Name, tuple[Array, Array]]) -> tuple[Array, dict[Name, Array]]:
-    """Return the times of all series, from the first one at which each has a value, and the values that hold then."""
+    """Return the times of all series, from the first one at which each has a value, and the values that hold then.
+
+    A series that begins more than a second after the first one is 0 until then.
+    """
+    begins = {name: float(time[0]) for name, (time, _) in series.items()}
+    late = min(begins.values()) + LATE
     clocks = {id(time): time for time, _ in series.values()}  # the columns of a table share one array of times
     rows = np.unique(np.concatenate([*clocks.values()]))
-    rows = rows[rows >= max(time[0] for time, _ in series.values())]
-    return rows, {name: held(time, values, rows) for name, (time, values) in series.items()}
+    rows = rows[rows >= max(begin for begin in begins.values() if begin <= late)]
+    values = {name: held(time, numbers, rows) for name, (time, numbers) in series.items()}
+    return rows, {
+        name: np.where(rows < begins[name], 0.0, own) if begins[name] > late else own for name, own in values.items()
+    }

@@ -4,7 +4,7 @@ Numbers are converted to SI units, and commands to fractions of the full command
 so a number outside is a mistake; without bounds, fits could overflow.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 
@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
+    COMMANDS,
     FORCE_UNITS,
     NEUTRAL,
     PULSES,
@@ -24,7 +25,6 @@ from rov_fmu.io.csv_table import (
     DataFileError,
     KnownColumns,
     pulses,
-    shares,
 )
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
@@ -49,16 +49,16 @@ def seconds(text: str) -> float:
 COMMAND = "command"
 """The column with the command of an axis, or of all thrusters of a curve."""
 FRACTION = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
-HELD_COMMAND = replace(FRACTION, least=1e-4, conversions=dict.fromkeys(PULSES, pulses))
+HELD_COMMAND = replace(FRACTION, least=1e-4, conversions=COMMANDS)
 TIME = Column(TIMES, minimum=-1e10, maximum=1e10, parse=seconds)  # some loggers count from 1970
 
 
 def logged_command(keys: LogKeys = NO_KEYS) -> Column:
     """Return the column of a command in a log. A pulse in µs has the neutral and the span of the keys unless the header
     has others; a force in N needs the force of full thrust, as in [N 50]."""
-    usual = (keys.neutral or NEUTRAL, keys.span or SPAN)
-    conversions = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual)) | dict.fromkeys(("N", "N.m"), shares)
-    return replace(FRACTION, optional=True, conversions=conversions)
+    usual = (NEUTRAL if keys.neutral is None else keys.neutral, keys.span or SPAN)
+    of_keys = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual))
+    return replace(FRACTION, optional=True, conversions={**COMMANDS, **of_keys})
 
 
 def in_degrees(unit: str) -> tuple[float, str]:
@@ -126,6 +126,8 @@ class Entry:
     """None for a command."""
     convert: Conversion | None = None
     """The conversion of the numbers; None where they have the unit of the column already."""
+    is_pulse: bool = False
+    """True for a pulse, µs, whose neutral nobody states."""
 
 
 @dataclass(frozen=True)
@@ -186,12 +188,14 @@ _OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kin
 
 @dataclass(frozen=True)
 class Names:
-    """The tables [columns], [topics] and [logs] of rov.toml."""
+    """The tables [columns], [topics], [valid] and [logs] of rov.toml."""
 
     columns: Mapping[str, str] = field(default_factory=lambda: WELL_KNOWN)
     """Headers, by the headers of the CSV files."""
     topics: Mapping[str, Entry] = field(default_factory=dict)
     """Meanings by topic and field: `/bar30/depth.data`."""
+    valid: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """The quantities of which a column or a field is a flag."""
     keys: LogKeys = NO_KEYS
     """What the logs do not tell."""
 
@@ -215,8 +219,9 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
                 mistakes.append(key_line(f"{table}.{source}", str(error), title))
                 continue
             if found and table == "topics" and (entry := of_logs[found.name].entry):
-                entries[source] = replace(entry, convert=found.convert)
-    return Names({**WELL_KNOWN, **tables.columns}, entries, tables.logs), mistakes
+                is_pulse = found.unit in PULSES and not found.numbers and tables.logs.neutral is None
+                entries[source] = replace(entry, convert=found.convert, is_pulse=is_pulse)
+    return Names({**WELL_KNOWN, **tables.columns}, entries, tables.valid, tables.logs), mistakes
 
 
 def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:

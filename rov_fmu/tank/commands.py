@@ -4,7 +4,8 @@ Which outputs are meant, and what their numbers mean, is known from the log wher
 
     motor n            the output that SERVOx_FUNCTION or PWM_MAIN_FUNCx assigns to it; otherwise output n
     range of pulses    neutral and span in [logs] of rov.toml; otherwise MOT_PWM_MIN and MOT_PWM_MAX about 1500 us, or
-                       SERVOx_MIN, SERVOx_TRIM and SERVOx_MAX; otherwise 1500 us and 400 us
+                       SERVOx_MIN, SERVOx_TRIM and SERVOx_MAX; otherwise 1500 us and 400 us. Where all outputs rest at
+                       another pulse, and none ever at that neutral pulse, no thrust is where they rest
     direction          MOT_n_DIRECTION, and SERVOx_REVERSED
 
 Each parameter has the value that was valid at the time of the output. ArduPilot applies the range and the direction of
@@ -16,6 +17,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
@@ -47,7 +49,11 @@ _PX4_MOTOR = 100
 """The function of output x of PX4 that drives motor n is n more than this."""
 
 
-_Pulse = Annotated[Finite, Field(gt=0.0, le=1e4)] | None
+_REST, _SHARE, _SELDOM = 100.0, 0.1, 0.01
+"""An output rests at its most frequent pulse, if this is nearer to 1500 us than the first number and has the second
+share of the rows at least. It does not rest at another pulse that has less than the last share."""
+_AT_REST, _CLEAR = 2.0, 20.0
+"""Pulses closer to another one than the first number are the same, µs; they are on its one side beyond the second."""
 
 
 class LogKeys(Strict):
@@ -57,9 +63,9 @@ class LogKeys(Strict):
     """Which of several vehicles in a log: the number of the MAVLink system, or the ROS namespace."""
     outputs: str = ""
     """The topic with the commands of the thrusters."""
-    neutral: _Pulse = None
+    neutral: Annotated[Finite, Field(ge=-1e4, le=1e4)] | None = None
     """The pulse that stops a thruster, µs."""
-    span: _Pulse = None
+    span: Annotated[Finite, Field(gt=0.0, le=1e4)] | None = None
     """The distance from the neutral pulse to full thrust, µs."""
     wrench: bool = False
     """True where the commands are forces and moments on the body, although the vehicle has thrusters."""
@@ -113,6 +119,8 @@ class _Outputs:
     """The source, or the first one where each thruster has its own."""
     series: Mapping[int, Series]
     """Times (s) and numbers by the number of the output, from 1."""
+    topics: Collection[str]
+    """The names of the topics with these outputs."""
 
     @property
     def used(self) -> list[int]:
@@ -158,6 +166,8 @@ class Commanded:
     sender: Source | None = None
     other_vehicles: Collection[str] = ()
     """The other vehicles that have commands."""
+    topics: Collection[str] = ()
+    """The names of all topics that have commands, also of those that are not used."""
     findings: Sequence[Finding] = ()
     without_pulse: Sequence[str] = ()
     """The thrusters that never get a pulse, although others do."""
@@ -187,10 +197,11 @@ def commands_of(
     findings = [*_choice(path, best, own, sorted(vehicles))]
     by_name = dict(zip(names, numbers, strict=True))
     series, meanings = _fractions(path, best, by_name, parameters, keys)
+    known = {topic for outputs in candidates for topic in outputs.topics}
     used = {*best.used} if _are_pulses(path, best) else {*numbers} - {0}
     without = [name for name, n in by_name.items() if n not in used] if used & {*numbers} else []
     extra = [*_without_thruster(best, numbers, functions)]
-    return Commanded(series, best.source, vehicles - {vehicle}, [*findings, *meanings], without, extra)
+    return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings], without, extra)
 
 
 def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], keys: LogKeys) -> Commanded:
@@ -217,9 +228,8 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     best = max(chosen, key=lambda source: sum(spread(values) for _, values in chosen[source].values()))
     others = [source.topic for source in chosen if source is not best]
     left = f"; not used: {listed(others)}" if others else ""
-    return Commanded(
-        chosen[best], best, findings=[about(path.name, "source of wrench", source=best.topic, others=left)]
-    )
+    findings = [about(path.name, "source of wrench", source=best.topic, others=left)]
+    return Commanded(chosen[best], best, topics={source.topic for source in found}, findings=findings)
 
 
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
@@ -238,10 +248,11 @@ def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Seque
 def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
     """Yield all outputs that may be those of the thrusters, in the order of the catalogue's preference.
 
-    The number of an output is that of its field, or that of the topic where each thruster of a vehicle has its own.
+    The number of an output is that of its field, or that of the topic where each thruster has its own, and the names of
+    these topics differ only in it.
     """
     for rule in OUTPUTS:
-        found: dict[str | Topic, dict[int, tuple[Topic, Array]]] = {}
+        found: dict[tuple[str, str] | Topic, dict[int, tuple[Topic, Array]]] = {}
         for topic in topics:
             name, kind = topic.source.topic, topic.source.kind
             match = re.search(rule.topic, name)
@@ -249,12 +260,13 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
                 continue
             for place, values in topic.fields.items():
                 if of_field := re.fullmatch(rule.field, place):
-                    key, numbered = (topic.source.vehicle, match) if match.groups() else (topic, of_field)
-                    found.setdefault(key, {})[int(numbered[1])] = topic, values
+                    alike = match.groups() and (name[: match.start(1)], name[match.end(1) :])
+                    number = int((match if alike else of_field)[1])
+                    found.setdefault(alike or topic, {})[number] = topic, values
         for by_number in found.values():
             ordered = [by_number[n] for n in sorted(by_number)]
             series = {n: (topic.time, values) for n, (topic, values) in enumerate(ordered, start=1)}
-            yield _Outputs(rule, ordered[0][0].source, series)
+            yield _Outputs(rule, ordered[0][0].source, series, {topic.source.topic for topic, _ in ordered})
 
 
 def _named(
@@ -352,8 +364,13 @@ def _fractions(
     if not series or not _are_pulses(path, outputs):
         return series, findings
     turned, without_pulse = [], 0
+    is_open = keys.neutral is None and parameters.last("MOT_PWM_TYPE") not in _BY_SERVO
+    sent = {name: values for name, (_, values) in series.items()} if is_open else {}
+    trims = {name: parameters.last(f"SERVO{numbers[name]}_TRIM") for name in sent}
+    rests, told = at_rest(path.name, sent, trims)
+    findings += told
     for motor, (name, (time, values)) in enumerate(series.items(), start=1):
-        low, neutral, high = _range(numbers[name], time, parameters, keys)
+        low, neutral, high = _range(numbers[name], time, parameters, keys, rests.get(name))
         if motor == 1 and (low[-1], neutral[-1], high[-1]) != (NEUTRAL - SPAN, NEUTRAL, NEUTRAL + SPAN):
             ends = {"low": f"{low[-1]:g}", "neutral": f"{neutral[-1]:g}", "high": f"{high[-1]:g}"}
             findings.append(about(path.name, "range of pulses", **ends))
@@ -397,17 +414,75 @@ def _are_pulses(path: Path, outputs: _Outputs) -> bool:
     )
 
 
-def _range(number: int, time: Array, parameters: Parameters, keys: LogKeys) -> tuple[Array, Array, Array]:
-    """Return the pulses of full thrust astern, of no thrust, and of full thrust ahead of an output, at some times."""
-    kind = parameters.last("MOT_PWM_TYPE")
+def _range(
+    number: int, time: Array, parameters: Parameters, keys: LogKeys, rest: float | None
+) -> tuple[Array, Array, Array]:
+    """Return the pulses of full thrust astern, of no thrust, and of full thrust ahead of an output, at some times.
+
+    `rest` is the pulse of no thrust if the outputs tell it.
+    """
+    kind, servo = parameters.last("MOT_PWM_TYPE"), f"SERVO{number}"
     of_motors = [("MOT_PWM_MIN", "MOT_PWM_MAX")] if kind not in _BY_SERVO else []
-    of_servo = [tuple(f"SERVO{number}_{end}" for end in ("MIN", "MAX", "TRIM"))] if kind in (None, *_BY_SERVO) else []
-    neutral = np.full(len(time), keys.neutral or NEUTRAL)
-    for names in [*of_motors, *of_servo] if keys.neutral is keys.span is None else ():
+    of_servo = [(f"{servo}_MIN", f"{servo}_MAX", f"{servo}_TRIM")] if kind in (None, *_BY_SERVO) else []
+    is_trim = rest is not None and abs(rest - (parameters.last(f"{servo}_TRIM") or 0.0)) < _AT_REST
+    usual = NEUTRAL if rest is None else rest
+    neutral = np.full(len(time), usual if keys.neutral is None else keys.neutral)
+    ranges = [*of_servo, *of_motors] if is_trim else [*of_motors, *of_servo]
+    for names in ranges if keys.neutral is keys.span is None else ():
         if all((parameters.last(name) or 0.0) > 0.0 for name in names):
             low, high, *trim = (parameters.at(name, time) for name in names)
             if kind == _BY_SERVO[0]:  # with PWMRange, no thrust is in the middle
                 return low, 0.5 * (low + high), high
-            return low, trim[0] if trim else neutral, high
+            if trim and (is_trim or rest is None):
+                return low, trim[0], high
+            moved = neutral - NEUTRAL  # with its range, which the autopilot has about 1500 us
+            return low + moved, neutral, high + moved
     span = keys.span or SPAN
     return neutral - span, neutral, neutral + span
+
+
+def at_rest(
+    file: str, pulses: Mapping[str, Array], trims: Mapping[str, float | None] = MappingProxyType({})
+) -> tuple[dict[str, float], list[Finding]]:
+    """Return the pulses of no thrust of outputs that clearly rest elsewhere than at 1500 us; and a finding, also where
+    they only may.
+
+    `pulses` has those of each output of the vehicle, and `trims` those of no thrust that the log tells, µs. A thruster
+    that works all the time does not rest. But if most outputs stay at a pulse from which they depart to both sides, or
+    which several have at the same time, and if none stays at 1500 us, then these are their pulses of no thrust.
+    Otherwise a reverse thrust and a load would be invented.
+    """
+    known = {name: values[np.isfinite(values) & ~np.isin(values, NO_OUTPUT)] for name, values in pulses.items()}
+    levels = {name: level for name, values in known.items() if (level := _usual_level(values)) is not None}
+    told = {name: level for name, level in levels.items() if abs(level - (trims.get(name) or 0.0)) < _AT_REST}
+    if told and any(abs(level - NEUTRAL) >= _AT_REST for level in told.values()):
+        return told, [about(file, "at rest", **_in_words(told))]
+    stays = (np.mean(np.abs(values - NEUTRAL) < _AT_REST) for values in known.values() if len(values))
+    if 2 * len(levels) <= len(pulses) or max(stays, default=1.0) >= _SELDOM:
+        return {}, []
+    sides = ((known[name].min() - level, known[name].max() - level) for name, level in levels.items())
+    is_two_sided = any(low < -_CLEAR and high > _CLEAR for low, high in sides)
+    own = [np.abs(pulses[name] - level) < _AT_REST for name, level in levels.items()]
+    is_together = len(own) > 2 and len({*map(len, own)}) == 1 and np.mean(np.all(own, axis=0)) >= _SHARE
+    if not (is_two_sided or is_together):
+        return {}, [about(file, "perhaps at rest", **_in_words(levels))]
+    others = dict.fromkeys(pulses, next(iter(levels.values()))) if len({*levels.values()}) == 1 else {}
+    return {**others, **levels}, [about(file, "at rest", **_in_words(levels))]
+
+
+def _usual_level(pulses: Array) -> float | None:
+    """Return the most frequent pulse of an output, if it is near 1500 us and frequent enough to be where it rests."""
+    levels, counts = np.unique(pulses, return_counts=True)
+    if (
+        not len(levels)
+        or counts.max() < max(2.0, _SHARE * len(pulses))
+        or abs(levels[counts.argmax()] - NEUTRAL) >= _REST
+    ):
+        return None
+    return float(levels[counts.argmax()])
+
+
+def _in_words(levels: Mapping[str, float]) -> dict[str, str]:
+    """Return the pulses of no thrust for a sentence, and one of them for a key of rov.toml."""
+    texts = [f"{level:g}" for level in sorted({*levels.values()})]
+    return {"rest": listed(texts), "key": texts[0]}

@@ -40,6 +40,7 @@ from rov_fmu.io.toml_file import (
     problem_lines,
     read_toml,
 )
+from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, check_tables_of_thrust
 from rov_fmu.vehicle.description import Head, Validity
@@ -54,7 +55,7 @@ _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
 """The tables that are not allowed together with `base`, because the base has its own."""
 _FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
 """The source of the directions of the thrusters where neither a base nor a table gives any."""
-_FILE_TABLES = ("columns", "topics", "dives", "logs")
+_FILE_TABLES = ("columns", "topics", "valid", "dives", "logs")
 """The tables that explain the files of tests."""
 
 
@@ -183,6 +184,23 @@ class TankLimits(Strict):
     """The longest recording, s."""
 
 
+def _check_quantities(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Check the names of quantities, each of which may begin with a minus."""
+    for name in names:
+        if (quantity := name.removeprefix("-")) not in QUANTITIES:
+            raise ValueError(
+                f"there is no such quantity{only(quantity, QUANTITIES, join_names(QUANTITIES))}: {shown(name)}"
+            )
+    return names
+
+
+_Flagged = Annotated[
+    tuple[str, ...],
+    BeforeValidator(lambda value: (value,) if isinstance(value, str) else as_tuple(value)),
+    AfterValidator(_check_quantities),
+]
+
+
 class RovTables(Tables):
     """The tables of rov.toml that could be read."""
 
@@ -202,6 +220,8 @@ class RovTables(Tables):
     """What the headers of CSV files stand for: other headers."""
     topics: dict[str, str] = Field(default={})
     """What the fields of topics stand for: headers of a CSV file."""
+    valid: dict[str, _Flagged] = Field(default={})
+    """The quantities that are measured only where a column or a field is true, by its name."""
     dives: dict[str, Dive] = Field(default={})
     """The dives of several files, by name."""
     logs: LogKeys = LogKeys()

@@ -100,10 +100,16 @@ SENTENCES: dict[str, SentenceForm] = {
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",
     "rows without time": "{files}: {count:#row} without a time left out",
-    "rows without command": "{files}: {count:#row} without a command left out",
+    "rows before commands": "{files}: {count:#row} before the first command left out",
+    "late command": "{files}: {column} has no command before {at} s. Until then, its command is taken as 0",
     "torn rows": "{files}: {count:#row} with more cells than the header left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "column without unit": "{files}: {column} is not read, because its header has no unit. Write for example {header}",
+    "mark": (
+        "{files}: {count:#value} of {columns} left out, because {what} is far from all others: a mark that nothing was "
+        "measured"
+    ),
+    "invalid": "{files}: {count:#value} of {columns} left out, because {what} says that they are invalid",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
     "beyond full thrust": "{files}: {count:#command} of {column} beyond full thrust taken as full thrust",
     "missing column": (
@@ -150,6 +156,14 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
     ),
     "range of pulses": "{files}: full thrust is {low} and {high} us, and no thrust {neutral} us",
+    "at rest": (
+        "{files}: no thrust is {rest} us, because the outputs rest there and never at 1500 us. If that is wrong, write "
+        "neutral = 1500 into [logs] of rov.toml"
+    ),
+    "perhaps at rest": (
+        "{files}: no output ever rests at 1500 us, which is taken as no thrust, and most stay at {rest} us. If that is "
+        "no thrust, write neutral = {key} into [logs] of rov.toml"
+    ),
     "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "time of arrival": (
@@ -167,7 +181,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "several vehicles": (
-        "{files}: the log has the vehicles {vehicles}. {vehicle} is used; [logs] of rov.toml can name another"
+        "{files}: the log has the vehicles {vehicles}. {vehicle} is used; `vehicle` in [logs] of rov.toml names another"
     ),
     "motors without thruster": (
         "{files}: there are commands of {whose}, but the vehicle has no thruster for them, so that forces and inertias "

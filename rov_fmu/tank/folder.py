@@ -42,6 +42,12 @@ PATTERNS = ", ".join(f"*{suffix}" for suffix in _SUFFIXES)
 """The names that the files of tests have."""
 KINDS = (*TABLES, "log")
 """The words that the name of a file begins with."""
+_LACKING = {
+    "columns": "no CSV file has such a column",
+    "topics": "no log has such a topic and field",
+    "valid": "no log has such a column or field",
+}
+"""What is wrong with a name in a table of rov.toml that no file has."""
 _LOADS = "The vehicle has these loads as inputs, and neither thrusters nor their lag"
 _OWN_THRUSTERS = f"The vehicle has the thrusters of {ROV_FILE} as inputs, whose thrust and lag these logs do not tell"
 
@@ -185,14 +191,13 @@ class Folder:
         self.logs += [log for log in logs if log.commands]
 
     def unknown_names(self) -> Iterator[str]:
-        """Yield a line for each entry of [columns] and [topics] that no file has."""
+        """Yield a line for each entry of [columns], [topics] and [valid] that no file has."""
         tables = self.rov_file.tables
-        for table, names in (("columns", tables.columns), ("topics", tables.topics)):
+        for table, names in (("columns", tables.columns), ("topics", tables.topics), ("valid", tables.valid)):
             free = sorted(self.known - names.keys())
             for name, value in names.items():
                 if name not in self.known:
-                    is_header = table == "columns"
-                    what = "no CSV file has such a column" if is_header else "no log has such a topic and field"
+                    what = _LACKING[table]
                     yield key_line(f"{table}.{name}", f"{what}{only(name, free) if free else ''}", value)
 
     def missing_columns(self, requests: Requests) -> Iterator[str]:

@@ -19,6 +19,10 @@ from rov_fmu.tank.findings import Finding
 LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
 
+_LONG, _LONG_INTERVALS, _CHANGING = 1.0, 10.0, 0.9
+"""Commands are told only where they change if more than this time passes without one, s, and more than this many
+usual intervals of the measurements, and if at least this share of the rows change a command."""
+
 
 @dataclass(frozen=True, order=True)
 class Source:
@@ -122,6 +126,20 @@ class Commands:
         by_thruster = (self.thruster == n for n in range(len(self.thrusters)))
         begun = np.asarray(time) >= self.rows[0]
         return np.column_stack([begun * held(self.time[own], self.value[own], time) for own in by_thruster])
+
+    def held_while(self, measured: Array) -> "Commands":
+        """Return the commands with a row at each time of a measurement if they are told only where they change.
+
+        Then nearly every row is another command, and long times have none. The last command holds until the
+        measurements (s, ascending) end.
+        """
+        times = measured[measured >= self.rows[0]]
+        usual = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+        longest = np.diff(self.rows, append=max(self.rows[-1], times[-1] if len(times) else -np.inf)).max()
+        if longest <= max(_LONG, _LONG_INTERVALS * usual) or len({*self.time}) < _CHANGING * len(self.rows):
+            return self
+        rows = np.union1d(self.rows, times)
+        return Commands.of_rows(self.thrusters, rows, self.at(rows), self.source)
 
     @classmethod
     def of_rows(cls, thrusters: Sequence[str], rows: Array, values: Array, source: Source) -> "Commands":

@@ -49,7 +49,9 @@ def checked(log: Log) -> Log:
         if not channel.quantity.is_velocity:
             findings += scales_differ(log.file, channel, channels)
     findings += sources(log.file, channels)
-    return replace(log, channels=tuple(channels), findings=tuple(findings))
+    measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
+    commands = log.commands and log.commands.held_while(measured)
+    return replace(log, commands=commands, channels=tuple(channels), findings=tuple(findings))
 
 
 # ---- Sources ---------------------------------------------------------------------------------------------------------

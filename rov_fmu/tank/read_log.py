@@ -11,8 +11,9 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import BodyForce, Layout
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT
 from rov_fmu.tank.channels import channels_of, of_scalar
-from rov_fmu.tank.clocks import in_rows
+from rov_fmu.tank.clocks import LATE, in_rows
 from rov_fmu.tank.columns import (
     COMMAND,
     INPUTS,
@@ -23,9 +24,10 @@ from rov_fmu.tank.columns import (
     is_of_inputs,
     thruster_commands,
 )
-from rov_fmu.tank.commands import LogKeys, Series, commands_of, wrench_of
+from rov_fmu.tank.commands import Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
+from rov_fmu.tank.no_measurement import measured_only
 from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
@@ -48,9 +50,9 @@ def read_logs(
     if kind.open:
         content, entries = read_table(path, layout, axis, names, kind.open(path), is_part=is_part)
     else:
-        content = read_parsed(path, kind, {name.partition(".")[0] for name in entries})
+        content = read_parsed(path, kind, {name.partition(".")[0] for name in (*entries, *names.valid)})
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
-    return [_log(path, content, piece, layout, entries, names.keys, axis) for piece in content.pieces]
+    return [_log(path, content, piece, layout, entries, names, axis) for piece in content.pieces]
 
 
 def _log(
@@ -59,13 +61,17 @@ def _log(
     piece: Piece,
     layout: Layout,
     entries: Mapping[str, Entry],
-    keys: LogKeys,
+    names: Names,
     axis: Axis | None,
 ) -> Log:
     """Return the log of a piece: what `entries` say of its fields, and what is recognised besides."""
-    is_first = piece is content.pieces[0]
+    is_first, keys = piece is content.pieces[0], names.keys
     file = path.name if is_first else f"{path.name} (from {piece.since:.4g} s)"
-    named, told, labels = _meant(piece, entries)
+    topics, not_measured = measured_only(file, piece.topics, entries, names.valid)
+    piece = replace(piece, topics=topics)
+    fields = {field: values for topic in piece.topics for field, values in topic.full_fields() if field in entries}
+    rests, at_neutral = at_rest(file, {field: values for field, values in fields.items() if entries[field].is_pulse})
+    named, told, labels = _meant(piece, entries, rests)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
     if layout.has_wrench:
@@ -77,10 +83,16 @@ def _log(
     config = piece.parameters.last("FRAME_CONFIG")
     source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
-    findings = [*content.findings * is_first, *commanded.findings, *_findings(file, layout, series, labels)]
-    findings += misfits(file, layout, commanded.without_pulse, extra, config)
+    findings = [
+        *content.findings * is_first,
+        *not_measured,
+        *at_neutral,
+        *commanded.findings,
+        *_findings(file, layout, series, labels),
+        *misfits(file, layout, commanded.without_pulse, extra, config),
+    ]
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
-    used = {channel.source.topic for channel in channels} | {source.topic}
+    used = {channel.source.topic for channel in channels} | {*commanded.topics}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}
     commands = None
     if series:
@@ -100,29 +112,44 @@ def _log(
     )
 
 
-def _meant(piece: Piece, entries: Mapping[str, Entry]) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
-    """Return the channels and the commands that `entries` say that fields are, and the fields of the commands."""
+def _meant(
+    piece: Piece, entries: Mapping[str, Entry], rests: Mapping[str, float]
+) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
+    """Return the channels and the commands that `entries` say that fields are, and the fields of the commands.
+
+    `rests` has the pulses of no thrust by field, µs, where they are not the usual one.
+    """
     channels: list[Channel] = []
     commands: dict[str, Series] = {}
     labels: dict[str, str] = {}
     for topic in piece.topics:
         for field, values in topic.full_fields():
             if entry := entries.get(field):
-                converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
+                moved = rests.get(field, NEUTRAL) - NEUTRAL
+                numbers = np.where(np.isin(values, NO_OUTPUT), values, values - moved) if moved else values
+                converted = np.array([*map(entry.convert, numbers.tolist())]) if entry.convert else values
+                told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
                 if entry.quantity:
                     source = replace(topic.source, topic=field)
                     channels += of_scalar(entry.quantity, source, topic.time, converted)
-                else:
+                elif told.any():
                     labels[entry.name] = field
-                    commands[entry.name] = topic.time, np.nan_to_num(converted)
+                    time = topic.time if told.all() else topic.time[told]
+                    commands[entry.name] = time, np.nan_to_num(converted[told])
     return channels, commands, labels
 
 
 def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str]) -> Iterator[Finding]:
-    """Yield a finding for each column or thruster with commands beyond ±1, which become ±1, and for each without any.
+    """Yield a finding for each column or thruster with commands beyond ±1, which become ±1, and for each without any,
+    or without any at first.
 
     `labels` has the column or field of each input, thruster or axis that rov.toml or a table names.
     """
+    first = min((time[0] for time, _ in series.values()), default=0.0)
+    for name, (time, _) in series.items():
+        if time[0] > first + LATE:
+            at = f"{time[0] - first:.4g}"
+            yield about(file, "late command", column=labels.get(name, f"thruster {name}"), at=at)
     for name, (_, values) in series.items() if not layout.has_wrench else ():
         if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
             yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)

@@ -6,11 +6,9 @@ from pathlib import Path
 from statistics import fmean
 
 from rov_fmu.equation.layout import CurrentTable, ThrustTable
-from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, DataFileError, pulses, read_columns
+from rov_fmu.io.csv_table import BEYOND, COMMANDS, FORCE_UNITS, Column, DataFileError, read_columns
 
-_COMMAND = Column(
-    {"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=dict.fromkeys(PULSES, pulses)
-)
+_COMMAND = Column({"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=COMMANDS)
 _THRUST = Column(FORCE_UNITS, also=("force",), minimum=-1e6, maximum=1e6)
 _CURRENT = Column({"A": 1.0}, minimum=0.0, maximum=1e4)
 _MOST_POINTS = 2000
@@ -19,9 +17,9 @@ _WIDEST = 0.05
 
 
 def read_thrust(path: Path) -> ThrustTable:
-    """Read a CSV file with the columns command [1], [%] or [us], and thrust [N], [kgf] or [lbf]. Raises DataFileError.
+    """Read a CSV file with the columns command [1], [%], [us] or [N 50], and thrust [N], [kgf] or [lbf].
 
-    Rows with equal commands become one point with their mean thrust. The table has no name yet.
+    Raises DataFileError. Rows with equal commands become one point with their mean thrust. The table has no name yet.
     """
 
     def check(command: float, force: float) -> str | None:
@@ -52,7 +50,7 @@ def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path
 
 
 def read_current(path: Path) -> CurrentTable:
-    """Read a CSV file with the columns command [1], [%] or [us], and current [A]. Raises DataFileError.
+    """Read a CSV file with the columns command [1], [%], [us] or [N 50], and current [A]. Raises DataFileError.
 
     Rows with equal commands become one point with their mean current.
     """
@@ -76,7 +74,7 @@ def _points(
     points: dict[float, list[float]] = {}
     for row, (command, value) in enumerate(zip(columns.values["command"], columns.values[name], strict=True)):
         if abs(command) > 1.0:
-            raise columns.error(row, "command", "must be within full thrust in both directions")
+            raise columns.error(row, "command", BEYOND)
         if reason := check(command, value):
             raise columns.error(row, name, reason)
         points.setdefault(command, []).append(value)

@@ -14,7 +14,7 @@ from rov_fmu import load
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, Axis
 from rov_fmu.fmu.variables import variables
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.csv_table import PULSES, DataFileError
 from rov_fmu.tank.columns import Names, columns_of_log
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import unwrapped
@@ -369,6 +369,13 @@ WRITTEN |= {
     "a wrong unit": [PRESSED.replace("k", ""), *(f"{n},{n},{101.3 + 0.1 * n},{0.01 * n}" for n in range(40))],
     "a frozen depth": ["time [s],u_t [%],depth [m],pressure [kPa]", *(f"{n},{n},1,{101 + n}" for n in range(40))],
 }
+ONE_BY_ONE = "time [s],u_l [%],u_t [%],depth [m],heading [deg]"
+MESSAGES = ("{},,,", ",{},,", ",,{},", ",,,{}")
+WRITTEN |= {
+    "a row for each message": [ONE_BY_ONE, *(f"{n},{MESSAGES[n % 4].format(n)}" for n in range(80))],
+    "tables one after the other": [ONE_BY_ONE, *(f"{n},{one.format(n)}" for one in MESSAGES for n in range(40))],
+    "a command that begins late": [ONE_BY_ONE, *(f"{n},{n if n > 5 else ''},{n},{n},{n}" for n in range(40))],
+}
 
 
 def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
@@ -377,7 +384,8 @@ def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
     assert {axes[signal["axis"]] for signal in recording["signals"]} == {axis for axis, _ in used if axis in axes}
     for signal in recording["signals"]:
         channel = used[axes[signal["axis"]], signal["isPosition"]]
-        assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel)), abs=1e-6), log.file
+        there = channel.there & (log.commands is None or channel.time >= log.commands.rows[0])
+        assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel)[there]), abs=1e-6), log.file
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -387,11 +395,17 @@ def test_a_log_is_read_as_identify_reads_it(name: str, page: Any, vehicle: Vehic
     read, *_ = read_logs(tmp_path / "pool.csv", vehicle.layout, Names())
     check_read_alike(recording, read, [form.axis for form in vehicle.layout.axes])
     assert read.commands is not None
-    assert recording["times"] == pytest.approx(read.commands.rows - read.commands.rows[0], abs=1e-6)
-    command = read.commands.at(read.commands.rows)[:, read.commands.thrusters.index("t")]
-    assert recording["commands"]["u_t"] == pytest.approx(command)
-    assert command.any()
-    assert recording["left"] == (12 if name == "a clock set back" else 0)
+    rows = np.unique(np.concatenate([read.commands.rows, *(channel.time for channel in read.channels)]))
+    rows = rows[rows >= read.commands.rows[0]]
+    assert [*dict.fromkeys(recording["times"])] == pytest.approx(rows - rows[0], abs=1e-6)
+    held = dict(
+        zip(recording["times"], zip(*(recording["commands"][f"u_{one}"] for one in "lt"), strict=True), strict=True)
+    )
+    commands = read.commands.at(rows)[:, [read.commands.thrusters.index(one) for one in "lt"]]
+    assert np.array([*held.values()]) == pytest.approx(commands)
+    assert commands.any()
+    left = {"a clock set back": 12, "a row for each message": 1}
+    assert recording["left"] == left.get(name, 0)
     assert ("The pressure is not used" in said(page)) is (name in ("a barometer in the hull", "a wrong unit"))
 
 
@@ -405,7 +419,12 @@ def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, 
     logs = []
     for name, one in known.items():
         beside = f"{command} [%]" if not one.commands else "depth [m]"
-        units = [*one.column.units, *(f"{unit} 2000" for unit in one.column.conversions if unit[0] == "N"), "us"]
+        units = [
+            *one.column.units,
+            *(f"{unit} 2000" for unit in one.column.conversions if unit not in PULSES),
+            "us",
+            "us 0 2000",
+        ]
         for title in (name, *one.column.also):
             for unit in units:
                 header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if one.commands else ",voltage [V]")

@@ -154,7 +154,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: axes.heave.Z_wdot: there is no such key; give -Z_wdot, which is positive, as m_a of [axes.heave]",
     ),
     (
-        f"{BLUEROV2}{LIMITS.format(-1.01, 1, 0.2, 0.2, -0.1, 0, 10001)}",
+        f"{BLUEROV2}{LIMITS.format(-1.01, 1, 0.2, 0.2, -0.1, -10001, 10001)}",
         HEAVE_ALONE,
         " | ".join(
             f"/rov.toml: {line}"
@@ -162,7 +162,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
                 "windows.heave = [-1.01, 1]: must be [low, high] within -1 ... 1, fractions of the full command: 20 %",
                 "windows.surge = [0.2, 0.2]: must be [low, high]",
                 "priors.inertia = -0.1: must be 0 or above",
-                "logs.neutral = 0: must be greater than 0",
+                "logs.neutral = -10001: must be greater than or equal to -10000",
                 "logs.span = 10001: must be less than or equal to 10000",
             )
         ),

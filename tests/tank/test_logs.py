@@ -50,20 +50,19 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
         ("rows sorted", 1),
         ("time stamps merged", 2),
         ("rows without time", 2),
-        ("rows without command", 3),
         ("torn rows", 1),
+        ("unread cells", 1),
         ("unread cells", 1),
     ]
     assert {finding.file for finding in log.findings} == {"log.csv"}
-    assert log.findings[-1].names == {"column": "depth [cm]"}
+    assert [one.names for one in log.findings[-2:]] == [{"column": "command [%]"}, {"column": "depth [cm]"}]
     depth = used(log.log, "depth")
-    assert depth.time[depth.there] == pytest.approx(0.1 * np.arange(N))
-    expected = 0.01 * np.arange(N)
-    expected[19] = 0.77
-    assert measured(log.log, "depth") == pytest.approx(expected)
-    assert commanded(log.log, COMMAND, depth.time[depth.there]) == pytest.approx(
-        [0.25 if n == 19 else STEP[n] for n in range(N)]
-    )
+    in_order = 0.01 * np.arange(N)
+    in_order[19] = 0.77
+    held = [0.25 if n == 19 else STEP[n] for n in range(N)]
+    assert depth.time[depth.there] == pytest.approx([*0.1 * np.arange(21), 2.05, 2.06, 2.07, *0.1 * np.arange(21, N)])
+    assert measured(log.log, "depth") == pytest.approx([*in_order[:21], *[0.05] * 3, *in_order[21:]])
+    assert commanded(log.log, COMMAND, depth.time[depth.there]) == pytest.approx([*held[:21], *[0.3] * 3, *held[21:]])
 
 
 def test_a_measurement_without_a_unit_is_told(tmp_path: Path) -> None:
@@ -165,6 +164,24 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     )
 
 
+OFFSETS = {
+    "us 0 400": [-0.5, 0.0, 1.0],
+    "us 0 -400": [0.5, 0.0, -1.0],
+    "us 100 400": [-0.75, -0.25, 0.75],
+    "us -100 250": [-0.4, 0.4, 1.0],
+}
+"""Units of pulses, and the commands that -200, 0 and 400 are."""
+
+
+@pytest.mark.parametrize("unit", OFFSETS)
+def test_pulses_about_any_neutral(unit: str, tmp_path: Path) -> None:
+    rows = [f"{n},{pulse},{n}" for n, pulse in enumerate((-200, 0, 400))]
+    log = read(tmp_path, f"time [s],command [{unit}],depth [m]", rows, HEAVE)
+    assert commanded(log.log, COMMAND) == pytest.approx(OFFSETS[unit])
+    kinds = [finding.kind for finding in log.findings]
+    assert kinds == (["beyond full thrust"] if "-100" in unit else [])
+
+
 SLIPS = {
     "% 1": "no command exceeds 1 %. Are they fractions? Then write [1]",
     "% 1.01": "",
@@ -173,6 +190,7 @@ SLIPS = {
     "us 100": "no pulse beyond 100 us: percent under [us]? Write [%]",
     "us 100.1": "",
     "us 0": "",
+    "us_0_400 50": "",
 }
 """The unit and the largest number of a command, and why they cannot belong together."""
 
@@ -180,6 +198,7 @@ SLIPS = {
 @pytest.mark.parametrize("case", SLIPS)
 def test_commands_that_cannot_be_in_their_unit_are_refused(case: str, tmp_path: Path) -> None:
     unit, number = case.split()
+    unit = unit.replace("_", " ")
     try:
         read(tmp_path, f"time [s],command [{unit}],depth [m]", ["0,0,1", f"1,{number},2"], HEAVE)
         found = ""
@@ -197,12 +216,11 @@ REFUSED = {
     "'PWM (us)'? Units stand in square brackets.",
     "no motion": "time [s],u_t [%] | 0,1 | line 1: column 'surge distance [m]' or 'surge velocity [m/s]' or 'depth",
     "no such unit": "time [s],u_t [V],depth [m] | 0,1,1 | 'u_t [V]': must be 'u_t [%]' or 'u_t [1]' or 'u_t [us]'",
-    "span of none": "time [s],u_t [us 1500 0],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] such as",
+    "span of none": "time [s],u_t [us 1500 0],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] with a span",
     "two kinds": "time [s],command [%],u_t [%],depth [m] | 0,0,0,0 | columns 'command [%]', 'u_t [%]'",
     "twice": "time [s],u_t [%],t [1],depth [m] | 0,1,1,1 | this column occurs twice",
     "percent as fractions": "time [s],u_t [1],depth [m] | 0,30,1 | line 2, column 'u_t [1]' = '30': must be at",
-    "neutral of none": "time [s],u_t [us 0 400],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] such as",
-    "neutral alone": "time [s],u_t [us 1500],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] such as",
+    "neutral alone": "time [s],u_t [us 1500],depth [m] | 0,1,1 | must be [us], or [us NEUTRAL SPAN] with a span",
     "words in a unit": "time [s],u_t [us 1500 x],depth [m] | 0,1,1 | column 2 = 'u_t [us 1500 x]': only numbers may "
     "follow us",
     "a number in a unit": "time [s],u_t [% 5],depth [m] | 0,1,1 | column 2 = 'u_t [% 5]': must be [%] alone",

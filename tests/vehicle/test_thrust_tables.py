@@ -53,6 +53,16 @@ def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> Non
     assert with_numbers.forces == pytest.approx((-9.0 * 4.4482216152605, 0.0, 11.0 * 4.4482216152605), rel=1e-15)
 
 
+@pytest.mark.parametrize("unit", ["us 0 40", "us -10 40", "N 40", "kgf 40"])
+def test_pulses_relative_to_neutral_and_forces_are_commands(unit: str, tmp_path: Path) -> None:
+    """The rows at rest need not be in order."""
+    neutral = -10 if "-10" in unit else 0
+    rows = "".join(f"{9 * c},{40 * c + neutral}\n" for c in (-1, -0.5, 1, 0, 0.5))
+    found = read_thrust(table(tmp_path, f"thrust [N],command [{unit}]\n{rows}"))
+    assert found.commands == (-1.0, -0.5, 0.0, 0.5, 1.0)
+    assert found.forces == (-9.0, -4.5, 0.0, 4.5, 9.0)
+
+
 def test_thrust_goes_on_with_its_slope_to_full_command(tmp_path: Path) -> None:
     found = read_thrust(table(tmp_path, "command [%],thrust [N]\n-95,-190\n-50,-100\n0,0\n50,60\n95,114\n"))
     assert found.commands == (-1.0, -0.95, -0.5, 0.0, 0.5, 0.95, 1.0)
@@ -91,7 +101,7 @@ def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_t
         "no force ahead": ("command [1],thrust [N]\n-1,-1\n0,0\n1,0\n", "and one ahead above 0 N"),
         "a pulse beyond full thrust": (
             "pulse [us],thrust [N]\n1099,-1\n1500,0\n1900,1\n",
-            "must be within full thrust",
+            "is beyond full thrust; [us NEUTRAL SPAN] states another range",
         ),
         "one half": ("command [1],thrust [N]\n0,0\n0.5,1\n1,2\n", "must cover the commands from -1 to 1"),
         "too little ahead": ("command [1],thrust [N]\n-1,-1\n0,0\n0.94,1\n", "side, not only -1 ... 0.94"),

@@ -14,7 +14,17 @@ from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns, read_header
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import COMMANDS, FORCE, HEADERS, NOT_COMMANDED, QUANTITIES, TIMES, TORQUE
+from rov_fmu.tank.catalogue import (
+    COMMANDS,
+    FORCE,
+    HEADERS,
+    NOT_COMMANDED,
+    NOT_MEASURED,
+    QUANTITIES,
+    THRUSTER,
+    TIMES,
+    TORQUE,
+)
 from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_columns
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
@@ -28,6 +38,13 @@ _FEWEST_ROWS = 50
 _USUAL_PULSES = 1000.0, 2000.0
 _REST = 20.0
 """The largest distance of the usual pulse of a thruster from the neutral one, µs."""
+_IDLE_PULSE = 100.0
+"""The largest distance of the only pulse of a thruster that is not used from the usual neutral one, µs."""
+_FEWEST_WORKING = 3
+"""The least number of numbered outputs that never rest and are taken as commands of thrusters."""
+_NO_THRUSTER = 2
+_NO_COMMAND = {"rc", "rcin", "max", "min", "limit", "n", "kgf", "lbf", *NOT_COMMANDED}
+"""Words in headers that are no commands: of a pilot, limits, and forces."""
 _NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
 """A name of a thruster that a vehicle file may have."""
 _CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
@@ -95,7 +112,8 @@ def guessed(
     meant = {title: _meant(title, numbers[title], rotations) for title in titles}
     if "time" not in meant.values():
         meant |= dict.fromkeys(_clock(meant, numbers), "time")
-    commanding = _commanding(meant, numbers)
+    layouts = [*layouts]
+    commanding = _commanding(meant, numbers, layouts)
     names = _names(commanding)
     forces = {title: force for title in commanding if (force := _force(title))}
     if forces:  # beside them, a velocity may have its symbol alone
@@ -113,10 +131,66 @@ def guessed(
     return layout, columns | _measured(others, numbers, is_up=_is_up(meant, numbers))
 
 
-def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
-    """Return the headers of the commands of thrusters, or else those of forces that are applied."""
-    commanding = [title for title, name in meant.items() if _is_command(title, numbers[title], name)]
-    return commanding[:_MOST_THRUSTERS] or [t for t in meant if _force(t) and len(numbers[t])]
+def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array], layouts: Iterable[Layout]) -> list[str]:
+    """Return the headers of the commands of thrusters, or else those of forces that are applied.
+
+    Outputs are numbered: if one is a command, then so are the others of its name, unit and range.
+    """
+    possible = {title: _family(title) for title in meant if _may_be_command(title, numbers[title])}
+    sure = [title for title in possible if _is_command(title, numbers[title], meant[title])]
+    families = {possible[title]: _are_pulses(numbers[title]) for title in sure} | dict.fromkeys(
+        (family for family in {*possible.values()} if _work_all_the_time(possible, numbers, family)), True
+    )
+    found = [
+        title
+        for title, family in possible.items()
+        if title in sure or ("#" in family[0] and families.get(family) is _are_pulses(numbers[title]))
+    ]
+    best = min(map(_grade, found), default=0)
+    found = [title for title in found if _grade(title) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
+    ends = {name: _ends(numbers[title]) for name, title in zip(_names(found), found, strict=True)}
+    is_pulse = any(map(_are_pulses, (numbers[title] for title in found)))
+    kept = likely_thrusters(ends, layouts, *((NEUTRAL, _IDLE_PULSE) if is_pulse else (0.0, 0.0)))
+    return [title for name, title in zip(ends, found, strict=True) if name in kept] or [
+        title for title in meant if _force(title) and len(numbers[title])
+    ]
+
+
+def likely_thrusters(
+    ends: Mapping[str, tuple[float, float]], layouts: Iterable[Layout], rest: float = 0.0, idle: float = 0.25
+) -> list[str]:
+    """Return the names of the outputs that seem to drive thrusters, from the ends of the range of each, in order.
+
+    An output that never changes drives no thruster, unless it idles, which is closer to `rest` than `idle`, and an
+    output after it changes, or a vehicle has as many.
+    """
+    if not any(low < high for low, high in ends.values()):
+        return [*ends]
+    names = [name for name, (low, high) in ends.items() if low < high or abs(low - rest) <= idle]
+    last = max(n for n, name in enumerate(names, start=1) if ends[name][0] < ends[name][1])
+    known = [*layouts]
+    return next((names[:n] for n in range(last, len(names) + 1) if fitting(names[:n], known)), names[:last])
+
+
+def _ends(numbers: Array) -> tuple[float, float]:
+    return float(numbers.min()), float(numbers.max())
+
+
+def _family(title: str) -> tuple[str, str]:
+    """Return what numbered outputs share: the name with # for its numbers, and the unit."""
+    name, unit = header_parts(title)
+    return re.sub(r"\d+", "#", name), unit
+
+
+def _grade(title: str) -> int:
+    """Return 0 for a header that may be that of a command, 1 for that of something wanted, which is a command if there
+    is no other, and more for one that names no thruster."""
+    words = {*_words(title).split()}
+    if not (wanted := words & NOT_MEASURED):
+        return 0
+    if not (re.search(THRUSTER, _words(title)) or any(map(str.isdigit, words))):
+        return _NO_THRUSTER
+    return 0 if wanted <= {"cmd", "command", "commands"} else 1
 
 
 def _clock(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
@@ -179,17 +253,36 @@ def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
     return ""
 
 
+def _may_be_command(title: str, numbers: Array) -> bool:
+    """Return True if the name and the unit of a header are not against the command of a thruster."""
+    unit = header_parts(title)[1].casefold()
+    is_possible = unit in ("", "1", "-", "%", "pwm") or unit.startswith(PULSES)
+    return bool(is_possible and len(numbers) and not _NO_COMMAND & {*_words(title).split()})
+
+
 def _is_command(title: str, numbers: Array, meant: str) -> bool:
     """Return True for the command of a thruster, by its name, unit and size, or for pulses that rest at 1500 us."""
-    words, unit = _words(title), header_parts(title)[1].casefold()
-    is_possible = unit in ("", "1", "-", "%", "pwm") or unit.startswith(PULSES)
-    if not is_possible or not len(numbers) or {"rc", *NOT_COMMANDED} & {*words.split()}:
+    if not _may_be_command(title, numbers):
         return False
     given = numbers[~np.isin(numbers, NO_OUTPUT)]
-    if re.search(COMMANDS, words) or (unit == "%" and not meant):
+    if re.search(COMMANDS, _words(title)) or (header_parts(title)[1] == "%" and not meant):
         return bool((np.abs(given) <= 100.0).all()) or _within(given, PULSE_RANGE)
     values, counts = np.unique(given, return_counts=True)
     return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
+
+
+def _work_all_the_time(
+    possible: Mapping[str, tuple[str, str]], numbers: Mapping[str, Array], family: tuple[str, str]
+) -> bool:
+    """Return True for several outputs in whole microseconds on both sides of the usual neutral pulse."""
+    own = [numbers[title] for title in possible if possible[title] == family]
+    working = [values for values in own if values.min() < NEUTRAL < values.max()]
+    whole = all(_within(values, _USUAL_PULSES) and (values == np.round(values)).all() for values in working)
+    return len(working) >= _FEWEST_WORKING and whole
+
+
+def _are_pulses(numbers: Array) -> bool:
+    return _within(numbers[~np.isin(numbers, NO_OUTPUT)], PULSE_RANGE)
 
 
 def _within(numbers: Array, ends: tuple[float, float]) -> bool:

@@ -8,16 +8,19 @@ that cannot be used are left out and counted.
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
+    COMMANDS,
     NEUTRAL,
     NO_OUTPUT,
     NUMBER,
@@ -26,12 +29,13 @@ from rov_fmu.io.csv_table import (
     Columns,
     DataFileError,
     read_columns,
+    read_header,
 )
 from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, restart_rows
+from rov_fmu.tank.clocks import AGAIN, LATE, LEAST_AFTER, ascending, restart_rows
 from rov_fmu.tank.columns import (
     AXIS,
     COMMAND,
@@ -48,8 +52,10 @@ from rov_fmu.tank.columns import (
     known_columns,
     refuse_slips,
 )
+from rov_fmu.tank.commands import at_rest
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
+from rov_fmu.tank.no_measurement import FLAG, flag_columns
 from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece
 
@@ -73,9 +79,11 @@ def rules_of_page() -> dict[str, Any]:
         "times": TIMES,
         "fractions": FRACTION.units,
         "pulses": {"units": PULSES, "neutral": NEUTRAL, "span": SPAN, "none": NO_OUTPUT},
+        "forces": [unit for unit in COMMANDS if unit not in PULSES],
         "renamed": WELL_KNOWN,
         "slips": SLIPS,
         "mostUnordered": _MOST_UNORDERED,
+        "late": LATE,
         "leastAfter": LEAST_AFTER,
         "again": AGAIN,
         "leastSamples": LEAST_SAMPLES,
@@ -102,26 +110,41 @@ def read_table(
     `open_stream` opens its lines. A part of a dive may have only commands or only motion.
     """
     known = columns_of_log(layout, axis, names.keys)
+    flags = flag_columns(read_header(path, open_stream), known, names)
+    known |= dict.fromkeys(flags, LogColumn(FLAG))
     check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
         path,
         known_columns(known),
         others=True,
         loose=True,
-        renamed=names.columns,
+        renamed={**names.columns, **{title: f"{name} [1]" for name, title in flags.items()}},
         hint=RENAMING,
         check_header=check,
         open_stream=open_stream,
     )
+    table = replace(table, headers={**table.headers, **flags})
     commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
+    pulses = _pulses(table, commanding)
+    unstated = [name for name in pulses if table.units[name] in PULSES] if names.keys.neutral is None else []
+    rests, told = at_rest(path.name, {name: pulses[name] for name in unstated})
+    if rests:
+        stated = {table.headers[name]: f"[us {rest:g} {names.keys.span or SPAN:g}]" for name, rest in rests.items()}
+        titles = {title: names.columns.get(title, title) for title in table.header}
+        renamed = {title: meant.partition("[")[0] + stated[meant] for title, meant in titles.items() if meant in stated}
+        names = replace(names, columns={**names.columns, **renamed})
+        content, entries = read_table(path, layout, axis, names, open_stream, is_part=is_part)
+        content.findings += told
+        return content, entries
     values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
     content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
-    _tell_cells(content, table, commanding)
+    _tell_cells(content, table, pulses, names.keys.neutral)
+    content.findings += told
     _tell_headers(content, table, known)
     content.findings += _without_thruster(table, layout)
     if unlikely:
@@ -201,47 +224,76 @@ def _no_axis_in_name(path: Path, layout: Layout) -> str:
 
 
 def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], commanding: Sequence[str]) -> None:
-    """Add the rows with a time and commands between the restarts of the clock, and what was left out or sorted.
+    """Add the rows with a time between the restarts of the clock, and what was left out or sorted. Raises
+    DataFileError.
 
-    Raises DataFileError.
+    A row without a command keeps its measurements: in many tables, each message has a row of its own. Rows before the
+    first command are only counted, because nothing is learnt from them.
     """
     timed = np.isfinite(columns["time"])
-    rows = np.flatnonzero(np.all([np.isfinite(columns[name]) for name in ("time", *commanding)], axis=0))
-    if not rows.size:
+    told = np.any([np.isfinite(columns[name]) for name in commanding or ["time"]], axis=0) & timed
+    if not told.any():
         what = "both a time and a command" if commanding else "a time"
         for name in (name for name in ("time", *commanding) if table.unread[name]):
             reason = f"is no {'time' if name == 'time' else 'number'}, and no row has {what}"
             raise table.error(table.unread[name][0], name, reason)
         raise DataFileError(f"{table.path}: no row has {what}")
-    late: list[int] = []
+    rows = np.flatnonzero(timed)
+    starts, late = _order(columns, rows)
+    if len(late) > _MOST_UNORDERED * rows.size:
+        reason = "the time goes back and does not return. Are there two logs in one file?"
+        raise table.error(int(late[0]), "time", reason)
     merged, since = rows.size, 0.0
-    for own in np.split(rows, restart_rows(columns["time"][rows])):
+    for own in np.split(rows, starts):
         times = columns["time"][own]
-        late += own[times < np.maximum.accumulate(times)].tolist()
         # One column after the other, because a log may be as large as the memory allows.
         fields = {table.headers[name]: ascending(times, values[own])[1] for name, values in columns.items()}
         time = fields.pop(table.headers["time"])
         content.pieces.append(Piece([Topic(Source(""), time, fields)], since=since))
         merged -= len(time)
         since += float(time[-1] - time[0])
-    if len(late) > _MOST_UNORDERED * rows.size:
-        reason = "the time goes back and does not return. Are there two logs in one file?"
-        raise table.error(late[0], "time", reason)
     content.count("rows sorted", len(late))
     content.count("time stamps merged", merged)
     content.count("rows without time", int((~timed).sum()))
-    content.count("rows without command", int(timed.sum()) - rows.size)
+    content.count("rows before commands", int((columns["time"][rows] < columns["time"][told].min()).sum()))
 
 
-def _tell_cells(content: Content, table: Columns, commanding: Sequence[str]) -> None:
-    """Add what the cells tell: too many in a row, no numbers, and no pulses."""
+def _order(columns: Mapping[str, Array], rows: NDArray[np.intp]) -> tuple[list[int], NDArray[np.intp]]:
+    """Return the places in `rows` at which the clock restarts, and the rows that only are out of order.
+
+    Both show in the times at which a column has numbers. Tables of several sensors may stand one after the other in a
+    file: each begins with an earlier time than that at which the one before it ended.
+    """
+    time, late, is_restarted = columns["time"], [rows[:0]], False
+    there = {name: np.isfinite(values[rows]) for name, values in columns.items() if name != "time"}
+    for known in {mask.tobytes(): mask for mask in there.values()}.values():
+        own = rows[known]
+        places = restart_rows(time[own])
+        is_restarted |= bool(places)
+        late += [part[time[part] < np.maximum.accumulate(time[part])] for part in np.split(own, places) if len(part)]
+    return restart_rows(time[rows]) if is_restarted else [], np.unique(np.concatenate(late))
+
+
+def _tell_cells(content: Content, table: Columns, pulses: Mapping[str, Array], neutral: float | None) -> None:
+    """Add what the cells tell: too many in a row, no numbers, and no pulses. `neutral` is that of rov.toml, µs."""
     content.count("torn rows", table.torn)
     for name, rows in table.unread.items():
-        if name not in ("time", *commanding):
+        if name != "time":
             content.count("unread cells", len(rows), column=table.headers[name])
-    for name in (name for name in commanding if table.units[name] in PULSES):
-        count = sum(bool(text) and float(text) in NO_OUTPUT for (text,) in table.texts(name))
-        content.count("no pulse", count, column=table.headers[name])
+    for name, values in pulses.items():
+        is_none = np.isin(values, NO_OUTPUT) & (np.frombuffer(table.values[name]) == 0.0)
+        _, *numbers = table.units[name].split()
+        is_none &= values != (float(numbers[0]) if numbers else neutral)
+        content.count("no pulse", int(is_none.sum()), column=table.headers[name])
+
+
+def _pulses(table: Columns, commanding: Sequence[str]) -> dict[str, Array]:
+    """Return the pulses of each column that has pulses, as they stand in the file, µs; NaN for blank cells."""
+    names = [name for name in commanding if table.units[name].split()[0] in PULSES]
+    rows = np.fromiter(
+        (float(text or "nan") for texts in (table.texts(*names) if names else ()) for text in texts), float
+    )
+    return dict(zip(names, rows.reshape(-1, max(len(names), 1)).T, strict=False))
 
 
 def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.io.csv_table import DataFileError, KnownColumns, read_columns
+from rov_fmu.io.csv_table import BEYOND, DataFileError, KnownColumns, read_columns
 from rov_fmu.io.messages import MOST
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
 
@@ -36,8 +36,8 @@ def read_rows(
     numbers = [*zip(table.lines, table.values["command"], table.values[name], strict=True)]
     mistakes = []
     for n, (_, command, value) in enumerate(numbers):
-        if abs(command) > 1.0:  # a pulse
-            mistakes.append(table.error(n, "command", "is beyond full thrust; [us NEUTRAL SPAN] states another range"))
+        if abs(command) > 1.0:  # a pulse or a force
+            mistakes.append(table.error(n, "command", BEYOND))
         elif kind != "thrust" and command == 0.0:
             mistakes.append(table.error(n, "command", "must not be 0, because nothing moves then"))
         elif reason := _impossible(kind, command, value, noise):

@@ -25,6 +25,7 @@ PX4 = PX4.format("output[0]=1500,1600 output[1]=1500,1700")
 SERVO1 = "MOT_1_DIRECTION=1 SERVO1_MIN=1000 SERVO1_TRIM=1480 SERVO1_MAX=2000"
 TWO = f"{SERVOS} 1 . servo1_raw=1500,1700 servo2_raw=1500,1400"
 ONE = f"{SERVOS} 1 . servo1_raw=1720,1240"
+IDLE = f"{SERVOS} 1 . servo2_raw={{0}},{{0}},{{0}},{{0}} servo3_raw={{0}},{{0}},{{0}},{{0}} servo1_raw="
 VEHICLES = f"/rov_a/cmd {ARRAY} rov_a . data[0]=0,1; /rov_b/cmd {ARRAY} rov_b . data[0]=0,-1"
 COMMANDS: dict[str, tuple[str, str, str, str]] = {
     "of two rules the first": (
@@ -53,8 +54,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         VEHICLES,
         "a",
         "",
-        "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; [logs] of rov.toml can "
-        "name another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
+        "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; `vehicle` in "
+        "[logs] of rov.toml names another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
     ),
     "a named vehicle": (VEHICLES, "a", "vehicle=rov_b", "/rov_b/cmd: a 0 -1: | rov_b is used"),
     "an unknown vehicle": (
@@ -104,6 +105,62 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         "-0.55 0.65: ('log: parameters of the autopilot reverse the thrusters a',)",
     ),
     "reversed twice": (ONE, "a", "MOT_1_DIRECTION=-1 SERVO1_REVERSED=1", "0.55 -0.65: ()"),
+    "outputs that rest elsewhere": (
+        IDLE.format(1530) + "1530,1530,1730,1330",
+        "a",
+        "",
+        "a 0 0 0.5 -0.5: | no thrust is 1530 us, because the outputs rest there and never at 1500 us. If that is wrong, "
+        "write neutral = 1500 into [logs] of rov.toml | full thrust is 1130 and 1930 us, and no thrust 1530 us",
+    ),
+    "the range of the motors about outputs that rest elsewhere": (
+        IDLE.format(1470) + "1470,1470,1720,1220",
+        "a b c",
+        "MOT_PWM_MIN=1000 MOT_PWM_MAX=2000",
+        "a 0 0 0.5 -0.5, b 0 0 0 0, c 0 0 0 0: | full thrust is 970 and 1970 us, and no thrust 1470 us",
+    ),
+    "the range of servos whose trim is where they rest": (
+        IDLE.format(1500) + "1470,1470,1685,1285",
+        "a",
+        "MOT_PWM_MIN=1000 MOT_PWM_MAX=2000 SERVO1_TRIM=1470 SERVO1_MIN=1100 SERVO1_MAX=1900",
+        "a 0 0 0.5 -0.5: | full thrust is 1100 and 1900 us, and no thrust 1470 us",
+    ),
+    "each output rests at its own pulse": (
+        IDLE.format(1470) + "1530,1530,1730,1630",
+        "a b c",
+        "",
+        "a 0 0 0.5 0.25, b 0 0 0 0, c 0 0 0 0: | no thrust is 1470 and 1530 us",
+    ),
+    "an output that works all the time has the neutral pulse of those that rest": (
+        IDLE.format(1530) + "1640,1650,1660,1420 servo4_raw=1530,1530,1530,1530",
+        "a b c d",
+        "",
+        "a 0.275 0.3 0.325 -0.275, b 0 0 0 0, c 0 0 0 0, d 0 0 0 0",
+    ),
+    "outputs that rest at 1500 us": (
+        IDLE.format(1500) + "1530,1530,1730,1330",
+        "a b c",
+        "SERVO2_TRIM=1530 MOT_PWM_MIN=1100 MOT_PWM_MAX=1900",
+        "a 0.075 0.075 0.575 -0.425, b 0 0 0 0, c 0 0 0 0: ('log: the log does not tell the directions of the motors",
+    ),
+    "the trim at which an output rests": (
+        IDLE.format(1500) + "1530,1530,1730,1330",
+        "a b c",
+        "SERVO1_TRIM=1530",
+        "a 0 0 0.5 -0.5, b 0 0 0 0, c 0 0 0 0: | no thrust is 1530 us",
+    ),
+    "a stated neutral pulse": (
+        IDLE.format(1530) + "1530,1530,1730,1330",
+        "a",
+        "neutral=1500",
+        "0.075 0.075 0.575 -0.425",
+    ),
+    "one thruster that may rest": (
+        f"{SERVOS} 1 . servo1_raw=1540,1540,1640,1740",
+        "a",
+        "",
+        "a 0.1 0.1 0.35 0.6: | no output ever rests at 1500 us, which is taken as no thrust, and most stay at 1540 us. If "
+        "that is no thrust, write neutral = 1540 into [logs] of rov.toml",
+    ),
     "neutral alone": (ONE, "a", f"neutral=1520 {SERVO1}", "0.5 -0.7"),
     "span alone": (ONE, "a", f"span=200 {SERVO1}", "1.1 -1.3"),
     "pulses": (f"/cmd {ARRAY} . . data[0]=800,2200,65535,0", "a", "", "-1.75 1.75 0 0"),

@@ -1,0 +1,209 @@
+"""Numbers of a log that are no measurements: those that a flag says are invalid, and marks such as -32.768 or -9999.
+
+A column or field whose name has the word `valid` is a flag: of the quantities that its other words mean (`dvl_valid` of
+the velocities, `depth_valid` of the depth), or, without other words, of all in the same message or row. The table
+[valid] of rov.toml names others.
+
+A mark is known by what it is to the other numbers, and no list of marks is needed: it repeats exactly, and lies farther
+from all others than these lie from each other, so that a vehicle would have to jump there and back between two samples.
+The numbers of a sensor that saturates, rests or wraps are near others. A velocity of 0 is never a mark.
+
+Both rules apply to the numbers as they stand in the log, before a vector is rotated into another frame.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rov_fmu.io.csv_table import Column, KnownColumns
+from rov_fmu.io.messages import listed
+from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.catalogue import FLAGS, MESSAGES, QUANTITIES, QUATERNION, VECTORS, Quantity, words_of
+from rov_fmu.tank.channels import Topic
+from rov_fmu.tank.clocks import held
+from rov_fmu.tank.columns import Entry, LogColumn, Names, in_degrees, known_columns
+from rov_fmu.tank.findings import Finding, about
+
+_OUTERMOST, _LEAST_OTHERS = 2, 10
+"""The largest number of marks on each side of the measurements that are found at once, and the least number of other
+values whose range is known well."""
+_FAR, _FAR_VELOCITY, _FAR_ONCE, _FAR_VELOCITY_ONCE = 1.0, 3.0, 10.0, 100.0
+"""A mark is farther from all others than this many times their range. A velocity may change quickly. A number that
+occurs only once may be a short motion, or an outlier, which the fit can bear."""
+_FAR_FROM_FEW = 100.0
+"""A mark among few other values is farther from them than this many times their range and their size."""
+_TURN = 2.1 * pi
+"""The largest range of an angle that wraps, rad."""
+_GAP_INTERVALS = 10.0
+"""Between samples that are farther apart than this many usual intervals, a vehicle may move."""
+_TRUE, _FALSE = ("true", "t", "yes", "valid", "ok", "a"), ("false", "f", "no", "invalid", "v")
+
+
+def truth(text: str) -> float:
+    """Return 1 or 0 for the text of a flag, such as `true`, or NMEA's `V`. Raises ValueError."""
+    return float((*_FALSE, *_TRUE).index(text.casefold()) >= len(_FALSE))
+
+
+FLAG = Column({"1": 1.0}, optional=True, blanks=True, parse=truth)
+"""The column of a flag of validity."""
+
+
+def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> dict[str, bool]:
+    """Return the quantities of which a column or field is a flag, with the value of the flag where they are valid.
+
+    `place` is the place in a message, whose topic does not tell what the flag is about. `valid` is the table [valid] of
+    rov.toml, where a minus before the name of a quantity means that a true flag marks what is invalid.
+    """
+    if name in valid:
+        return {quantity.removeprefix("-"): not quantity.startswith("-") for quantity in valid[name]}
+    words = words_of(re.split(r"[\[(]", place or name)[0])
+    if not words & {"valid", "validity", "invalid"}:
+        return {}
+    others = words - {"valid", "validity", "invalid", "is", "flag", "data", "measurement"}
+    named = {quantity for quantity in QUANTITIES if {*quantity.split()} <= others}
+    meant = named or {quantity for pattern, of in FLAGS for quantity in of if re.search(pattern, " ".join(others))}
+    return dict.fromkeys(meant if others else QUANTITIES, "invalid" not in words)
+
+
+def flag_columns(titles: Iterable[str], known: Mapping[str, LogColumn], names: Names) -> dict[str, str]:
+    """Return the headers of a table that are flags of validity, by the names under which they are read."""
+    is_column = KnownColumns(known_columns(known)).has
+    found = [
+        title for title in titles if flag_of(title, names.valid) and not is_column(names.columns.get(title, title))
+    ]
+    return {f"flag {n}": title for n, title in enumerate(dict.fromkeys(found))}
+
+
+@dataclass(frozen=True)
+class _Flag:
+    """A flag of validity: n times, s, and whether the quantities are valid from then on."""
+
+    name: str
+    topic: Topic | None
+    """The topic that it concerns, if its name tells what it is about; None for one of rov.toml."""
+    quantities: Mapping[str, bool]
+    time: Array
+    is_true: Flags
+
+
+def measured_only(
+    file: str, topics: Sequence[Topic], entries: Mapping[str, Entry], valid: Mapping[str, Sequence[str]]
+) -> tuple[list[Topic], list[Finding]]:
+    """Return the topics with NaN in place of numbers that are no measurements, and findings about these.
+
+    `entries` are the meanings of fields beside those of the catalogue.
+    """
+    flags = [*_flags(topics, valid)]
+    left: dict[tuple[str, str], dict[str, int]] = {}
+
+    def without(values: Array, gone: Flags, kind: str, what: str, column: str) -> Array:
+        gone &= np.isfinite(values)
+        if gone.any():
+            left.setdefault((kind, what), {})[column] = int(gone.sum())
+        return np.where(gone, np.nan, values)
+
+    kept = []
+    for topic in topics:
+        fields = dict(topic.fields)
+        for place, (quantities, convert) in _measured(topic, entries).items():
+            column = topic.full_name(place)
+            for flag in flags:
+                for is_valid in {state for name, state in flag.quantities.items() if name in quantities}:
+                    if flag.topic in (None, topic):
+                        gone = held(flag.time, flag.is_true, topic.time) != is_valid
+                        fields[place] = without(fields[place], gone, "invalid", flag.name, column)
+            in_si = convert(fields[place])
+            for mark in marks(topic.time, in_si, QUANTITIES[quantities[0]]):
+                factor, unit = in_degrees(QUANTITIES[quantities[0]].unit)
+                fields[place] = without(fields[place], in_si == mark, "mark", f"{factor * mark:.6g} {unit}", column)
+        kept.append(replace(topic, fields=fields))
+    findings = [
+        about(file, kind, what=what, columns=listed(counts), count=sum(counts.values()))
+        for (kind, what), counts in left.items()
+    ]
+    return kept, findings
+
+
+def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, tuple[Sequence[str], Callable[[Array], Array]]]:
+    """Return the quantities that each field of a topic tells, and the conversion of its numbers to SI units.
+
+    Components of quaternions have no marks.
+    """
+    found: dict[str, tuple[Sequence[str], Callable[[Array], Array]]] = {}
+    name, kind = topic.source.topic, topic.source.kind
+    for message in reversed(MESSAGES):
+        is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
+        if is_meant and {*message.fields} <= topic.fields.keys() and message.gives != QUATERNION:
+            what = VECTORS.get(message.gives, (message.gives,)), partial(np.multiply, message.factor)
+            found |= dict.fromkeys(message.fields, what)
+    for place in topic.fields:
+        if (entry := entries.get(topic.full_name(place))) and (quantity := entry.quantity):
+            convert = entry.convert
+            found[place] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
+    return found
+
+
+def _flags(topics: Sequence[Topic], valid: Mapping[str, Sequence[str]]) -> Iterator[_Flag]:
+    """Yield the flags in topics. One whose name tells what it is about is of the same message or row."""
+    for topic in topics:
+        for place, values in topic.fields.items():
+            name, known = topic.full_name(place), np.isfinite(values)
+            quantities = flag_of(name, valid, place)
+            if quantities and known.any():
+                own = None if name in valid else topic
+                yield _Flag(name, own, quantities, topic.time[known], values[known] > 0.0)
+
+
+# ---- Marks -----------------------------------------------------------------------------------------------------------
+
+
+def marks(time: Array, values: Array, quantity: Quantity) -> list[float]:
+    """Return the numbers that mark that nothing was measured, of values in SI units."""
+    known = np.isfinite(values)
+    time, values = time[known], values[known]
+    levels, counts = np.unique(values, return_counts=True)
+    found: list[float] = []
+    while marked := next((own for own in _far(levels, counts, quantity) if _jumps(time, values, levels[own])), None):
+        found += levels[marked].tolist()
+        levels, counts = np.delete(levels, marked), np.delete(counts, marked)
+    return found
+
+
+def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterator[slice]:
+    """Yield the places of the outermost levels, of some in ascending order, that are far from all others.
+
+    The range of the others is that without the outermost ones on both sides, because there may be marks on both.
+    """
+    is_velocity = quantity.is_velocity
+    for number in range(1, _OUTERMOST + 1):
+        for own in (slice(None, number), slice(-number, None)):
+            outer, others = levels[own], np.delete(levels, own)
+            if not len(others) or (is_velocity and 0.0 in outer):
+                continue
+            distance = float(max(others[0] - outer[-1], outer[0] - others[-1]))
+            body = levels[_OUTERMOST:-_OUTERMOST] if len(levels) >= 2 * _OUTERMOST + _LEAST_OTHERS else others
+            size = float(np.ptp(body))
+            is_once = counts[own].min() < 2
+            factor = (
+                (_FAR_VELOCITY_ONCE if is_once else _FAR_VELOCITY) if is_velocity else _FAR_ONCE if is_once else _FAR
+            )
+            if quantity.wraps and size < _TURN:
+                if np.ptp(levels) < _TURN:
+                    continue  # on a circle, it is near
+                factor, size = 1.0, 0.5 * _TURN
+            elif len(body) < _LEAST_OTHERS:
+                factor, size = _FAR_FROM_FEW, max(size, float(np.abs(body).max()))
+            if size > 0.0 and distance > factor * size:
+                yield own
+
+
+def _jumps(time: Array, values: Array, levels: Array) -> bool:
+    """Return True if a sensor reaches or leaves each level between two samples without a gap between them."""
+    intervals = np.diff(time)
+    is_soon = intervals <= _GAP_INTERVALS * np.median(intervals)
+    return all((is_soon & (np.diff((values == level).astype(int)) != 0)).any() for level in levels)
