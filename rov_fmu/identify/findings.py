@@ -150,6 +150,7 @@ _FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "
 _READ: dict[Heading, frozenset[str]] = {
     "Doubts": frozenset(
         {
+            "grown rows",
             "too few samples",
             "time of arrival",
             "other clock",
@@ -163,6 +164,8 @@ _READ: dict[Heading, frozenset[str]] = {
         {
             "wrench",
             "source of wrench",
+            "code page",
+            "lines before header",
             "rows sorted",
             "time stamps merged",
             "rows without time",

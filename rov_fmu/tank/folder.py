@@ -96,7 +96,8 @@ class Folder:
             self.files.setdefault((kind, subject), []).append(path.name)
             axis = AXES.get(subject)
             if kind != "log":
-                rows, known = read_rows(path, kind, axis, self.names.columns)
+                rows, known, told = read_rows(path, kind, axis, self.names.columns)
+                self.findings += told
                 self.rows.setdefault((kind, subject), []).extend(rows)
                 self.known |= known
             elif layout := self.layout if axis else self.logged:

@@ -127,14 +127,14 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
     unread = {title: what for title, what in ranges.items() if not is_column(columns.get(title, title))}
     if len(ranges) - len(unread) < len(of_table):
         return Inspection(path, path.name, (), (), unread, (), columns)
-    rows, _ = read_rows(path, kind, axis, columns)
+    rows, _, told = read_rows(path, kind, axis, columns)
     numbers = zip(*((row.command, row.value) for row in rows), strict=True)
     no_times = np.full(len(rows), nan)
     channels = (
         _row(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
         for (name, column), own in zip(of_table.items(), numbers, strict=True)
     )
-    return Inspection(path, path.name, (), tuple(channels), unread, (), columns)
+    return Inspection(path, path.name, (), tuple(channels), unread, tuple(told), columns)
 
 
 def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection | None:
@@ -143,7 +143,9 @@ def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[st
         with suppress(DataFileError):
             if (found := _of_table(path, kind, renamed, ranges)).channels:
                 name = f"{kind}_<{'curve' if kind == 'thrust' else 'axis'}>{path.suffix}"
-                return replace(found, findings=(about(path.name, "unnamed table", measured=measured, name=name),))
+                return replace(
+                    found, findings=(*found.findings, about(path.name, "unnamed table", measured=measured, name=name))
+                )
     return None
 
 

@@ -115,7 +115,8 @@ def read_table(
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
-    content = Content(path.name, [], names=frozenset(table.header))
+    told = [about(path.name, kind, **words) for kind, words in table.assumed.items()]
+    content = Content(path.name, [], told, names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, commanding)
     _tell_headers(content, table, known)
