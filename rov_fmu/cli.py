@@ -742,6 +742,8 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
         print_inspection(inspection)
     for line in inspected.warnings:
         _warn(line)
+    for line in inspected.notes:
+        paragraph(console(), f"{line}.")
     command = shell_words("rov-fmu", "identify", draft.parent)
     if draft.exists():
         paragraph(console(), f"There is a {draft} already, so no draft was written.")

@@ -16,7 +16,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Se
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from io import BytesIO, TextIOWrapper
+from io import BytesIO, StringIO, TextIOWrapper
 from itertools import islice, pairwise, zip_longest
 from math import isfinite, isnan, nan
 from pathlib import Path
@@ -39,6 +39,8 @@ UTF_16_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
 _CODE_PAGE = "cp1252"
 _MOST_BEFORE = 100
 """The number of lines in which the header is looked for."""
+_START = 100_000
+"""The number of bytes at the beginning of a text that tell whether it is a table."""
 _COMPARED_ROWS = 50
 """The number of rows before and after an insertion of columns that tell its place."""
 _FEWEST, _MOST_ODD, _MOST_MISFITS = 3, 0.05, 0.25
@@ -341,9 +343,12 @@ def _stream(content: bytes, encoding: str) -> TextIO:
     return TextIOWrapper(BytesIO(content), encoding)
 
 
-def has_rows(open_stream: Callable[[], TextIO]) -> bool:
-    """Return True if a text looks like a table: a row of numbers follows a header with as many columns."""
-    return _dialect(open_stream()).has_rows
+def looks_like_table(path: Path) -> bool:
+    """Return True if a text has a row of numbers below a header with as many columns. Only its beginning is read."""
+    with path.open("rb") as file:
+        start = file.read(_START)
+    encoding = "utf-16" if start.startswith(UTF_16_MARKS) else "utf-8-sig"
+    return _dialect(StringIO(start.decode(encoding, "replace"))).has_rows
 
 
 @dataclass(frozen=True)
@@ -403,7 +408,9 @@ def _dialect(lines: Iterable[str]) -> _Dialect:
 
 def _cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without empty ones at its end."""
-    cells = [_with_point(cell, separator) for cell in next(csv.reader([line], delimiter=separator), [])]
+    cells = []
+    with suppress(csv.Error):  # the line is no CSV, and reading it will say so
+        cells = [_with_point(cell, separator) for cell in next(csv.reader([line], delimiter=separator), [])]
     while cells and not cells[-1]:
         cells.pop()
     return cells
@@ -494,9 +501,9 @@ class _CsvFile:
             for row in reader:
                 cells = [_with_point(cell, separator) for cell in row]
                 if any(cells):
-                    if is_header:
+                    if is_header and self._dialect.has_rows:
                         cells[0] = cells[0].lstrip(_COMMENT).strip() or cells[0]
-                        is_header = False
+                    is_header = False
                     yield before + reader.line_num, cells
         except csv.Error as error:
             raise DataFileError(f"{self.path}, line {before + reader.line_num}: not CSV: {error}") from error

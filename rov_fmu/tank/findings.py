@@ -93,6 +93,7 @@ SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
     "unnamed table": "{files}: a table with the {measured} at each command: name it {name}",
+    "other files": "{files}: not read, because {reason}",
     # The form of a table
     "code page": "{files}: it is not in UTF-8, so it is read in code page 1252 of Windows",
     "lines before header": "{files}: {count:#line} before the header not read",
