@@ -243,12 +243,14 @@ class Folder:
             raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
 
 
-def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> Folder:
+def read_folder(
+    folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None, base: Path | None = None
+) -> Folder:
     """Read a folder. Raises DataFileError or VehicleFileError if it cannot be read at all.
 
-    `check_inputs` is called with every file that is read, before any test is read.
+    `check_inputs` is called with every file that is read, before any test is read. `base` replaces that of rov.toml.
     """
-    rov_file = _read_description(folder)
+    rov_file = _read_description(folder, base)
     found = Folder(folder, rov_file, rov_file_mistakes=[*rov_file.mistakes])
     mistakes, tables, dives = found.rov_file_mistakes, rov_file.tables, rov_file.tables.dives
     found.names, wrong_names = names_of(found.layout, tables)
@@ -277,14 +279,14 @@ def unreadable(path: Path, error: FileError) -> Finding:
     return about(path.name, "unreadable file", reason=first.removeprefix(str(path)).lstrip(":, "))
 
 
-def _read_description(folder: Path) -> RovFile:
+def _read_description(folder: Path, base: Path | None) -> RovFile:
     """Read rov.toml, and explain its purpose where there is none beside tests."""
     if not folder.is_dir():
         what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
         raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
     path = folder / ROV_FILE
     try:
-        return read_description(path)
+        return read_description(path, base)
     except VehicleFileError:
         if path.exists():
             raise
