@@ -28,7 +28,7 @@ from rov_fmu.io.reading import read_bytes
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 """A number as a cell has it, with a decimal point."""
-_VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{4}}-[0-9]{{2}}-[0-9]{{2}}.*|[0-9]+:[0-9]{{2}}.*")
+VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{4}}-[0-9]{{2}}-[0-9]{{2}}.*|[0-9]+:[0-9]{{2}}.*")
 """A cell of a row: a number, a date or a time of day."""
 _HEADER = re.compile(r"(?P<name>[^\[\]]+)\[(?P<unit>[^\[\]]+)\]")
 _SEPARATORS, _COMMENT = ",;\t", "#"
@@ -37,7 +37,7 @@ _GIVEN_SEPARATOR = re.compile(rf'"?sep=([{_SEPARATORS}])"?', re.IGNORECASE)
 UTF_16_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
 """The first bytes of a text in UTF-16."""
 _CODE_PAGE = "cp1252"
-_MOST_BEFORE = 100
+MOST_BEFORE = 100
 """The number of lines in which the header is looked for."""
 _START = 100_000
 """The number of bytes at the beginning of a text that tell whether it is a table."""
@@ -385,7 +385,7 @@ def _dialect(lines: Iterable[str]) -> _Dialect:
     given = ""
     first = None
     headers: list[_Dialect] = []
-    for number, line in enumerate(islice(lines, _MOST_BEFORE)):
+    for number, line in enumerate(islice(lines, MOST_BEFORE)):
         if not first and (mark := _GIVEN_SEPARATOR.fullmatch(line.strip(" \r\n"))):
             given = mark[1]
             continue
@@ -401,7 +401,7 @@ def _dialect(lines: Iterable[str]) -> _Dialect:
                     return replace(header, has_rows=len(header.titles) > 1)
             if len(cells) > 1 and _is_row(cells):
                 break
-        if not any(map(_VALUE.fullmatch, cells)):
+        if not any(map(VALUE.fullmatch, cells)):
             headers.append(own)
     return first or _Dialect()
 
@@ -429,7 +429,7 @@ def _with_point(text: str, separator: str) -> str:
 def _is_row(cells: Iterable[str]) -> bool:
     """Return True if most of the cells that are not blank are numbers or times."""
     filled = [cell for cell in cells if not _is_missing(cell)]
-    return 2 * sum(bool(_VALUE.fullmatch(cell)) for cell in filled) > len(filled)
+    return 2 * sum(bool(VALUE.fullmatch(cell)) for cell in filled) > len(filled)
 
 
 def _is_missing(cell: str) -> bool:

@@ -1,12 +1,13 @@
 """The files of a folder: which are logs and tables, by their content, and why the others are not read."""
 
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError, looks_like_table
-from rov_fmu.io.file_kinds import LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
+from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.readers.other_files import EMPTY, IN_FOLDER, NO_FILE, NO_TABLE, PICTURE
@@ -71,6 +72,9 @@ def has_usual_suffix(path: Path) -> bool:
 
 
 def _is_of_program(path: Path) -> bool:
+    if path.suffix.lower() == ".mcap" and path.is_file():
+        with suppress(OSError), path.open("rb") as file:
+            return IDENTIFIED.encode() in file.read(64)
     return path.name.startswith(".") or path.name == BAG or path.suffix.lower() in OWN_SUFFIXES
 
 

@@ -17,11 +17,13 @@ import numpy as np
 from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
+    MOST_BEFORE,
     NEUTRAL,
     NO_OUTPUT,
     NUMBER,
     PULSES,
     SPAN,
+    VALUE,
     Columns,
     DataFileError,
     read_columns,
@@ -66,6 +68,8 @@ def rules_of_page() -> dict[str, Any]:
     """Return the rules by which recording.js, of the page that flies, reads tables as `read_table` does."""
     return {
         "number": NUMBER.pattern,
+        "value": VALUE.pattern,
+        "mostBefore": MOST_BEFORE,
         "times": TIMES,
         "fractions": FRACTION.units,
         "pulses": {"units": PULSES, "neutral": NEUTRAL, "span": SPAN, "none": NO_OUTPUT},
