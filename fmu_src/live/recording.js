@@ -181,7 +181,8 @@ function reasonAgainst(known, { pressures: { atmosphere, gradient, hull, least }
 /** Returns the text of a file. It must equal what `open_text` of rov_fmu/io/csv_table.py reads. @param {ArrayBuffer} content */
 function textOf(content) {
   const mark = new DataView(content).byteLength > 1 ? new DataView(content).getUint16(0) : 0;
-  if (mark === 0xfffe || mark === 0xfeff) return new TextDecoder(mark === 0xfffe ? "utf-16le" : "utf-16be").decode(content);
+  if (mark === 0xfffe || mark === 0xfeff)
+    return new TextDecoder(mark === 0xfffe ? "utf-16le" : "utf-16be").decode(content);
   try {
     return new TextDecoder("utf-8", { fatal: true }).decode(content);
   } catch {
@@ -210,7 +211,8 @@ function headerOf(lines, rules) {
     if (!line.startsWith("#")) {
       const above = [...candidates.filter(hasUnit), ...candidates.filter((one) => !hasUnit(one))];
       const header = above.find((one) => isAbove(one, line, value));
-      if (header) return { ...header, headers: header.headers.map((cell, n) => (n ? cell : cell.replace(/^#+ */, ""))) };
+      if (header)
+        return { ...header, headers: header.headers.map((cell, n) => (n ? cell : cell.replace(/^#+ */, ""))) };
       if (own.headers.length > 1 && isRow(own.headers, value)) break;
     }
     if (!own.headers.some((cell) => value.test(cell))) candidates.push(own);
