@@ -35,7 +35,7 @@ from rov_fmu.io.messages import (
 )
 from rov_fmu.io.output import check_targets, write_whole
 from rov_fmu.process import exit_code
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
 if TYPE_CHECKING:
     from rov_fmu.build import Built
@@ -78,6 +78,12 @@ def _complete_vehicle(_: click.Context, __: click.Parameter, incomplete: str) ->
 _vehicle = partial(
     click.argument, "vehicle", callback=lambda _, __, given: find_vehicle(given), shell_complete=_complete_vehicle
 )
+
+
+def _find_given(_: click.Context, __: click.Parameter, given: str | None) -> Path | None:
+    """Return the vehicle file of an option, if it is given."""
+    return None if given is None else find_vehicle(given)
+
 
 _vehicle_or_videoray = partial(_vehicle, default=str(VIDEORAY))
 
@@ -353,7 +359,7 @@ def _warn(message: str) -> None:
 @_vehicle_or_videoray()
 @click.option(
     "--against",
-    callback=lambda _, __, given: given and find_vehicle(given),
+    callback=_find_given,
     metavar="OTHER.toml",
     help=("Another vehicle, which is shown as a ghost and gets the same commands."),
     shell_complete=_complete_vehicle,
@@ -672,6 +678,13 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     metavar="LOGS.mcap",
     help="File to write for Foxglove and PlotJuggler: commands, measurements, predictions, bands, unknown forces.",
 )
+@click.option(
+    "--base",
+    callback=_find_given,
+    metavar="VEHICLE",
+    help="Vehicle to begin from, in place of the `base` of rov.toml: a vehicle file anywhere, or one that ships.",
+    shell_complete=_complete_vehicle,
+)
 @click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
 @click.option(
     "--inspect",
@@ -691,6 +704,7 @@ def _identify(
     output: Path | None,
     report: Path | None,
     mcap: Path | None,
+    base: Path | None,
     force: bool,
     inspects: bool,
     drafts: bool,
@@ -707,21 +721,24 @@ def _identify(
     from rov_fmu.report.progress import parts
 
     writes = output or report or mcap or force
-    if (inspects or drafts) and writes:
+    if (inspects or drafts) and (writes or base):
         option = "--draft" if drafts else "--inspect"
         raise click.UsageError(
-            f"identify: {option} writes only a draft of rov.toml: leave -o, --report, --mcap, --force out"
+            f"identify: {option} writes only a draft of rov.toml: leave -o, --report, --mcap, --base, --force out"
         )
     if inspects or drafts or (not writes and lacks_description(folder)):
         _inspect(folder, inspects=inspects, drafts=drafts)
         return
     with parts() as shown:
-        identification, replaced = identify_folder(folder, output, report, mcap, force=force, begin=shown.begin)
+        identification, replaced = identify_folder(
+            folder, output, report, mcap, base=base, force=force, begin=shown.begin
+        )
     for line in replaced:
         paragraph(console(), line)
     print_identification(identification)
     name = identification.vehicle.identifier
-    whole = "identify", folder, "-o", f"{name}.toml", "--report", report or f"{name}.html"
+    given = ["--base", shipped_name(base) or base] if base else []
+    whole = "identify", folder, *given, "-o", f"{name}.toml", "--report", report or f"{name}.html"
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
     if by_heading(identification.findings)["Warnings"]:
         following = f"check the warnings, then {following}"
@@ -742,6 +759,8 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
         print_inspection(inspection)
     for line in inspected.warnings:
         _warn(line)
+    for line in inspected.notes:
+        paragraph(console(), f"{line}.")
     command = shell_words("rov-fmu", "identify", draft.parent)
     if draft.exists():
         paragraph(console(), f"There is a {draft} already, so no draft was written.")

@@ -428,7 +428,7 @@ class Live {
   async open(file) {
     try {
       if (file.size > MOST_BYTES) throw new Unreadable(`it is larger than ${MOST_BYTES / 1e6} MB`);
-      const recording = readRecording(await file.text(), file.name, this.vehicle);
+      const recording = readRecording(textOf(await file.arrayBuffer()), file.name, this.vehicle);
       this.slideCommands({});
       this.replay(recording);
     } catch (error) {

@@ -26,17 +26,15 @@ function readRecording(text, name, vehicle) {
     .replace(/^\uFEFF/, "")
     .split(/\r\n|\r|\n/)
     .filter((line) => line.trim() !== "");
-  if (lines.length < 3) throw new Unreadable("it has less than two rows below its header");
-  if (lines.length > MOST_ROWS) throw new Unreadable(`it has more than ${MOST_ROWS} rows`);
-  const marks = [",", ";", "\t"];
-  const separator = marks.reduce((best, mark) => (count(lines[0], mark) > count(lines[0], best) ? mark : best));
-  const headers = cellsOf(lines[0], separator);
-  if (headers.length < 2) throw new Unreadable("its first line is no header of columns");
   const rules = vehicle.csv;
+  const { separator, start: begin, headers } = headerOf(lines, rules);
+  if (lines.length < begin + 3) throw new Unreadable("it has less than two rows below its header");
+  if (lines.length > MOST_ROWS) throw new Unreadable(`it has more than ${MOST_ROWS} rows`);
+  if (headers.length < 2) throw new Unreadable("its first line is no header of columns");
   const pattern = new RegExp(`^(?:${rules.number})$`);
   /** @param {string} cell */
   const number = (cell) => {
-    const plain = separator === "," ? cell : cell.replace(",", ".");
+    const plain = pointed(cell, separator);
     return pattern.test(plain) ? Number(plain) : Number.NaN;
   };
   const columns = headers.map((header) => columnOf(header, name, vehicle));
@@ -47,7 +45,7 @@ function readRecording(text, name, vehicle) {
     throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”; ${RENAMING}`);
   }
   const below = lines
-    .slice(1)
+    .slice(begin + 1)
     .map((line) => cellsOf(line, separator))
     .filter((cells) => cells.slice(headers.length).every((cell) => cell === ""));
   for (const [units, most, mistake] of rules.slips) {
@@ -102,7 +100,7 @@ function readRecording(text, name, vehicle) {
     })),
     forces: [],
     notes: [...(reason ? [`The pressure is not used: ${reason}.`] : []), ...nearness(off)],
-    left: lines.length - 1 - rows.length,
+    left: lines.length - begin - 1 - rows.length,
   };
 }
 
@@ -201,6 +199,78 @@ function reasonAgainst(known, { pressures: { atmosphere, gradient, hull, least }
   return isOfHull
     ? "its pressure hardly changes and is that of the air, so the barometer seems to be inside the hull"
     : "";
+}
+
+/** Returns the text of a file. It must equal what `open_text` of rov_fmu/io/csv_table.py reads. @param {ArrayBuffer} content */
+function textOf(content) {
+  const mark = new DataView(content).byteLength > 1 ? new DataView(content).getUint16(0) : 0;
+  if (mark === 0xfffe || mark === 0xfeff)
+    return new TextDecoder(mark === 0xfffe ? "utf-16le" : "utf-16be").decode(content);
+  try {
+    return new TextDecoder("utf-8", { fatal: true }).decode(content);
+  } catch {
+    return new TextDecoder("windows-1252").decode(content);
+  }
+}
+
+/** The header of a table: its place among the lines, its cells, and what separates them.
+ * @typedef {{start: number, separator: string, headers: string[]}} Header */
+
+/** Returns the header of a table with these lines, of which none is blank. It must equal `_dialect` of rov_fmu/io/csv_table.py, which
+ * says why. @param {string[]} lines @param {Rules} rules @returns {Header} */
+function headerOf(lines, rules) {
+  const given = /^ *"?sep=([,;\t])"? *$/i.exec(lines[0] ?? "");
+  const value = new RegExp(`^(?:${rules.value})$`);
+  /** @type {Header[]} */
+  const candidates = [];
+  /** @type {Header | undefined} */
+  let first;
+  for (let start = given ? 1 : 0; start < Math.min(lines.length, rules.mostBefore); start++) {
+    const line = lines[start];
+    const separator = given?.[1] ?? [",", ";", "\t"].reduce((a, b) => (count(line, b) > count(line, a) ? b : a));
+    const own = { start, separator, headers: filledCells(line, separator) };
+    if (own.headers.length === 0) continue;
+    first ??= own;
+    if (!line.startsWith("#")) {
+      const above = [...candidates.filter(hasUnit), ...candidates.filter((one) => !hasUnit(one))];
+      const header = above.find((one) => isAbove(one, line, value));
+      if (header)
+        return { ...header, headers: header.headers.map((cell, n) => (n ? cell : cell.replace(/^#+ */, ""))) };
+      if (own.headers.length > 1 && isRow(own.headers, value)) break;
+    }
+    if (!own.headers.some((cell) => value.test(cell))) candidates.push(own);
+  }
+  return first ?? { start: 0, separator: ",", headers: [] };
+}
+
+/** @param {Header} header */
+function hasUnit({ headers }) {
+  return headers.some((cell) => /^[^[\]]+\[[^[\]]+\]$/.test(cell));
+}
+
+/** Returns whether a line is a row below a header. @param {Header} header @param {string} line @param {RegExp} value */
+function isAbove(header, line, value) {
+  const { length } = header.headers;
+  const row = filledCells(line, header.separator);
+  return (hasUnit(header) ? row.length <= length : row.length > 1 && row.length === length) && isRow(row, value);
+}
+
+/** Returns whether most of the cells that are not blank are numbers or times. @param {string[]} cells @param {RegExp} value */
+function isRow(cells, value) {
+  const filled = cells.filter((cell) => !/^([-.]*|nan)$/i.test(cell));
+  return 2 * filled.filter((cell) => value.test(cell)).length > filled.length;
+}
+
+/** Returns the cells of a line, without empty ones at its end. @param {string} line @param {string} separator */
+function filledCells(line, separator) {
+  const cells = cellsOf(line, separator).map((cell) => pointed(cell, separator));
+  while (cells[cells.length - 1] === "") cells.pop();
+  return cells;
+}
+
+/** Returns a number with a decimal point, unless commas separate the cells. @param {string} cell @param {string} separator */
+function pointed(cell, separator) {
+  return separator === "," || !/^[-+.,\deE]+$/.test(cell) ? cell : cell.replace(",", ".");
 }
 
 /** @param {string} text @param {string} mark */

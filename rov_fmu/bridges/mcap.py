@@ -61,15 +61,15 @@ class Number:
 class Recording:
     """An MCAP file in memory. Raises InputError where foxglove-sdk is not installed."""
 
-    def __init__(self, about: Mapping[str, str]) -> None:
-        """Begin a file with metadata about the vehicle."""
+    def __init__(self, about: Mapping[str, str], profile: str = "") -> None:
+        """Begin a file with metadata about the vehicle, and with a profile, which tells what kind of file it is."""
         try:
             from foxglove import Context, open_mcap
             from foxglove.mcap import MCAPWriteOptions
         except ImportError as error:
             raise InputError(MISSING) from error
         self.context, self._stream = Context(), BytesIO()
-        options = MCAPWriteOptions(profile="", compression_threads=0)  # the bytes do not depend on the machine
+        options = MCAPWriteOptions(profile=profile, compression_threads=0)  # the bytes do not depend on the machine
         self._writer = open_mcap(self._stream, context=self.context, writer_options=options)
         self._writer.write_metadata("vehicle", dict(about))
 

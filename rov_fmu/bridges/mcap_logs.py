@@ -13,6 +13,7 @@ from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW
 from rov_fmu.identify.result import Identification, Prediction, UnknownForce
+from rov_fmu.io.file_kinds import IDENTIFIED
 from rov_fmu.report.page.recording import topic_name
 from rov_fmu.tank.log import Channel, Commands, Log
 from rov_fmu.tank.quality import unwrapped
@@ -42,7 +43,7 @@ def identification_mcap(identification: Identification) -> bytes:
 
     Raises InputError where foxglove-sdk is not installed.
     """
-    recording = Recording(about(identification.vehicle))
+    recording = Recording(about(identification.vehicle), IDENTIFIED)
     messages: list[tuple[int, Callable[[], None]]] = []
     for log in identification.folder.logs:
         series = [*_series_of(identification, log)]

@@ -72,12 +72,15 @@ class Tests:
         return low <= command <= high
 
 
-def load_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> Tests:
+def load_tests(
+    folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None, base: Path | None = None
+) -> Tests:
     """Read a folder. Raises DataFileError or VehicleFileError with a line for every mistake.
 
-    `check_inputs` is called with every file that the identification reads, before any test is read.
+    `check_inputs` is called with every file that the identification reads, before any test is read. `base` is the
+    vehicle to begin from, in place of that of rov.toml.
     """
-    found = read_folder(folder, check_inputs)
+    found = read_folder(folder, check_inputs, base)
     description = found.rov_file.description
     logs = [_Contents(log, *driven_axes(log, _layout_of(log, found))) for log in found.logs]
     tested = _tested(found, logs)
@@ -96,8 +99,8 @@ def load_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = la
         raise (DataFileError if in_tests else VehicleFileError)(*mistakes)
     assert vehicle.given
     path = vehicle.given.description.tables.base
-    base = {vehicle.given.description.base_name: file_hash(path)} if path else {}
-    inputs = {ROV_FILE: found.inputs[ROV_FILE]} | base | found.inputs
+    of_base = {vehicle.given.description.base_name: file_hash(path)} if path else {}
+    inputs = {ROV_FILE: found.inputs[ROV_FILE]} | of_base | found.inputs
     of_logs = [finding for one in logs for finding in one.told]
     of_vehicle = _not_pushed(vehicle.findings, of_logs) if not path else vehicle.findings
     findings = (*of_vehicle, *found.findings, *of_logs, *_driven_together(found))

@@ -150,6 +150,7 @@ _FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "
 _READ: dict[Heading, frozenset[str]] = {
     "Doubts": frozenset(
         {
+            "grown rows",
             "too few samples",
             "time of arrival",
             "other clock",
@@ -165,6 +166,9 @@ _READ: dict[Heading, frozenset[str]] = {
         {
             "wrench",
             "source of wrench",
+            "other files",
+            "code page",
+            "lines before header",
             "rows sorted",
             "time stamps merged",
             "rows without time",
@@ -220,6 +224,11 @@ def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     for finding in found:
         groups[heading(finding)].append(finding)
     return {name: sentences(some) for name, some in groups.items()}
+
+
+def not_read(found: Iterable[Finding]) -> tuple[str, ...]:
+    """Return the sentences about files that are not read, although nothing is wrong with them."""
+    return sentences(finding for finding in found if finding.kind == "other files")
 
 
 def told(identification: Identification) -> Identification:

@@ -18,12 +18,14 @@ def identify_folder(
     report: Path | None,
     mcap: Path | None = None,
     *,
+    base: Path | None = None,
     force: bool,
     begin: Callable[[str], Progress],
 ) -> tuple[Identification, list[str]]:
     """Identify a vehicle from a folder of tank tests, and write the files that are asked for.
 
-    These are the vehicle file, the report, and the MCAP file with what was measured and predicted.
+    These are the vehicle file, the report, and the MCAP file with what was measured and predicted. `base` replaces the
+    vehicle to begin from that rov.toml names.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. Returns the
@@ -47,7 +49,7 @@ def identify_folder(
         replaced.extend(check_replaced(targets, force=force))
 
     begin("reading the folder")
-    tests = load_tests(folder, check_outputs)
+    tests = load_tests(folder, check_outputs, base)
     identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
     if report:

@@ -18,15 +18,13 @@ from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
-from rov_fmu.tank.folder import PATTERNS, unreadable
+from rov_fmu.tank.folder import unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables, likely_thrusters
-from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
+from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
+from rov_fmu.tank.readers.listing import BAG, Listing, list_files
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-
-_BAG = "metadata.yaml"
-"""The file in the folder of a bag of ROS 2."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,8 @@ class Inspected:
     logs: Sequence[Inspection]
     warnings: Sequence[str]
     """A sentence for each file that cannot be read."""
+    notes: Sequence[str]
+    """A sentence for each kind of other files in the folder."""
     draft: Path
     """The place of rov.toml."""
     text: str
@@ -52,7 +52,7 @@ class Inspected:
 
 def lacks_description(folder: Path) -> bool:
     """Return True for a folder with logs or tables but without rov.toml."""
-    return folder.is_dir() and not (folder / ROV_FILE).exists() and bool(logs_of(folder))
+    return folder.is_dir() and not (folder / ROV_FILE).exists() and bool(list_files(folder).tests)
 
 
 def inspect_logs(path: Path) -> Inspected:
@@ -65,24 +65,27 @@ def inspect_logs(path: Path) -> Inspected:
     if not path.exists():
         raise DataFileError(f"{path}: {NO_FILE}")
     folder = path if path.is_dir() else path.parent
-    folder = folder.parent if (folder / _BAG).is_file() else folder
+    folder = folder.parent if (folder / BAG).is_file() else folder
     described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE
     layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
+    listing = list_files(path) if path.is_dir() else Listing(folder, [path])
     inspections: list[Inspection] = []
     mistakes: list[str] = []
-    findings: list[Finding] = []
+    findings: list[Finding] = listing.findings
     with one_parser():
-        for log in logs_of(path, described.tables.columns):
+        for log in logs_among(listing.tests, described.tables.columns):
             try:
                 inspections += inspect(log, layouts.values(), described)
             except DataFileError as error:
                 mistakes += str(error).splitlines()
                 findings.append(unreadable(log, error))
     if not inspections:
-        raise DataFileError(*(mistakes or [f"{path}: there is no log ({PATTERNS}) in it"]))
+        raise DataFileError(*([*mistakes, *listing.lines("unreadable file")] if mistakes else listing.no_tests()))
     tables = headers_of_tables(folder)
     text = _draft(folder, inspections, tables, *_thrusters(inspections, layouts, tables.curves))
-    return Inspected(inspections, sentences(findings, SENTENCES), folder / ROV_FILE, text)
+    notes = [finding for finding in findings if finding.kind == "other files"]
+    warnings = [finding for finding in findings if finding not in notes]
+    return Inspected(inspections, sentences(warnings, SENTENCES), sentences(notes, SENTENCES), folder / ROV_FILE, text)
 
 
 def _thrusters(

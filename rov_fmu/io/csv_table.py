@@ -1,5 +1,8 @@
 """Reading CSV files of numbers from spreadsheets, loggers and FMUs; each mistake gives one line.
 
+Every table has a header with the names of the columns, and rows below it. Encoding, separator and what stands before
+the header are those of the file (`_Dialect`).
+
 `read_columns` reads tables whose headers have units, such as `command [%]`. `read_series` reads variables of an FMU
 over time, whose headers are names.
 """
@@ -7,22 +10,42 @@ over time, whose headers are names.
 import csv
 import re
 from array import array
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import islice, zip_longest
+from io import BytesIO, StringIO, TextIOWrapper
+from itertools import islice, pairwise, zip_longest
 from math import isfinite, isnan, nan
 from pathlib import Path
 from types import MappingProxyType
 from typing import TextIO
 
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, shown, similar
-from rov_fmu.io.reading import read_lines
+from rov_fmu.io.reading import read_bytes
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 """A number as a cell has it, with a decimal point."""
+VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{4}}-[0-9]{{2}}-[0-9]{{2}}.*|[0-9]+:[0-9]{{2}}.*")
+"""A cell of a row: a number, a date or a time of day."""
 _HEADER = re.compile(r"(?P<name>[^\[\]]+)\[(?P<unit>[^\[\]]+)\]")
+_SEPARATORS, _COMMENT = ",;\t", "#"
+_GIVEN_SEPARATOR = re.compile(rf'"?sep=([{_SEPARATORS}])"?', re.IGNORECASE)
+"""The line by which Excel is told the separator."""
+UTF_16_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
+"""The first bytes of a text in UTF-16."""
+_CODE_PAGE = "cp1252"
+MOST_BEFORE = 100
+"""The number of lines in which the header is looked for."""
+_START = 100_000
+"""The number of bytes at the beginning of a text that tell whether it is a table."""
+_COMPARED_ROWS = 50
+"""The number of rows before and after an insertion of columns that tell its place."""
+_FEWEST, _MOST_ODD, _MOST_MISFITS = 3, 0.05, 0.25
+"""The least number of rows before and after an insertion, the largest share of rows after it with yet another number of
+cells, and the largest share of columns that do not go on as before."""
 _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
 _NO_ROWS = "no rows below the header"
@@ -89,6 +112,8 @@ class Columns:
     """The rows by column whose cells are neither numbers nor blank. A loose reading makes these NaN."""
     torn: int
     """The number of rows with more cells than the header. A loose reading leaves them out."""
+    assumed: Mapping[str, Mapping[str, str | float]]
+    """What was assumed about the form of the file, as the kind of a finding with its words."""
     rows: Callable[[], Iterator[Mapping[str, str]]]
     """Return the cells of each row by column. The file is parsed again, because keeping the texts takes much memory."""
 
@@ -139,23 +164,50 @@ def read_columns(
     `open_stream` opens the lines of a table that is not the text of the file itself.
     """
     file = _CsvFile(path, open_stream)
-    lines = iter(file)
-    line, titles = next(lines)
+    line, titles = next(iter(file))
     header = [*map(renamed.get, titles, titles)]
     file_columns = _find_columns(path, line, header, columns, others, hint)
     headers = {column.name: header[place] for place, column in file_columns.items()}
-    torn, wrong = _Mistakes(path), _Mistakes(path)
+    wrong = _Mistakes(path)
     for reason in check_header(headers, _others(header, file_columns)):
         wrong.add(f"{path}, line {line}: {reason}")
     wrong.check()
-    values = {name: array("d") for name in headers}
-    row_lines = array("L")
-    unread = {name: array("L") for name in headers}
-    for line, cells in lines:
+    values, lines, unread, torn = _numbers(file, header, file_columns, loose)
+    if torn.count and file.align():
+        values, lines, unread, torn = _numbers(file, header, file_columns, loose)
+    if torn.count > len(lines):
+        raise DataFileError(file.too_many(torn))
+    if not lines:
+        raise DataFileError(f"{path}, line {line}: {_NO_ROWS}")
+    return Columns(
+        path,
+        titles,
+        headers,
+        {column.name: " ".join([column.unit, *column.numbers]) for column in file_columns.values()},
+        values,
+        lines,
+        unread,
+        torn.count + file.left_out,
+        file.assumed,
+        partial(_rows, file, file_columns, len(header)),
+    )
+
+
+def _numbers(
+    file: "_CsvFile", header: Sequence[str], file_columns: Mapping[int, FileColumn], loose: bool
+) -> tuple[dict[str, "array[float]"], "array[int]", dict[str, "array[int]"], "_TornRows"]:
+    """Return the numbers by column, the line of each row, the rows by column whose cells are unread, and the rows with
+    too many cells. Raises DataFileError."""
+    path = file.path
+    torn, wrong = _TornRows(len(header)), _Mistakes(path)
+    values = {column.name: array("d") for column in file_columns.values()}
+    lines = array("L")
+    unread = {name: array("L") for name in values}
+    for line, cells in islice(file, 1, None):
         if len(cells) > len(header):
-            (torn if loose else wrong).add(file.too_many(line, cells, len(header)))
+            torn.add(line, cells)
             continue
-        row_lines.append(line)
+        lines.append(line)
         for (place, column), cell in zip(file_columns.items(), _by_column(cells, file_columns).values(), strict=True):
             try:
                 value = _value(cell, place < len(cells), column, loose)
@@ -164,23 +216,11 @@ def read_columns(
                 continue
             values[column.name].append(value)
             if isnan(value) and not _is_blank(cell):
-                unread[column.name].append(len(row_lines) - 1)
-    if torn.count > len(row_lines):
-        wrong.add(torn.first[0])
+                unread[column.name].append(len(lines) - 1)
+    if torn.count and not loose:
+        wrong.add(file.too_many(torn))
     wrong.check()
-    if not row_lines:
-        raise DataFileError(f"{path}, line {line}: {_NO_ROWS}")
-    return Columns(
-        path,
-        titles,
-        headers,
-        {column.name: " ".join([column.unit, *column.numbers]) for column in file_columns.values()},
-        values,
-        row_lines,
-        unread,
-        torn.count,
-        partial(_rows, file, file_columns, len(header)),
-    )
+    return values, lines, unread, torn
 
 
 def _rows(file: "_CsvFile", file_columns: Mapping[int, FileColumn], width: int) -> Iterator[Mapping[str, str]]:
@@ -199,7 +239,7 @@ def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict
 
 
 def read_header(path: Path, open_stream: Callable[[], TextIO] | None = None) -> list[str]:
-    """Return the cells of the first line that is not blank. Raises DataFileError."""
+    """Return the cells of the header. Raises DataFileError."""
     return next(iter(_CsvFile(path, open_stream)))[1]
 
 
@@ -230,17 +270,19 @@ def read_series(
         if reason := _why_no_variable(header, place, why_wrong):
             wrong.add(f"{path}, line {line}, column {shown(name)}: {reason}")
     wrong.check()
-    series, numbers = Series({name: array("d") for name in header}), array("L")
+    series, numbers, torn = Series({name: array("d") for name in header}), array("L"), _TornRows(len(header))
     for line, cells in lines:
         numbers.append(line)
         if len(cells) > len(header):
-            wrong.add(file.too_many(line, cells, len(header)))
+            torn.add(line, cells)
             continue
         for name, cell in zip_longest(header, cells, fillvalue=""):
             try:
                 series[name].append(finite(cell))
             except ValueError as error:
                 wrong.add(f"{path}, line {line}, column {shown(name)} = {shown(cell)}: {error}")
+    if torn.count:
+        wrong.add(file.too_many(torn))
     wrong.check()
     times = series[header[0]]
     for line, before, time in zip(numbers[1:], times, times[1:], strict=False):
@@ -282,51 +324,297 @@ class _Mistakes:
             raise DataFileError(*self.first)
 
 
-# ---- Cells -----------------------------------------------------------------------------------------------------------
+# ---- Lines -----------------------------------------------------------------------------------------------------------
+
+
+def open_text(path: Path) -> Callable[[], TextIO]:
+    """Return a function that opens the lines of a table, each time from the start. Raises UnreadableFileError.
+
+    The text is in UTF-16 if it begins with its byte order mark, otherwise in UTF-8, or else in code page 1252, in which
+    Windows writes µ and °. The stream takes less memory than the text.
+    """
+    content = read_bytes(path, UnreadableFileError, most=LARGEST)
+    for encoding in ("utf-16",) if content.startswith(UTF_16_MARKS) else ("utf-8-sig", _CODE_PAGE):
+        with suppress(UnicodeDecodeError):
+            content.decode(encoding)
+            return partial(_stream, content, encoding)
+    raise UnreadableFileError(f"{path}: is no text in UTF-8, UTF-16 or code page 1252. Save it as UTF-8")
+
+
+def _stream(content: bytes, encoding: str) -> TextIO:
+    return TextIOWrapper(BytesIO(content), encoding)
+
+
+def looks_like_table(path: Path) -> bool:
+    """Return True if a text has a row of numbers below a header with as many columns. Only its beginning is read."""
+    with path.open("rb") as file:
+        start = file.read(_START)
+    encoding = "utf-16" if start.startswith(UTF_16_MARKS) else "utf-8-sig"
+    return _dialect(StringIO(start.decode(encoding, "replace"))).has_rows
+
+
+@dataclass(frozen=True)
+class _Dialect:
+    """The form of a table."""
+
+    separator: str = ","
+    before: int = 0
+    """The number of lines before the header."""
+    titles: Sequence[str] = ()
+    """The cells of the header."""
+    has_rows: bool = False
+    """True if a row of numbers with as many cells follows the header."""
+
+    @property
+    def has_unit(self) -> bool:
+        """True if a title has a unit."""
+        return any(map(_HEADER.fullmatch, self.titles))
+
+    def is_above(self, line: str) -> bool:
+        """Return True if a line is a row below this header: most of its cells are numbers, and their number fits."""
+        row = _cells(line, self.separator)
+        fits = len(row) <= len(self.titles) if self.has_unit else 1 < len(row) == len(self.titles)
+        return fits and _is_row(row)
+
+
+def _dialect(lines: Iterable[str]) -> _Dialect:
+    """Return the form of a table with these lines.
+
+    The header is a line without numbers above the first row: the first such line with a unit, or else the first one
+    with as many cells as the row. A row has mostly numbers. Titles and comments may stand before the header, but no
+    row. If there is no such line, the header is the first line.
+    """
+    given = ""
+    first = None
+    headers: list[_Dialect] = []
+    for number, line in enumerate(islice(lines, MOST_BEFORE)):
+        if not first and (mark := _GIVEN_SEPARATOR.fullmatch(line.strip(" \r\n"))):
+            given = mark[1]
+            continue
+        separator = given or max(_SEPARATORS, key=line.count)
+        cells = _cells(line, separator)
+        if not any(cells):
+            continue
+        own = _Dialect(separator, number, cells)
+        first = first or own
+        if not line.startswith(_COMMENT):
+            for header in sorted(headers, key=lambda one: not one.has_unit):
+                if header.is_above(line):
+                    return replace(header, has_rows=len(header.titles) > 1)
+            if len(cells) > 1 and _is_row(cells):
+                break
+        if not any(map(VALUE.fullmatch, cells)):
+            headers.append(own)
+    return first or _Dialect()
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, without empty ones at its end."""
+    cells = []
+    with suppress(csv.Error):  # the line is no CSV, and reading it will say so
+        cells = [_with_point(cell, separator) for cell in next(csv.reader([line], delimiter=separator), [])]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _with_point(text: str, separator: str) -> str:
+    """Return a cell without blanks around it, and with a decimal point instead of a comma in a number, unless commas
+    separate the cells."""
+    text = text.strip()
+    if separator == "," or "," not in text:
+        return text
+    with_point = text.replace(",", ".", 1)
+    return with_point if NUMBER.fullmatch(with_point) else text
+
+
+def _is_row(cells: Iterable[str]) -> bool:
+    """Return True if most of the cells that are not blank are numbers or times."""
+    filled = [cell for cell in cells if not _is_missing(cell)]
+    return 2 * sum(bool(VALUE.fullmatch(cell)) for cell in filled) > len(filled)
+
+
+def _is_missing(cell: str) -> bool:
+    """Return True for a cell that stands for no value: blank, or only dashes and points."""
+    return _is_blank(cell) or not cell.strip("-.")
+
+
+@dataclass
+class _TornRows:
+    """The rows that have more cells than the header."""
+
+    most: int
+    """The number of cells of the header."""
+    count: int = 0
+    line: int = 0
+    """The line of the first one."""
+    cells: Sequence[str] = ()
+    """The cells of the first one."""
+
+    def add(self, line: int, cells: Sequence[str]) -> None:
+        """Count a row."""
+        self.count += 1
+        if self.count == 1:
+            self.line, self.cells = line, cells
 
 
 class _CsvFile:
-    """The lines of a CSV file that are not blank, each with its number and its cells."""
+    """The lines of a CSV file from its header on that are not blank, each with its number and its cells."""
 
     def __init__(self, path: Path | str, open_stream: Callable[[], TextIO] | None) -> None:
-        self._path = path
-        self._open = open_stream or read_lines(Path(path), UnreadableFileError, most=LARGEST)
-        header = next(filter(str.strip, self._open()), "")
-        self._separator = max(",;\t", key=header.count)
-        """The one of comma, semicolon and tab that is most frequent in the header."""
+        self.path = path
+        self._open = open_stream or open_text(Path(path))
+        self._dialect = _dialect(self._open())
+        self._places: dict[int, list[int | None]] = {}
+        """The place of each column of the header in rows with so many cells, if they have more than the header."""
+        self.left_out = 0
+        """The number of rows that are left out because the places of their columns are unknown."""
+        self.assumed: dict[str, Mapping[str, str | float]] = {}
+        """What was assumed, as the kind of a finding with its words."""
+        if getattr(self._open(), "encoding", "") == _CODE_PAGE:
+            self.assumed["code page"] = {}
+        before = [line for line in islice(self._open(), self._dialect.before) if line.strip()]
+        if count := sum(not _GIVEN_SEPARATOR.fullmatch(line.strip(" \r\n")) for line in before):
+            self.assumed["lines before header"] = {"count": count}
 
     def __iter__(self) -> Iterator[tuple[int, list[str]]]:
         """Yield the lines. They are not kept, because their cells take much memory. Raises DataFileError.
 
         Numbers have decimal points, and empty cells at the end of a line are dropped if the header has no such column.
         """
-        reader = csv.reader(self._open(), delimiter=self._separator, strict=True)
-        width = 0
+        width, is_grown = 0, False
+        for line, row in self._rows():
+            places = self._places.get(len(row))
+            is_grown = is_grown or places is not None
+            if is_grown and places is None:
+                continue
+            cells = ["" if place is None else row[place] for place in places] if places else row
+            while len(cells) > width and not cells[-1]:
+                cells.pop()
+            width = width or len(cells)
+            yield line, cells
+
+    def _rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield the lines with all their cells. Raises DataFileError."""
+        before, separator = self._dialect.before, self._dialect.separator
+        reader = csv.reader(islice(self._open(), before, None), delimiter=separator, strict=True)
+        is_header = True
         try:
             for row in reader:
-                cells = [self._with_point(cell.strip()) for cell in row]
+                cells = [_with_point(cell, separator) for cell in row]
                 if any(cells):
-                    while len(cells) > width and not cells[-1]:
-                        cells.pop()
-                    width = width or len(cells)
-                    yield reader.line_num, cells
+                    if is_header and self._dialect.has_rows:
+                        cells[0] = cells[0].lstrip(_COMMENT).strip() or cells[0]
+                    is_header = False
+                    yield before + reader.line_num, cells
         except csv.Error as error:
-            raise DataFileError(f"{self._path}, line {reader.line_num}: not CSV: {error}") from error
-        if not width:
-            raise UnreadableFileError(f"{self._path}: the file is empty")
+            raise DataFileError(f"{self.path}, line {before + reader.line_num}: not CSV: {error}") from error
+        if is_header:
+            raise UnreadableFileError(f"{self.path}: the file is empty")
 
-    def too_many(self, line: int, cells: Sequence[str], most: int) -> str:
-        """Return the line about a row with more cells than the header has."""
-        commas = self._separator == "," and all(NUMBER.fullmatch(cell) for cell in cells)
+    def align(self) -> bool:
+        """Find the columns of the header in rows that have more cells from some line on. Return True if some are found.
+
+        A logger may write the header before it knows all columns, and insert the others later. What stands in the rows
+        before and after tells where. A few rows may have yet another number of cells.
+        """
+        rows = self._rows()
+        width = len(next(rows)[1])
+        parts = [_Part(0, width)]
+        odd = 0
+        for line, row in rows:
+            if len(row) > parts[-1].width:
+                parts.append(_Part(line, len(row)))
+            if len(row) == parts[-1].width:
+                parts[-1].add(row)
+            elif len(parts) > 1:
+                odd += 1
+        if any(part.count < _FEWEST for part in parts) or odd > _MOST_ODD * sum(part.count for part in parts[1:]):
+            return False
+        places: list[int | None] = [*range(width)]
+        found = {}
+        for before, after in pairwise(parts):
+            low, high = _where_inserted(before, after)
+            moved = [*range(low), *[None] * (high - low), *range(high + after.width - before.width, after.width)]
+            places = [None if place is None else moved[place] for place in places]
+            found[after.width] = places
+        first = sum(place == n for n, place in enumerate(places))
+        last = sum(place == n for n, place in enumerate(places, start=parts[-1].width - width))
+        if not first + last:
+            return False
+        self._places, self.left_out = found, odd
+        counts = {"cells": parts[-1].width, "columns": width, "first": first, "last": last}
+        self.assumed["grown rows"] = {"line": str(parts[1].line), **{name: str(n) for name, n in counts.items()}}
+        return True
+
+    def too_many(self, torn: _TornRows) -> str:
+        """Return the line about rows with more cells than the header has."""
+        commas = self._dialect.separator == "," and all(NUMBER.fullmatch(cell) for cell in torn.cells)
         hint = " (are these decimal commas? They need ; between the columns)" if commas else ""
-        return f"{self._path}, line {line}, column {most + 1} = {shown(cells[most])}: there is no such column{hint}"
+        if torn.count > 1:
+            hint += (
+                f", and {torn.count} rows have more cells than the header, which has {torn.most}. Complete the header"
+            )
+        place = f"line {torn.line}, column {torn.most + 1} = {shown(torn.cells[torn.most])}"
+        return f"{self.path}, {place}: there is no such column{hint}"
 
-    def _with_point(self, text: str) -> str:
-        """Return a number with a decimal point instead of a comma, unless commas separate the cells."""
-        if self._separator == "," or "," not in text:
-            return text
-        with_point = text.replace(",", ".", 1)
-        return with_point if NUMBER.fullmatch(with_point) else text
+
+@dataclass
+class _Part:
+    """Rows of a file with the same number of cells."""
+
+    line: int
+    """The line of the first one."""
+    width: int
+    count: int = 0
+    first: list[list[str]] = field(default_factory=list)
+    last: deque[list[str]] = field(default_factory=lambda: deque(maxlen=_COMPARED_ROWS))
+
+    def add(self, row: list[str]) -> None:
+        """Add a row. Only the first and the last ones are kept."""
+        self.count += 1
+        self.last.append(row)
+        if len(self.first) < _COMPARED_ROWS:
+            self.first.append(row)
+
+
+def _where_inserted(before: _Part, after: _Part) -> tuple[int, int]:
+    """Return the first and the last place at which the cells may have been inserted that make the rows longer.
+
+    A place is judged by the number of columns that would not go on as before. One of them is no proof, because a sensor
+    may begin or end just then.
+    """
+    more = after.width - before.width
+    old, new = [*zip(*before.last, strict=True)], [*zip(*after.first, strict=True)]
+    stay = [_differ(column, new[n]) for n, column in enumerate(old)]
+    move = [_differ(column, new[n + more]) for n, column in enumerate(old)]
+    misfits = [sum(stay[:place]) + sum(move[place:]) for place in range(before.width + 1)]
+    if min(misfits) > _MOST_MISFITS * before.width:
+        return 0, before.width
+    likely = [place for place, count in enumerate(misfits) if count <= min(misfits) + 1]
+    return likely[0], likely[-1]
+
+
+def _differ(old: Sequence[str], new: Sequence[str]) -> bool:
+    """Return True if cells can hardly be of the same column: they have other forms, or their numbers lie far apart."""
+    filled = [[cell for cell in cells if not _is_missing(cell)] for cells in (old, new)]
+    forms = [{_form(cell) for cell in cells} for cells in filled]
+    if not all(forms) or forms[0].isdisjoint(forms[1]):
+        return all(forms)
+    numbers = [[float(cell) for cell in cells if NUMBER.fullmatch(cell)] for cells in filled]
+    if not all(numbers):
+        return False
+    (low, high), (least, most) = ((min(own), max(own)) for own in numbers)
+    return max(least - high, low - most) > (high - low) + (most - least)
+
+
+def _form(cell: str) -> tuple[str, int]:
+    """Return the form of a cell: its characters that are no digits, and the number of decimals."""
+    whole, _, decimals = cell.lstrip("+-").rpartition(".") if "." in cell else (cell.lstrip("+-"), "", "")
+    return re.sub("[0-9]+", "9", whole), len(decimals)
+
+
+# ---- Cells -----------------------------------------------------------------------------------------------------------
 
 
 def _is_blank(text: str) -> bool:

@@ -1,10 +1,8 @@
 """Reading and hashing whole files; if one cannot be read, the error names it and says why."""
 
 import hashlib
-from collections.abc import Callable
-from io import BytesIO, TextIOWrapper
 from pathlib import Path
-from typing import IO, Any, TextIO
+from typing import IO, Any
 
 from rov_fmu.io.messages import NO_FILE, FileError
 
@@ -34,20 +32,12 @@ def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | Non
 
 def read_text(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> str:
     """Return the text of a file in UTF-8 with \\n as line end and without a byte order mark. Raises `kind`."""
-    return read_lines(path, kind, most=most)().read()
-
-
-def read_lines(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> Callable[[], TextIO]:
-    """Return a function that opens the text of a file as a stream of lines, each time from the start. Raises `kind`.
-
-    The stream takes less memory than `read_text`.
-    """
     content = read_bytes(path, kind, most=most)
     try:
-        content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise kind(f"{path}: not UTF-8 text, at byte {error.start}") from error
-    return lambda: TextIOWrapper(BytesIO(content), "utf-8-sig")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def root_of_xml(content: bytes) -> Any:

@@ -13,6 +13,7 @@ from rov_fmu.identify.findings import (
     extrapolated,
     name_of,
     next_tests,
+    not_read,
     repairs,
     size_in_words,
     verdict_in_words,
@@ -79,14 +80,17 @@ def _errors(axes: Sequence[AxisResult]) -> Table:
 
 
 def _conclusions(identification: Identification) -> Iterator[str]:
-    """Yield the paragraphs about other effects, the warnings, the number of other findings, and the next test."""
+    """Yield the paragraphs about other effects, warnings, unread files, how many other findings there are, and the next
+    test."""
     if kept := [effect for effect in identification.effects if effect.kept]:
         words = (f"{e.name} ({f'{e.of} {size_in_words(e.value, e.unit)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
     groups = by_heading(identification.findings)
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
-    if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")):
+    others = not_read(identification.findings)
+    yield from others
+    if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))
 

@@ -47,12 +47,12 @@ from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, read_tables
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, shipped_name
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
-"""The tables that are not allowed together with `base`, because the base has its own."""
+"""The tables that are not allowed together with `base`, because the base has its own; [body] may have `coupling`."""
 _FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
 """The source of the directions of the thrusters where neither a base nor a table gives any."""
 _FILE_TABLES = ("columns", "topics", "valid", "dives", "logs")
@@ -87,7 +87,12 @@ _Deviation = Annotated[Finite, _must_be("0 or above", lambda deviation: deviatio
 
 
 def _find_vehicle(name: object, info: ValidationInfo) -> Path:
-    """Return the path of the vehicle file in the folder of rov.toml, or of the one that ships. Raises ValueError."""
+    """Return the path of the vehicle file in the folder of rov.toml, or of the one that ships. Raises ValueError.
+
+    A path that the command line gives may lie anywhere.
+    """
+    if isinstance(name, Path):
+        return name
     if not isinstance(name, str):
         raise ValueError("must be text in quotes")
     own = inside(folder_of(info), name)
@@ -259,7 +264,7 @@ class Description:
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base_name: str
-    """The value of `base` as it stands in the file; empty without one."""
+    """The name of the base; empty without one."""
     thrusters: Layout | None = None
     """The thrusters that give the forces on the body, where the logs have these forces and the file has the thrusters.
     `layout` then has the forces in their place."""
@@ -299,15 +304,17 @@ NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
 """What there is without a rov.toml."""
 
 
-def read_description(path: Path) -> RovFile:
-    """Read rov.toml. Raises VehicleFileError where there is no such file, or where it is not TOML."""
+def read_description(path: Path, base: Path | None = None) -> RovFile:
+    """Read rov.toml. `base` replaces the one that it names. Raises VehicleFileError where there is no such file, or
+    where it is not TOML."""
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
+    data |= {"base": base} if base else {}
     file, problems, lost = read_tables(data, RovTables, context, ("vehicle",), ("fin",))
-    base, base_mistakes = _load_base(file)
+    vehicle, base_mistakes = _load_base(file)
     mistakes = [*_hardware_mistakes(file, lost, data)]
     description, of_hardware = None, {"base", "axes", *_HARDWARE_TABLES}
     if not (base_mistakes or mistakes or lost & of_hardware or _misspelt(lost, _HARDWARE_TABLES)):
-        description = _describe(path, file, data, base)
+        description = _describe(path, file, data, vehicle)
         possible = _possible_coefficients(description.layout)
         # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
         unknown = {("known", name) for name in description.named if name not in possible}
@@ -340,9 +347,13 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
             yield key_line(f"curves.{name}.electric_current", reason)
     if "base" in data:
         for name in present:
-            yield key_line(
-                name, "is not allowed together with base, which has its own; coefficients may be given in [known]"
-            )
+            own = {*data[name]} - {"coupling"} if name == "body" and isinstance(data[name], dict) else {name}
+            if own:
+                but = ", except coupling" if name == "body" else ""
+                reason = (
+                    f"is not allowed together with base, which has its own{but}; coefficients may be given in [known]"
+                )
+                yield key_line(name, reason)
         if file.logs.wrench:
             yield key_line("logs.wrench", "is not allowed with base: write its hardware tables here", True)
         return
@@ -374,6 +385,8 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
     """Put together the description from the parts of the file and the base."""
     own_layout = file.layout
     start = base.layout if base else _start(file)
+    if base and file.body:
+        start = replace(start, coupled=file.body.coupling)
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
     axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
     layout = _largest_layout(start, axis_keys)
@@ -393,7 +406,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
         measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=file.validity.limits if file.validity else base.limits if base else (),
-        base_name=data.get("base", ""),
+        base_name=(shipped_name(name) or name.name) if isinstance(name := data.get("base", ""), Path) else name,
         thrusters=own_layout if file.logs.wrench and file.thruster else None,
     )
 

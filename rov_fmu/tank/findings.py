@@ -96,6 +96,14 @@ SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
     "unnamed table": "{files}: a table with the {measured} at each command: name it {name}",
+    "other files": "{files}: not read, because {reason}",
+    # The form of a table
+    "code page": "{files}: it is not in UTF-8, so it is read in code page 1252 of Windows",
+    "lines before header": "{files}: {count:#line} before the header not read",
+    "grown rows": (
+        "{files}: from line {line} on, rows have {cells} cells, and the header has {columns}. Their first {first} and "
+        "last {last} are taken as the first and last columns of the header. Complete the header if this is wrong"
+    ),
     # Rows of a log
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",

@@ -21,7 +21,6 @@ from pathlib import Path
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, read_header
-from rov_fmu.io.file_kinds import LOG_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
 from rov_fmu.io.reading import hash_of
 from rov_fmu.io.toml_file import join_names, key_line
@@ -32,14 +31,12 @@ from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.listing import has_usual_suffix, list_files
 from rov_fmu.tank.readers.parsers import one_parser, open_table
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
-_SUFFIXES = (*TABLE_SUFFIXES, *LOG_SUFFIXES)
-PATTERNS = ", ".join(f"*{suffix}" for suffix in _SUFFIXES)
-"""The names that the files of tests have."""
 KINDS = (*TABLES, "log")
 """The words that the name of a file begins with."""
 _LACKING = {
@@ -102,7 +99,8 @@ class Folder:
             self.files.setdefault((kind, subject), []).append(path.name)
             axis = AXES.get(subject)
             if kind != "log":
-                rows, known = read_rows(path, kind, axis, self.names.columns)
+                rows, known, told = read_rows(path, kind, axis, self.names.columns)
+                self.findings += told
                 self.rows.setdefault((kind, subject), []).extend(rows)
                 self.known |= known
             elif layout := self.layout if axis else self.logged:
@@ -229,7 +227,9 @@ class Folder:
         curves = [curve.name for curve in self.layout.curves] if self.layout else []
         subjects = [*curves, *(self.logged.kinds if self.logged else AXES)]
         hint = did_you_mean(path.stem.lower().partition("_")[0], KINDS, also={"time": "time_constant"})
-        return DataFileError(
+        # A text of another suffix may be no test at all, and its owner is only warned.
+        failure = DataFileError if has_usual_suffix(path) else UnreadableFileError
+        return failure(
             f"{path}: neither a log, which has a column 'time [s]', nor a table, whose name begins with "
             f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {listed(subjects, 'or')}{hint}"
         )
@@ -248,24 +248,30 @@ class Folder:
             raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
 
 
-def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> Folder:
+def read_folder(
+    folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None, base: Path | None = None
+) -> Folder:
     """Read a folder. Raises DataFileError or VehicleFileError if it cannot be read at all.
 
-    `check_inputs` is called with every file that is read, before any test is read.
+    `check_inputs` is called with every file that is read, before any test is read. `base` replaces that of rov.toml.
     """
-    rov_file = _read_description(folder)
+    rov_file = _read_description(folder, base)
     found = Folder(folder, rov_file, rov_file_mistakes=[*rov_file.mistakes])
     mistakes, tables, dives = found.rov_file_mistakes, rov_file.tables, rov_file.tables.dives
     found.names, wrong_names = names_of(found.layout, tables)
     if wrong_names or not rov_file.explains_files:  # each file would be refused for what rov.toml should explain
         raise VehicleFileError(*mistakes, *lines_on(folder / ROV_FILE, wrong_names))
     parts = {name for dive in dives.values() for name in dive.files}
-    paths = [path for path in test_files(folder) if path.name not in parts]
+    listing = list_files(folder, parts)
+    paths = [path for path in listing.tests if path.name not in parts]
     if not paths and not dives:
-        raise VehicleFileError(*mistakes, f"{folder}: there are no tests ({PATTERNS}) in this folder")
+        raise VehicleFileError(*mistakes, *listing.no_tests())
     vehicles = filter(None, (tables.against, tables.base))
     check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *vehicles])
     found.read_all(paths)
+    found.findings += listing.findings
+    if found.mistakes:  # they may follow from files that are not read
+        found.mistakes += listing.lines("unreadable file")
     if (description := rov_file.description) and not (mistakes or found.mistakes):
         mistakes += lines_on(description.path, found.unknown_names())
         mistakes += lines_on(description.path, found.missing_columns(description.requests))
@@ -275,26 +281,23 @@ def read_folder(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = l
 def unreadable(path: Path, error: FileError) -> Finding:
     """Return the finding about a file that cannot be read, with the first reason."""
     first, *_ = str(error).splitlines()
-    return about(path.name, "unreadable file", reason=first.removeprefix(f"{path}: "))
+    return about(path.name, "unreadable file", reason=first.removeprefix(str(path)).lstrip(":, "))
 
 
-def test_files(folder: Path) -> list[Path]:
-    """Return the files of a folder that may be tests, also those of bags in folders of their own, in order."""
-    in_bags = (path for bag in folder.glob("*/metadata.yaml") for path in bag.parent.iterdir())
-    return sorted(path for path in (*folder.iterdir(), *in_bags) if path.name.lower().endswith(_SUFFIXES))
-
-
-def _read_description(folder: Path) -> RovFile:
-    """Read rov.toml, and explain its purpose where there is none."""
+def _read_description(folder: Path, base: Path | None) -> RovFile:
+    """Read rov.toml, and explain its purpose where there is none beside tests."""
     if not folder.is_dir():
         what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
         raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
     path = folder / ROV_FILE
     try:
-        return read_description(path)
+        return read_description(path, base)
     except VehicleFileError:
         if path.exists():
             raise
+        listing = list_files(folder)
+        if not listing.tests:
+            raise DataFileError(*listing.no_tests()) from None
         words = (
             "there is no such file. It must give the vehicle's name, and everything that no test determines, "
             "such as the mass"

@@ -11,6 +11,11 @@ SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODE
 VIDEORAY = SHIPPED["videoray"]
 
 
+def shipped_name(path: Path) -> str:
+    """Return the name of the shipped vehicle with this file; an empty text if there is none."""
+    return next((name for name, own in SHIPPED.items() if own == path), "")
+
+
 def find_vehicle(given: str | Path) -> Path:
     """Return the vehicle file at a path, or of a shipped vehicle with this name. Raises FileError."""
     path, name = Path(given), str(given)

@@ -25,6 +25,7 @@ from rov_fmu.identify.result import UnknownForce
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError
+from rov_fmu.tank.readers.listing import Listing, list_files
 from tests.bridges.test_sdf import turned_in_gazebo
 from tests.folders import small_folder
 from tests.report.results import example
@@ -149,12 +150,14 @@ def test_command(tmp_path: Path) -> None:
     assert len(found["/scene"]) == 51  # 25 a second
 
 
-def test_identification() -> None:
+def test_identification(tmp_path: Path) -> None:
     """A log has its commands, the predictions with their 95 % bands, and the unknown force, all from its own time 0."""
     result = example()
     prediction = next(p for axis in result.axes for p in axis.predictions if p.is_judged)
     unknown = UnknownForce(SURGE, prediction.file, np.array([1.0, 2.5]), np.array([0.5, -1.0]), np.array([0.1, 0.2]))
     content = identification_mcap(replace(result, unknown_forces=(unknown,)))
+    (tmp_path / "logs.mcap").write_bytes(content)
+    assert list_files(tmp_path) == Listing(tmp_path), "the next identification does not take it for a log"
     found = messages(content)
     topic = "/" + prediction.file.replace(".", "_")
     assert {topic.split("/")[1] for topic in found} == {one.file.replace(".", "_") for one in result.folder.logs}

@@ -101,7 +101,7 @@ TYPED: dict[str, tuple[str, str]] = {
     ),
     "a draft that is written elsewhere": (
         "identify . --draft --force",
-        "identify: --draft writes only a draft of rov.toml: leave -o, --report, --mcap, --force out",
+        "identify: --draft writes only a draft of rov.toml: leave -o, --report, --mcap, --base, --force out",
     ),
     "an inspection with a report": ("identify . --inspect --report r.html", "identify: --inspect writes only a draft"),
     "a vehicle that is no FMU yet": (

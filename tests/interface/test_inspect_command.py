@@ -389,7 +389,7 @@ UNREADABLE: dict[str, bytes] = {
     "cut.mcap": b"\x89MCAP0\r\n\x01",
     "empty.csv": b"",
     "image.bin": b"\x89PNG\r\n\x1a\n\0\0",
-    "latin.csv": b"time [s],temp\xe9rature\n0,1\n",
+    "no_text.csv": b"time [s],temp\x81rature\n0,1\n",
 }
 
 

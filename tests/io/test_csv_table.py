@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns, read_series
+from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns, read_header, read_series
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.often import often
@@ -124,6 +124,139 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
     assert ({name: [*rows] for name, rows in table.unread.items()}, table.torn) == ({"length": [1], "time": []}, 1)
 
 
+# ---- Dialects --------------------------------------------------------------------------------------------------------
+
+PLAIN = "angle [°];pulse [µs]\n0,5;1500\n1,5;1600\n"
+BEFORE = {  # what may stand before the header, and the number of lines that are told
+    "a separator for Excel": ("sep=;\n", 0),
+    "the same in quotes": ('"SEP=;"\n\n', 0),
+    "a title": ("Tank of Odense\n", 1),
+    "prose with commas": ("Recorded on Monday, with a DVL, and a tether\n\n", 1),
+    "as many commas as the table has separators": ("Location: Odense, Denmark\n", 1),
+    "comments": ("# rate, 10 Hz\n#\n# 1;2\n", 3),
+    "keys and values of an instrument": ("Instrument;CTD\nRate [Hz];10\nDate;2024-05-11\n\nNote;\n", 4),
+    "a quotation mark": ('Diameter 5" tube\n', 1),
+    "both": ("sep=;\n# by hand\n", 1),
+}
+ENCODINGS = {"utf-8": 0, "utf-8-sig": 0, "utf-16": 0, "cp1252": 1}
+
+
+@pytest.mark.parametrize("before", BEFORE)
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("header", ["angle", "# angle"])
+def test_the_form_of_a_file_is_found_and_what_was_assumed_is_told(
+    before: str, encoding: str, header: str, tmp_path: Path
+) -> None:
+    lines, count = BEFORE[before]
+    path = tmp_path / "some.csv"
+    for end in ("\n", "\r\n"):
+        path.write_bytes((lines + PLAIN).replace("angle", header).replace("\n", end).encode(encoding))
+        table = read_columns(path, {"angle": Column({"°": 1.0}), "pulse": Column({"µs": 1.0})})
+        assert _values(table) == {"angle": [0.5, 1.5], "pulse": [1500.0, 1600.0]}
+        assert [*table.lines] == [lines.count("\n") + 2, lines.count("\n") + 3]
+        assert ("code page" in table.assumed) == ENCODINGS[encoding]
+        assert table.assumed.get("lines before header", {}).get("count", 0) == count
+    with pytest.raises(DataFileError, match=f"line {lines.count(chr(10)) + 2}, column 'pulse .µs.' = '1500': must be"):
+        read_columns(path, {"angle": Column({"°": 1.0}), "pulse": Column({"µs": 1.0}, maximum=2.0)})
+
+
+def test_a_row_is_never_skipped(tmp_path: Path) -> None:
+    """Two tables in one file: the first has no units."""
+    path = _file(tmp_path, "long,late\n1,2\n3,4\nlength [m],time [s]\n5,6\n")
+    with pytest.raises(DataFileError, match="line 1, column 1 = 'long'"):
+        read_columns(path, {"length": LENGTH, "time": MAYBE})
+    assert read_header(_file(tmp_path, "Timestamp,depth\n,\n--.--,-\ns,m\n2024-05-11 10:00:00.1,--.--\n")) == [
+        "Timestamp",
+        "depth",
+    ]
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"length [m]\n\x81\n"])
+def test_what_is_in_no_encoding_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    path.write_bytes(content)
+    with pytest.raises(DataFileError) as error:
+        read_columns(path, {"length": LENGTH})
+    assert str(error.value) == f"{path}: is no text in UTF-8, UTF-16 or code page 1252. Save it as UTF-8"
+
+
+# ---- Rows that grow --------------------------------------------------------------------------------------------------
+
+TITLES = ("time [s]", "roll [deg]", "mode", "depth [m]", "volts [V]", "fix")
+SI = {name: Column({unit: 1.0}) for name, unit in (("time", "s"), ("roll", "deg"), ("depth", "m"), ("volts", "V"))}
+
+
+def _cells(n: int) -> list[str]:
+    """Return a row of a logger, whose columns have their own forms and sizes."""
+    return [
+        f"{0.1 * n:.3f}",
+        f"{(37 * n) % 11 - 5:.1f}",
+        "MANUAL",
+        f"{-2 - 0.013 * n:.2f}",
+        f"{15.9 - n / 1e4:.4f}",
+        str(n % 3),
+    ]
+
+
+def _grown(rows: int, *steps: tuple[int, int, int], short: int = 0) -> str:
+    """Return a log that grows: from row n on, so many cells are inserted before a column of the header. `short` is a
+    row that was cut."""
+    text = ",".join(TITLES)
+    for n in range(rows):
+        cells = _cells(n)
+        for start, place, more in sorted(steps, key=lambda step: -step[1]):
+            cells[place:place] = [str(90 + i) for i in range(more)] if n >= start else []
+        text += "\n" + ",".join(cells[:3] if short and n == short else cells)
+    return text + "\n"
+
+
+@pytest.mark.parametrize("place", range(len(TITLES) + 1))
+@pytest.mark.parametrize("start", [3, 40])
+def test_columns_that_are_inserted_later_leave_the_others_right_or_blank(
+    start: int, place: int, tmp_path: Path
+) -> None:
+    """A cell is never taken for that of another column. All that are far from the insertion are read."""
+    table = read_columns(_file(tmp_path, _grown(90, (start, place, 2))), SI, others=True, loose=True)
+    wanted = [_cells(n) for n in range(90)]
+    for column, name in ((0, "time"), (1, "roll"), (3, "depth"), (4, "volts")):
+        read = [(value, float(row[column])) for value, row in zip(table.values[name], wanted, strict=True)]
+        assert all(value == true or (isnan(value) and n >= start) for n, (value, true) in enumerate(read))
+        if abs(column + 0.5 - place) > 2.0:
+            assert all(value == true for value, true in read)
+    told = table.assumed["grown rows"]
+    assert (told["line"], told["cells"], told["columns"]) == (str(start + 2), "8", "6")
+
+
+def test_columns_may_be_inserted_twice_and_a_row_cut(tmp_path: Path) -> None:
+    text = _grown(120, (20, 5, 1), (70, 6, 2), short=100)
+    table = read_columns(_file(tmp_path, text), SI, others=True, loose=True)
+    rows = [n for n in range(120) if n != 100]
+    assert [*table.values["time"]] == [float(_cells(n)[0]) for n in rows]
+    assert [*table.values["depth"]] == [float(_cells(n)[3]) for n in rows]
+    assert table.torn == 1
+    assert [cells["depth"] for cells in table.rows()] == [_cells(n)[3] for n in rows]
+
+
+def test_rows_that_cannot_be_assigned_are_left_out_or_refused_in_one_line(tmp_path: Path) -> None:
+    """All cells are alike, or there is no row before the insertion, or the number of cells goes up and down."""
+    for n in (80, 1):
+        rows = [[str(i % 7)] * (3 if i < n else 5) for i in range(100)]
+        path = _file(tmp_path, "\n".join(["time [s],length [m],x", *map(",".join, rows)]))
+        columns = {"time": MAYBE, "length": LENGTH}
+        if n == 80:
+            table = read_columns(path, columns, others=True, loose=True)
+            assert (table.torn, len(table.lines), table.assumed) == (20, 80, {})
+            continue
+        with pytest.raises(DataFileError) as error:
+            read_columns(path, columns, others=True, loose=True)
+        rest = "'1': there is no such column (are these decimal commas? They need ; between the columns)"
+        more = "and 99 rows have more cells than the header, which has 3. Complete the header"
+        assert str(error.value) == f"{path}, line 3, column 4 = {rest}, {more}"
+    ragged = [",".join(_cells(n) + ["1", "2"] * (n % 2)) for n in range(41)]
+    table = read_columns(_file(tmp_path, "\n".join([",".join(TITLES), *ragged])), SI, others=True, loose=True)
+    assert (table.torn, table.assumed) == (20, {})
+
+
 # ---- Variables over time ---------------------------------------------------------------------------------------------
 
 SERIES = {
@@ -183,9 +316,8 @@ def _peak(action: Callable[[], object]) -> int:
 @often("rows", 3_000, 40_000)
 def test_a_log_takes_at_most_six_times_its_size_in_memory(rows: int, tmp_path: Path) -> None:
     path, layout = tmp_path / "log_dive.csv", load_vehicle(SHIPPED["bluerov2"]).layout
-    _log(path, 300)
-    read_log(path, layout)  # imports modules, which should not count
     size = _log(path, rows)
+    read_log(path, layout)  # imports modules, which should not count
     columns = {"time": Column({"s": 1.0}), "depth": Column({"m": 1.0})}
     assert _peak(lambda: read_columns(path, columns, others=True, loose=True)) < 3 * size
     assert _peak(lambda: read_log(path, layout)) < 6 * size

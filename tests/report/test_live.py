@@ -291,9 +291,9 @@ def drop(page: Any, name: str, content: bytes) -> None:
     page.set_input_files("#live-recording", [{"name": name, "mimeType": "text/csv", "buffer": content}])
 
 
-def dropped(page: Any, log: Path, text: str) -> Any:
+def dropped(page: Any, log: Path, text: str, encoding: str = "utf-8") -> Any:
     """Write a log, give it to the page, and return the recording that the page reads."""
-    log.write_text(text, encoding="utf-8")
+    log.write_text(text, encoding=encoding)
     page.evaluate("live.flight.replay = null")
     drop(page, log.name, log.read_bytes())
     until(page, "live.flight.replay !== null")
@@ -378,6 +378,17 @@ WRITTEN |= {
 }
 
 
+_PLAIN = ["time [s];u_t [%];roll [°];heave depth [cm]", *(f"{n};{n},5;0,5;{n}" for n in range(40))]
+WRITTEN |= {
+    "code page 1252": _PLAIN,
+    "UTF-16": _PLAIN,
+    "a separator for Excel": ["sep=;", *_PLAIN],
+    "an instrument": ["Tank; of Odense, Denmark; by us; all", "Rate [Hz];10;;", "Date;2024-05-11;;", "", *_PLAIN],
+    "comments": ["# by hand", "# 1;2;3;4", f"# {_PLAIN[0]}", *_PLAIN[1:]],
+}
+ENCODINGS = {"code page 1252": "cp1252", "UTF-16": "utf-16"}
+
+
 def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
     """Check that the page has the measurements of these axes that identify uses."""
     used = {(c.quantity.axis, not c.quantity.is_velocity): c for c in log.channels if not c.unused}
@@ -391,7 +402,7 @@ def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
 @pytest.mark.parametrize("name", WRITTEN)
 def test_a_log_is_read_as_identify_reads_it(name: str, page: Any, vehicle: Vehicle, tmp_path: Path) -> None:
     """After the clock was set back, the rows are another recording."""
-    recording = dropped(page, tmp_path / "pool.csv", "\n".join(WRITTEN[name]))
+    recording = dropped(page, tmp_path / "pool.csv", "\n".join(WRITTEN[name]), ENCODINGS.get(name, "utf-8"))
     read, *_ = read_logs(tmp_path / "pool.csv", vehicle.layout, Names())
     check_read_alike(recording, read, [form.axis for form in vehicle.layout.axes])
     assert read.commands is not None

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SWAY
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
@@ -14,7 +15,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests.commands import TESTS
 from tests.folders import (
     BLUEROV2,
@@ -85,6 +86,46 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     inputs: list[Path] = []
     load_tests(folder, inputs.extend)
     assert folder / "old.toml" in inputs
+
+
+@pytest.mark.parametrize("coupling", [None, True, False])
+@pytest.mark.parametrize("base", ["bluerov2", "bluerov2_heavy", "videoray"])
+def test_the_coupling_of_the_base_can_be_changed(base: str, coupling: bool | None, tmp_path: Path) -> None:
+    """A vehicle without sway, such as the VideoRay, cannot be coupled, and a fact says so."""
+    vehicle = load_vehicle(SHIPPED[base])
+    own = "" if coupling is None else f"[body]\ncoupling = {str(coupling).lower()}\n"
+    tests = read(tmp_path, f'base = "{base}"\n{HEAD}{own}', responses(vehicle, HEAVE))
+    wanted = vehicle.layout.coupled if coupling is None else coupling
+    assert tests.given.vehicle.layout.coupled == (wanted and base != "videoray")
+    assert ("not coupled" in [finding.kind for finding in tests.findings]) == (wanted and base == "videoray")
+
+
+@pytest.mark.parametrize("own", ["", 'base = "videoray"\n', 'base = "../of/mine.toml"\n'])
+def test_the_base_of_the_command_line_may_lie_anywhere(
+    own: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It replaces that of rov.toml, is an input, and is named in the result. A path in rov.toml stays in the folder."""
+    elsewhere = tmp_path / "of" / "mine.toml"
+    elsewhere.parent.mkdir()
+    text = SHIPPED["bluerov2"].read_text(encoding="utf-8")
+    elsewhere.write_text(text.replace("coupling = true", ""), encoding="utf-8")
+    rows = responses(load_vehicle(SHIPPED["bluerov2"]), SWAY)
+    folder = folder_of(tmp_path / "tests", f"{own}{HEAD}", rows)
+    inputs: list[Path] = []
+    tests = load_tests(folder, inputs.extend, elsewhere)
+    assert elsewhere in inputs
+    assert [*tests.inputs][:2] == [ROV_FILE, "mine.toml"]
+    assert not tests.given.vehicle.layout.coupled
+    assert load_tests(folder, base=SHIPPED["bluerov2"]).given.description.base_name == "bluerov2"
+    for given, target, message in (
+        (elsewhere, elsewhere, "would overwrite"),
+        (tmp_path / "none.toml", tmp_path / "out.toml", f"{tmp_path / 'none.toml'}: there is no such file"),
+    ):
+        assert main(["identify", str(folder), "--base", str(given), "-o", str(target)]) == 2
+        assert message in capsys.readouterr().err.splitlines()[-1]
+    if ".." in own:
+        with pytest.raises(VehicleFileError, match=r"base = .*must lead to a place inside the folder of this file"):
+            load_tests(folder)
 
 
 # ---- Hardware tables -------------------------------------------------------------------------------------------------

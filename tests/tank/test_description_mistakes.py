@@ -97,7 +97,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         f'base = "remus100.toml"\n{HEAD}',
         {"remus100.toml": (ROOT / "examples" / "remus100" / "remus100.toml").read_text(encoding="utf-8")},
-        ": there are no tests",
+        ": there is no log and no table in this folder. These formats are read: a CSV file, ",
     ),
     (
         DOWN.replace('curve = "t200"', 'curve = "t100"'),

@@ -28,6 +28,8 @@ from rov_fmu.tank.catalogue import (
 from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_columns
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
+from rov_fmu.tank.readers.listing import list_files
+from rov_fmu.tank.readers.parsers import open_table
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>[^\])]*)[\])]\s*")
 _PERCENT = re.compile(r"(?P<name>.*\S)\s+(?P<unit>%)")
@@ -345,13 +347,15 @@ def headers_of_tables(folder: Path) -> TableHeaders:
     """Return the information in the tables of a folder. Of a table that cannot be read, only the name is used."""
     columns: dict[str, str] = {}
     tested = set()
-    for path in sorted(folder.glob("*.[cC][sS][vV]")):
+    for path in list_files(folder).tests:
         if kind := kind_of_table(path, {}):
             if kind == "thrust":
                 _, curve = parts_of_name(path.stem.lower(), None)
                 tested.add(curve)
             with suppress(DataFileError):
-                for title, meant in guessed_of_table(kind, axis_in_name(path), read_header(path)).items():
+                for title, meant in guessed_of_table(
+                    kind, axis_in_name(path), read_header(path, open_table(path))
+                ).items():
                     columns[title] = meant or columns.get(title, "")
     return TableHeaders(tuple(_curves(tested)), columns)
 

@@ -19,7 +19,7 @@ from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.folder import kind_of_table, test_files
+from rov_fmu.tank.folder import kind_of_table
 from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
@@ -127,14 +127,14 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
     unread = {title: what for title, what in ranges.items() if not is_column(columns.get(title, title))}
     if len(ranges) - len(unread) < len(of_table):
         return Inspection(path, path.name, (), (), unread, (), columns)
-    rows, _ = read_rows(path, kind, axis, columns)
+    rows, _, told = read_rows(path, kind, axis, columns)
     numbers = zip(*((row.command, row.value) for row in rows), strict=True)
     no_times = np.full(len(rows), nan)
     channels = (
         _row(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
         for (name, column), own in zip(of_table.items(), numbers, strict=True)
     )
-    return Inspection(path, path.name, (), tuple(channels), unread, (), columns)
+    return Inspection(path, path.name, (), tuple(channels), unread, tuple(told), columns)
 
 
 def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection | None:
@@ -143,19 +143,15 @@ def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[st
         with suppress(DataFileError):
             if (found := _of_table(path, kind, renamed, ranges)).channels:
                 name = f"{kind}_<{'curve' if kind == 'thrust' else 'axis'}>{path.suffix}"
-                return replace(found, findings=(about(path.name, "unnamed table", measured=measured, name=name),))
+                return replace(
+                    found, findings=(*found.findings, about(path.name, "unnamed table", measured=measured, name=name))
+                )
     return None
 
 
-def logs_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> list[Path]:
-    """Return the logs in a folder, or in the folder of a bag, or the path itself; without logs, the tables in a folder.
-
-    `columns` is the table [columns] of rov.toml.
-    """
-    if not path.is_dir():
-        return [path]
-    files = test_files(path)
-    return [file for file in files if not kind_of_table(file, columns)] or files
+def logs_among(tests: Sequence[Path], columns: Mapping[str, str] = MappingProxyType({})) -> Sequence[Path]:
+    """Return the logs among tests, or without logs the tables. `columns` is the table [columns] of rov.toml."""
+    return [file for file in tests if not kind_of_table(file, columns)] or tests
 
 
 def _row(name: str, unit: str, time: Array, values: Array) -> Row:

@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
-from functools import partial
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,13 +19,13 @@ from typing import TextIO
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
-from rov_fmu.io.csv_table import LARGEST, DataFileError, UnreadableFileError
+from rov_fmu.io.csv_table import UTF_16_MARKS, DataFileError, UnreadableFileError, open_text
 from rov_fmu.io.messages import NO_FILE, brief, listed
-from rov_fmu.io.reading import read_lines
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import read_bag, read_mcap
 from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_telemetry
+from rov_fmu.tank.readers.other_files import EMPTY, reason_against
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.tank.readers.ulog import read_ulog
 
@@ -61,10 +60,12 @@ _BEGINNINGS = {
     b"MATLAB 7.3 MAT-file": _MATLAB,
 }
 """The formats by their first bytes."""
-_TABLE = Format("a CSV file", partial(read_lines, kind=UnreadableFileError, most=LARGEST))
+TABLE = Format("a CSV file", open_text)
 _TELEMETRY = Format("a telemetry log", None, read_telemetry, _PYMAVLINK)
 _MAVLINK_STARTS = (b"\xfe", b"\xfd")
 """The first byte of a MAVLink message, which follows eight bytes of time in a telemetry log."""
+FORMATS = listed(dict.fromkeys(kind.name for kind in (TABLE, _TELEMETRY, *_BEGINNINGS.values())))
+"""The formats that are read."""
 
 
 def format_of(path: Path) -> Format:
@@ -77,16 +78,17 @@ def format_of(path: Path) -> Format:
     except OSError as error:
         raise UnreadableFileError(f"{path}: cannot be read: {error.strerror or error}") from error
     if not head:
-        raise UnreadableFileError(f"{path}: the file is empty")
+        raise UnreadableFileError(f"{path}: {EMPTY}")
     for beginning, kind in _BEGINNINGS.items():
         if head.startswith(beginning):
             return kind
     if head[8:9] in _MAVLINK_STARTS and head[0] == 0:  # µs since 1970, most significant byte first
         return _TELEMETRY
-    if b"\0" not in head:
-        return _TABLE
-    names = listed(dict.fromkeys(kind.name for kind in (_TABLE, _TELEMETRY, *_BEGINNINGS.values())))
-    raise UnreadableFileError(f"{path}: its first bytes are those of none of the formats that are read: {names}")
+    reason = reason_against(path, head)
+    if not reason and (b"\0" not in head or head.startswith(UTF_16_MARKS)):
+        return TABLE
+    reason = reason or f"its first bytes are those of none of the formats that are read: {FORMATS}"
+    raise UnreadableFileError(f"{path}: {reason}")
 
 
 def open_table(path: Path) -> Callable[[], TextIO] | None:

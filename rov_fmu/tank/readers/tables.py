@@ -21,11 +21,13 @@ from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import (
     COMMANDS,
+    MOST_BEFORE,
     NEUTRAL,
     NO_OUTPUT,
     NUMBER,
     PULSES,
     SPAN,
+    VALUE,
     Columns,
     DataFileError,
     read_columns,
@@ -76,6 +78,8 @@ def rules_of_page() -> dict[str, Any]:
     """Return the rules by which recording.js, of the page that flies, reads tables as `read_table` does."""
     return {
         "number": NUMBER.pattern,
+        "value": VALUE.pattern,
+        "mostBefore": MOST_BEFORE,
         "times": TIMES,
         "fractions": FRACTION.units,
         "pulses": {"units": PULSES, "neutral": NEUTRAL, "span": SPAN, "none": NO_OUTPUT},
@@ -141,6 +145,7 @@ def read_table(
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
+    told += [about(path.name, kind, **words) for kind, words in table.assumed.items()]
     content = Content(path.name, [], names=frozenset(table.header))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, pulses, names.keys.neutral)

@@ -8,6 +8,8 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.csv_table import BEYOND, DataFileError, KnownColumns, read_columns
 from rov_fmu.io.messages import MOST
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
+from rov_fmu.tank.findings import Finding, about
+from rov_fmu.tank.readers.parsers import open_table
 
 
 @dataclass(frozen=True)
@@ -22,15 +24,16 @@ class Row:
 
 def read_rows(
     path: Path, kind: str, axis: Axis | None = None, names: Mapping[str, str] = {}
-) -> tuple[list[Row], frozenset[str]]:
+) -> tuple[list[Row], frozenset[str], list[Finding]]:
     """Read rows of a command and a force (`thrust`), velocity (`steady`) or time constant. Raises DataFileError.
 
-    `names` is the table [columns] of rov.toml. Also returns the keys of `names` that the file has.
+    `names` is the table [columns] of rov.toml. Also returns the keys of `names` that the file has, and what was assumed
+    about its form.
     """
     name, columns = TABLES[kind], columns_of(kind, axis)
     is_column = KnownColumns(columns).has
     renamed = {title: meant for title, meant in names.items() if is_column(meant)}  # the other entries are for logs
-    table = read_columns(path, columns, others=True, renamed=renamed, hint=RENAMING)
+    table = read_columns(path, columns, others=True, renamed=renamed, hint=RENAMING, open_stream=open_table(path))
     refuse_slips(table, ["command"])
     noise = 0.05 * max(map(abs, table.values[name]))
     numbers = [*zip(table.lines, table.values["command"], table.values[name], strict=True)]
@@ -46,7 +49,8 @@ def read_rows(
         more = len(mistakes) - MOST
         counted = [f"{path}: {more} more rows like these"] if more > 0 else []
         raise DataFileError(*map(str, mistakes[:MOST]), *counted)
-    return [Row(path.name, *row) for row in numbers], frozenset(renamed).intersection(table.header)
+    told = [about(path.name, kind, **words) for kind, words in table.assumed.items()]
+    return [Row(path.name, *row) for row in numbers], frozenset(renamed).intersection(table.header), told
 
 
 def _impossible(kind: str, command: float, value: float, noise: float) -> str | None:

@@ -1,0 +1,109 @@
+"""The files of a folder: which are logs and tables, by their content, and why the others are not read."""
+
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+
+from rov_fmu.io.csv_table import DataFileError, looks_like_table
+from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
+from rov_fmu.io.messages import listed
+from rov_fmu.tank.findings import Finding, about
+from rov_fmu.tank.readers.other_files import EMPTY, IN_FOLDER, NO_FILE, NO_TABLE, PICTURE
+from rov_fmu.tank.readers.parsers import FORMATS, TABLE, format_of
+
+BAG = "metadata.yaml"
+"""The file in the folder of a bag of ROS 2."""
+_MOST_NAMES = 3
+"""The largest number of files with the same suffix that a sentence names one by one."""
+
+
+@dataclass
+class Listing:
+    """The files of a folder."""
+
+    folder: Path
+    tests: list[Path] = field(default_factory=list)
+    """The logs and tables, also those of bags in folders of their own, in order."""
+    others: dict[str, list[Path]] = field(default_factory=dict)
+    """The files that are not read, by the reason."""
+
+    @property
+    def findings(self) -> list[Finding]:
+        """A finding for each reason why files are not read: a warning, unless nobody expects them to be read."""
+        usual = (PICTURE, EMPTY, NO_TABLE, IN_FOLDER)
+        return [
+            about(_named(paths), "other files" if reason in usual else "unreadable file", reason=reason)
+            for reason, paths in self.others.items()
+        ]
+
+    def lines(self, *kinds: str) -> list[str]:
+        """Return a line for each finding of these kinds."""
+        return [f"{self.folder / one.file}: {one.names['reason']}" for one in self.findings if one.kind in kinds]
+
+    def no_tests(self) -> list[str]:
+        """Return the lines about a folder without logs and tables."""
+        none = f"{self.folder}: there is no log and no table in this folder. These formats are read: {FORMATS}"
+        return [none, *self.lines("unreadable file", "other files")]
+
+
+def list_files(folder: Path, named: Collection[str] = ()) -> Listing:
+    """Return the files of a folder.
+
+    Nothing is told of hidden files, of vehicle files, FMUs and pages, and of those with the given names.
+    """
+    listing = Listing(folder)
+    for path in sorted(folder.iterdir()):
+        if (path / BAG).is_file():
+            listing.tests += sorted(part for part in path.iterdir() if part.name != BAG and part.is_file())
+        elif not (_is_of_program(path) or path.name in named):
+            reason = _why_not_read(path)
+            if reason:
+                listing.others.setdefault(reason, []).append(path)
+            elif reason is not None:
+                listing.tests.append(path)
+    return listing
+
+
+def has_usual_suffix(path: Path) -> bool:
+    """Return True if the name of a file tells that it is a log or a table."""
+    return path.name.lower().endswith((*LOG_SUFFIXES, *TABLE_SUFFIXES))
+
+
+def _is_of_program(path: Path) -> bool:
+    if path.suffix.lower() == ".mcap" and path.is_file():
+        with suppress(OSError), path.open("rb") as file:
+            return IDENTIFIED.encode() in file.read(64)
+    return path.name.startswith(".") or path.name == BAG or path.suffix.lower() in OWN_SUFFIXES
+
+
+def _why_not_read(path: Path) -> str | None:
+    """Return why a file or folder is not read, and what to do; an empty text if it is, and None for a folder without
+    tests.
+
+    What has a usual suffix is always read, so that its mistakes are told.
+    """
+    try:
+        if not (path.is_file() or path.is_dir()):
+            return NO_FILE
+        if has_usual_suffix(path):
+            return ""
+        if path.is_dir():
+            has_tests = any(part.is_file() and not _why_not_read(part) for part in path.iterdir())
+            return IN_FOLDER if has_tests else None
+        is_text = format_of(path) is TABLE
+    except DataFileError as error:
+        return str(error).removeprefix(f"{path}: ")
+    except OSError:  # a folder that may not be listed
+        return None
+    return NO_TABLE if is_text and not looks_like_table(path) else ""
+
+
+def _named(paths: Collection[Path]) -> str:
+    """Return the names of files; of many with the same suffix, only the first one and how many there are."""
+    names = []
+    for suffix, group in groupby(sorted(paths, key=lambda path: path.suffix), lambda path: path.suffix):
+        first, *more = (f"{path.name}/" if path.is_dir() else path.name for path in group)
+        names += [first, *more] if len(more) < _MOST_NAMES else [f"{first} and {len(more)} more *{suffix}"]
+    return listed(names)
