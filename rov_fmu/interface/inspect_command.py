@@ -18,7 +18,7 @@ from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
-from rov_fmu.tank.folder import PATTERNS, unreadable
+from rov_fmu.tank.folder import PATTERNS, test_files, unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_of
 from rov_fmu.tank.readers.parsers import one_parser
@@ -52,9 +52,10 @@ class Inspected:
 
 def lacks_description(folder: Path) -> bool:
     """Return True for a folder with logs or tables but without rov.toml."""
-    return folder.is_dir() and not (folder / ROV_FILE).exists() and bool(logs_of(folder))
+    return folder.is_dir() and not (folder / ROV_FILE).exists() and bool(test_files(folder))
 
 
+@one_parser()
 def inspect_logs(path: Path) -> Inspected:
     """Return what a log, or each log in a folder, contains, with a draft of rov.toml.
 
@@ -71,13 +72,12 @@ def inspect_logs(path: Path) -> Inspected:
     inspections: list[Inspection] = []
     mistakes: list[str] = []
     findings: list[Finding] = []
-    with one_parser():
-        for log in logs_of(path, described.tables.columns):
-            try:
-                inspections += inspect(log, layouts.values(), described)
-            except DataFileError as error:
-                mistakes += str(error).splitlines()
-                findings.append(unreadable(log, error))
+    for log in logs_of(path, described.tables.columns):
+        try:
+            inspections += inspect(log, [*layouts.values()], described)
+        except DataFileError as error:
+            mistakes += str(error).splitlines()
+            findings.append(unreadable(log, error))
     if not inspections:
         raise DataFileError(*(mistakes or [f"{path}: there is no log ({PATTERNS}) in it"]))
     tables = headers_of_tables(folder)

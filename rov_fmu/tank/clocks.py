@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, Flags
 
 Name = TypeVar("Name")
 Number = TypeVar("Number", bound=np.generic)
@@ -15,6 +15,8 @@ LEAST_AFTER = 10
 """The least number of messages in a row after a restart. Fewer messages are only out of order."""
 AGAIN = 0.5
 """The least number of earlier messages that have times in the range of these messages, as a share of their number."""
+_FAR, _INTERVALS = 3600.0, 1000.0
+"""A time is far from another one if both this time, s, and this many usual intervals are between them."""
 _OTHER_CLOCK = 1.0
 """If the times of messages and of their arrival differ by more than this, they come from different clocks, s."""
 
@@ -52,6 +54,34 @@ def restart_rows(time: Array) -> list[int]:
         if end - start >= LEAST_AFTER and (again or last < before.min()):
             return [start, *(start + row for row in restart_rows(time[start:]))]
     return []
+
+
+def are_stray(time: Array) -> Flags:
+    """Return True for each time that no clock can have shown among the others, as one with a flipped bit.
+
+    Such times are few, and far from all others in the log. A clock that is set during a log jumps as far, but many
+    times follow. NaN stands for no time, and is not stray.
+    """
+    order = np.argsort(time)
+    steps = np.diff(time[order])
+    usual = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+    group = np.cumsum(np.append(0, steps > max(_FAR, _INTERVALS * usual)))[: len(time)]
+    size = np.bincount(group, np.isfinite(time[order]))
+    stray = np.empty(len(time), bool)
+    stray[order] = size[group] < min(LEAST_AFTER, size.max(initial=0.0))
+    return stray & ~np.isnan(time)
+
+
+def first_in_each(time: Array, rate: float, begin: float | None = None) -> NDArray[np.intp]:
+    """Return the first row in each interval that has rows, of a number of intervals per second (1/s). The first one
+    begins at `begin`, or else at the first row; `time` ascends.
+
+    The work grows with the rows, and not with the time between them, which a clock that is set can make a century.
+    """
+    if not len(time):
+        return np.empty(0, np.intp)
+    number = np.floor((time - (time[0] if begin is None else begin)) * rate + 1e-6)
+    return np.append(0, np.flatnonzero(np.diff(number)) + 1)
 
 
 def usual_delay(pairs: Array) -> float:

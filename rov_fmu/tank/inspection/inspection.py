@@ -1,12 +1,11 @@
 """List the content of logs before a vehicle is known, and the headers that rov.toml would have to explain."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
-from types import MappingProxyType
 from typing import TextIO
 
 import numpy as np
@@ -24,7 +23,7 @@ from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_ta
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.tank.readers.parsers import open_table
+from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
 
 
@@ -63,7 +62,8 @@ class Inspection:
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
 
 
-def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_FILE) -> list[Inspection]:
+@guarded
+def inspect(path: Path, layouts: Sequence[Layout], described: RovFile = NO_ROV_FILE) -> list[Inspection]:
     """Return what a log contains, for each piece between two restarts of its clock, or what a table contains.
 
     The thrusters and columns have the names of the described vehicle, and the tables [columns], [topics] and [logs] of
@@ -147,7 +147,7 @@ def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[st
     return None
 
 
-def logs_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> list[Path]:
+def logs_of(path: Path, columns: Mapping[str, str] = {}) -> list[Path]:
     """Return the logs in a folder, or in the folder of a bag, or the path itself; without logs, the tables in a folder.
 
     `columns` is the table [columns] of rov.toml.

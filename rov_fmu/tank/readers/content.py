@@ -8,8 +8,8 @@ from types import MappingProxyType
 import numpy as np
 
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import restarts, usual_delay
+from rov_fmu.tank.channels import IMPOSSIBLE, Topic
+from rov_fmu.tank.clocks import are_stray, restarts, usual_delay
 from rov_fmu.tank.commands import Parameters
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
@@ -50,6 +50,19 @@ class Content:
         """Add a finding about something that was counted, if there is any."""
         if count:
             self.findings.append(about(self.file, kind, count=count, **words))
+
+    def leave_out_strays(self) -> None:
+        """Leave out the messages whose times no clock can have shown, and count them."""
+        times = [topic.time for piece in self.pieces for topic in piece.topics]
+        together = np.concatenate([np.empty(0), *times])
+        stray = are_stray(together) | (np.abs(together) >= IMPOSSIBLE)
+        self.count("stray times", int(stray.sum()))
+        if not stray.any():
+            return
+        kept = iter(np.split(~stray, np.cumsum([*map(len, times)])[:-1]))
+        for piece in self.pieces:
+            piece.topics = [topic.where(next(kept)) for topic in piece.topics]
+            piece.topics = [topic for topic in piece.topics if len(topic.time)]
 
 
 def content_of(

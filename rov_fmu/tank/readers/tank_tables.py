@@ -8,6 +8,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.csv_table import DataFileError, KnownColumns, read_columns
 from rov_fmu.io.messages import MOST
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
+from rov_fmu.tank.readers.parsers import guarded, open_table
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Row:
     value: float
 
 
+@guarded
 def read_rows(
     path: Path, kind: str, axis: Axis | None = None, names: Mapping[str, str] = {}
 ) -> tuple[list[Row], frozenset[str]]:
@@ -30,7 +32,7 @@ def read_rows(
     name, columns = TABLES[kind], columns_of(kind, axis)
     is_column = KnownColumns(columns).has
     renamed = {title: meant for title, meant in names.items() if is_column(meant)}  # the other entries are for logs
-    table = read_columns(path, columns, others=True, renamed=renamed, hint=RENAMING)
+    table = read_columns(path, columns, others=True, renamed=renamed, hint=RENAMING, open_stream=open_table(path))
     refuse_slips(table, ["command"])
     noise = 0.05 * max(map(abs, table.values[name]))
     numbers = [*zip(table.lines, table.values["command"], table.values[name], strict=True)]
