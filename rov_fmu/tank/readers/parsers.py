@@ -80,8 +80,8 @@ FORMATS = (
 def format_of(path: Path) -> Format:
     """Return the format of a log by its first bytes. Raises DataFileError for a file that is none."""
     try:
-        if path.exists() and not path.is_file():
-            raise DataFileError(f"{path}: is not a file")
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise DataFileError(f"{path}: is a device or a pipe, and not a file")
         with path.open("rb") as file:
             head = file.read(1024)
     except FileNotFoundError:
@@ -165,6 +165,8 @@ class _Parser:
         with self.lock:
             key = (file.st_dev, file.st_ino, file.st_mtime_ns, file.st_size)
             left = replace(limits, time=limits.time and limits.time - self.spent.get(key, 0.0))
+            if left.time is not None and left.time <= 0.0:
+                raise _exceeding(path, LimitError("time", limits))
             try:
                 self._child = self._child or ChildProcess(Functions, limits=limits)
                 begin = monotonic()
@@ -176,7 +178,7 @@ class _Parser:
             except ChildError as error:
                 self.close()
                 if isinstance(error, LimitError):
-                    raise UnreadableFileError(f"{path}: {LimitError(error.limit, limits)} to be read") from error
+                    raise _exceeding(path, LimitError(error.limit, limits)) from error
                 raise UnreadableFileError(f"{path}: its parser {error}") from error
             finally:
                 if limits.memory != budget(0).memory:
@@ -190,6 +192,10 @@ class _Parser:
 
 
 _PARSER = _Parser()
+
+
+def _exceeding(path: Path, error: LimitError) -> UnreadableFileError:
+    return UnreadableFileError(f"{path}: {error} to be read")
 
 
 def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
@@ -240,7 +246,7 @@ def read_content(path: Path, named: Collection[str]) -> Content:
                 kind = _format_of_unpacked(path, file)
             assert kind.read
             content = kind.read(_under_its_suffix(file, kind, Path(folder)), named)
-    except ImportError:
+    except ModuleNotFoundError:
         raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
     if printed.getvalue():
         content.findings.append(about(path.name, "damaged log"))

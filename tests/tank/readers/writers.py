@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import zstandard
 from mcap.writer import Writer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
@@ -80,6 +82,14 @@ def columns(dive: Dive) -> list[Array]:
 
 def csv(folder: Path, dive: Dive) -> Path:
     return table(folder / "dive.csv", ",".join(TITLES), *columns(dive))
+
+
+def matlab(folder: Path, dive: Dive) -> Path:
+    """Write vectors of MATLAB, whose names are the headers without units, and the pulses in a structure."""
+    own = dict(zip((title.partition(" [")[0].replace(" ", "_") for title in TITLES), columns(dive), strict=True))
+    pulses = {name: own.pop(name) for name in [*own] if name.startswith("u_")}
+    savemat(folder / "dive.mat", {**own, "pwm": pulses})
+    return folder / "dive.mat"
 
 
 # ---- MAVLink ---------------------------------------------------------------------------------------------------------
@@ -199,20 +209,40 @@ def dataflash(path: Path, messages: Iterable[bytes]) -> Path:
     return path
 
 
+def dataflash_text(path: Path, messages: Iterable[tuple[Any, ...]]) -> Path:
+    """Write a log as ground stations convert it to text: a line for each message, with its numbers in their units."""
+    declared = [(128, "BBnNZ", "FMT", "Type,Length,Name,Format,Columns")]
+    declared += [(kind, form, name, columns) for name, (kind, form, columns) in FORMATS.items()]
+    lines = [f"FMT, {kind}, 89, {name}, {form}, {columns}" for kind, form, name, columns in declared]
+    for name, *values in messages:
+        lines.append(", ".join([name, *(v.decode() if isinstance(v, bytes) else f"{v:.10g}" for v in values)]))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
 def rcou(time: float, *pulses: int) -> bytes:
     return packed("RCOU", round(time * 1e6), *pulses, *[0] * (14 - len(pulses)))
 
 
-def flash(folder: Path, dive: Dive) -> Path:
-    messages = [packed("PARM", round(dive.start * 1e6), b"MOT_1_DIRECTION", 1.0, 0.0)]
+def _flash_messages(dive: Dive) -> Iterator[tuple[Any, ...]]:
+    """Yield the name and the values of each message."""
+    yield "PARM", round(dive.start * 1e6), b"MOT_1_DIRECTION", 1.0, 0.0
     for n, time in enumerate(dive.start + dive.time):
         degrees, stamp = np.degrees(dive.euler[n]), round(time * 1e6)
         heading = degrees[2] % 360.0
-        messages += [rcou(time, *dive.pulses[n].astype(int).tolist())]
-        messages += [packed("ATT", stamp, 0.0, degrees[0], 0.0, degrees[1], 0.0, heading, 0.0, 0.0, 3)]
+        yield "RCOU", stamp, *dive.pulses[n].astype(int).tolist(), *[0] * 8
+        yield "ATT", stamp, 0.0, degrees[0], 0.0, degrees[1], 0.0, heading, 0.0, 0.0, 3
         filtered = [*degrees[:2], heading, *dive.over_ground[n], 0.0, *dive.position[n], 0.0, 0.0, 0.0, 0.0]
-        messages += [packed("XKF1", stamp, 0, *filtered), packed("BAT", stamp, 0, dive.voltage[n])]
-    return dataflash(folder / "dive.bin", messages)
+        yield "XKF1", stamp, 0, *filtered
+        yield "BAT", stamp, 0, dive.voltage[n]
+
+
+def flash(folder: Path, dive: Dive) -> Path:
+    return dataflash(folder / "dive.bin", (packed(*message) for message in _flash_messages(dive)))
+
+
+def flash_text(folder: Path, dive: Dive) -> Path:
+    return dataflash_text(folder / "dive.log", _flash_messages(dive))
 
 
 # ---- ULog ------------------------------------------------------------------------------------------------------------
@@ -402,10 +432,33 @@ def bag(suffix: str) -> Callable[[Path, Dive], Path]:
     return write
 
 
+def packed_bag(folder: Path, dive: Dive) -> Path:
+    """Write a bag of ROS 2 as `ros2 bag record --compression-mode file` leaves it."""
+    path = bag(".db3")(folder, dive)
+    packed = path.with_name(f"{path.name}.zstd")
+    packed.write_bytes(zstandard.compress(path.read_bytes()))
+    path.unlink()
+    return packed
+
+
 LOGS: Mapping[str, Callable[[Path, Dive], Path]] = {
     ".bin": flash,
     ".tlog": tlog,
     ".ulg": ulog,
     **{suffix: bag(suffix) for suffix in (".bag", ".db3", ".mcap")},
+    ".zstd": packed_bag,
 }
-"""The formats that a parser of somebody else reads."""
+"""The logs that have a suffix of their own, and that a parser of somebody else reads."""
+SEEDS: Mapping[str, Callable[[Path, Dive], Path]] = {
+    "a DataFlash log": flash,
+    "a DataFlash log in text": flash_text,
+    "a telemetry log": tlog,
+    "a ULog": ulog,
+    "a bag of ROS 1": bag(".bag"),
+    "a bag of ROS 2": bag(".db3"),
+    "an MCAP file": bag(".mcap"),
+    "a file that zstd compressed": packed_bag,
+    "a .mat file": matlab,
+    "a CSV file": csv,
+}
+"""A writer for every format, by its name in rov_fmu/tank/readers/parsers.py."""
