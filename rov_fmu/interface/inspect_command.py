@@ -74,7 +74,7 @@ def inspect_logs(path: Path) -> Inspected:
     findings: list[Finding] = []
     for log in logs_of(path, described.tables.columns):
         try:
-            inspections += inspect(log, [*layouts.values()], described)
+            inspections += inspect(log, layouts.values(), described)
         except DataFileError as error:
             mistakes += str(error).splitlines()
             findings.append(unreadable(log, error))

@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.arrays import Array
 
 Name = TypeVar("Name")
 Number = TypeVar("Number", bound=np.generic)
@@ -56,20 +56,22 @@ def restart_rows(time: Array) -> list[int]:
     return []
 
 
-def are_stray(time: Array) -> Flags:
-    """Return True for each time that no clock can have shown among the others, as one with a flipped bit.
+def parts_of_clock(time: Array) -> NDArray[np.intp]:
+    """Return the number of the part of a log to which each time belongs, in the order of time.
 
-    Such times are few, and far from all others in the log. A clock that is set during a log jumps as far, but many
-    times follow. NaN stands for no time, and is not stray.
+    Parts are far from each other: a clock was set between them, or the log was interrupted. A few times that are far
+    from all others, as one with a flipped bit, belong to none, and have -1. So has NaN.
     """
     order = np.argsort(time)
     steps = np.diff(time[order])
     usual = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
-    group = np.cumsum(np.append(0, steps > max(_FAR, _INTERVALS * usual)))[: len(time)]
-    size = np.bincount(group, np.isfinite(time[order]))
-    stray = np.empty(len(time), bool)
-    stray[order] = size[group] < min(LEAST_AFTER, size.max(initial=0.0))
-    return stray & ~np.isnan(time)
+    part = np.cumsum(np.append(0, steps > max(_FAR, _INTERVALS * usual)))[: len(time)]
+    size = np.bincount(part, np.isfinite(time[order]))
+    is_kept = size >= min(LEAST_AFTER, size.max(initial=1.0))
+    number = np.empty(len(time), np.intp)
+    number[order] = np.where(is_kept, np.cumsum(is_kept) - 1, -1)[part]
+    number[np.isnan(time)] = -1
+    return number
 
 
 def first_in_each(time: Array, rate: float, begin: float | None = None) -> NDArray[np.intp]:

@@ -96,7 +96,9 @@ SENTENCES: dict[str, SentenceForm] = {
     # Rows of a log
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",
-    "stray times": ("{files}: {count:#time stamp} far from all others left out. Is the file damaged?"),
+    "stray times": (
+        "{files}: {count:#time stamp} hours or years from all others left out. The file is damaged, or a clock was set"
+    ),
     "rows without time": "{files}: {count:#row} without a time left out",
     "rows without command": "{files}: {count:#row} without a command left out",
     "torn rows": "{files}: {count:#row} with more cells than the header left out",

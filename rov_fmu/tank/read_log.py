@@ -49,6 +49,7 @@ def read_logs(
         content, entries = read_table(path, layout, axis, names, lines, is_part=is_part)
     else:
         content = read_content(path, {name.partition(".")[0] for name in entries})
+    content.split_by_clock()
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
     return [_log(path, content, piece, layout, entries, names.keys, axis) for piece in content.pieces]
 

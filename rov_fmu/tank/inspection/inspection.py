@@ -1,7 +1,7 @@
 """List the content of logs before a vehicle is known, and the headers that rov.toml would have to explain."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import nan
@@ -62,17 +62,20 @@ class Inspection:
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
 
 
-@guarded
-def inspect(path: Path, layouts: Sequence[Layout], described: RovFile = NO_ROV_FILE) -> list[Inspection]:
+def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_FILE) -> list[Inspection]:
     """Return what a log contains, for each piece between two restarts of its clock, or what a table contains.
 
     The thrusters and columns have the names of the described vehicle, and the tables [columns], [topics] and [logs] of
     its rov.toml are obeyed. Without one, the thrusters of a CSV log have the names of the first layout that fits, or
     else names that follow from the headers. Raises DataFileError.
     """
-    axis = axis_in_name(path)
-    description, tables = described.description, described.tables
-    layout = description.layout if description else Layout((), (), ())
+    layout = described.description.layout if described.description else None
+    return _inspected(path, [*layouts], layout, described.tables)
+
+
+@guarded
+def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, tables: RovTables) -> list[Inspection]:
+    axis, layout = axis_in_name(path), described or Layout((), (), ())
     columns: Mapping[str, str] = {}
     unread: dict[str, str] = {}
     if open_stream := open_table(path):
@@ -85,7 +88,7 @@ def inspect(path: Path, layouts: Sequence[Layout], described: RovFile = NO_ROV_F
         columns = renamed = {title: tables.columns[title] for title in titles if title in tables.columns}
         if kind := kind_of_table(path, columns):
             return [_of_table(path, kind, columns, ranges)]
-        if not description:
+        if not described:
             layout, columns = guessed(titles, numbers, axis, layouts)
         names, _ = names_of(layout, RovTables(columns=columns, logs=tables.logs))
         is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
@@ -98,7 +101,7 @@ def inspect(path: Path, layouts: Sequence[Layout], described: RovFile = NO_ROV_F
         if count < 2 or not has_time:
             return [Inspection(path, path.name, (), (), unread, (), columns)]
     else:
-        names, _ = names_of(layout if description else None, tables)
+        names, _ = names_of(described, tables)
         axis = None
     logs = map(checked, read_logs(path, layout, names, axis, is_part=True))
     return [_of_log(path, log, unread, columns) for log in logs]

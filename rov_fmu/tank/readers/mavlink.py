@@ -139,7 +139,11 @@ def _of_dataflash(path: Path, reader: Any, counts: Mapping[str, int], named: Col
 def _messages(reader: Any, wanted: Collection[str]) -> Iterator[Message | None]:
     """Yield the messages of some kinds in a log of the vehicle. One without a time is damaged."""
     while message := reader.recv_match(type=wanted):
-        kind, numbers = message.get_type(), _numbers(message)
+        try:
+            kind, numbers = message.get_type(), _numbers(message)
+        except ValueError:  # a text that is no number
+            yield None
+            continue
         part = next((f"{word} {numbers[key]:g}" for key, word in _INSTANCES.items() if key in numbers), "")
         arrival = numbers.get("TimeUS", nan) * 1e-6
         parameter = str(message.Name) if kind == "PARM" else ""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import partial, wraps
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from threading import RLock
 from time import monotonic
 from typing import Any, Concatenate, ParamSpec, TextIO, TypeVar
@@ -214,7 +214,8 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
     except FileError:
         raise
     except Exception as error:
-        kind, reason = format_of(path), brief(str(error)) or type(error).__name__
+        told = re.sub(rf"{re.escape(gettempdir())}\S*", path.name, str(error))  # where it was unpacked
+        kind, reason = format_of(path), brief(told) or type(error).__name__
         hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
         raise UnreadableFileError(
             f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
@@ -250,7 +251,6 @@ def read_content(path: Path, named: Collection[str]) -> Content:
         raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
     if printed.getvalue():
         content.findings.append(about(path.name, "damaged log"))
-    content.leave_out_strays()
     findings = [replace(finding, file=path.name) for finding in content.findings]
     return replace(content, file=path.name, findings=findings)
 

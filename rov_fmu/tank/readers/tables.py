@@ -30,7 +30,7 @@ from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, are_stray, ascending, restart_rows
+from rov_fmu.tank.clocks import AGAIN, LEAST_AFTER, ascending, parts_of_clock, restart_rows
 from rov_fmu.tank.columns import (
     AXIS,
     COMMAND,
@@ -200,7 +200,7 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
 
     Raises DataFileError.
     """
-    stray = are_stray(columns["time"])
+    stray = np.isfinite(columns["time"]) & (parts_of_clock(columns["time"]) < 0)
     columns["time"][stray] = np.nan
     timed = np.isfinite(columns["time"])
     rows = np.flatnonzero(np.all([np.isfinite(columns[name]) for name in ("time", *commanding)], axis=0))
