@@ -60,17 +60,18 @@ def parts_of_clock(time: Array) -> NDArray[np.intp]:
     """Return the number of the part of a log to which each time belongs, in the order of time.
 
     Parts are far from each other: a clock was set between them, or the log was interrupted. A few times that are far
-    from all others, as one with a flipped bit, belong to none, and have -1. So has NaN.
+    from all others, as one with a flipped bit, belong to none, and have -1. So have NaN and infinite times.
     """
-    order = np.argsort(time)
-    steps = np.diff(time[order])
+    known = np.where(np.isfinite(time), time, np.nan)
+    order = np.argsort(known)  # NaN comes last
+    steps = np.diff(known[order])
     usual = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
     part = np.cumsum(np.append(0, steps > max(_FAR, _INTERVALS * usual)))[: len(time)]
-    size = np.bincount(part, np.isfinite(time[order]))
+    size = np.bincount(part, np.isfinite(known[order]))
     is_kept = size >= min(LEAST_AFTER, size.max(initial=1.0))
     number = np.empty(len(time), np.intp)
     number[order] = np.where(is_kept, np.cumsum(is_kept) - 1, -1)[part]
-    number[np.isnan(time)] = -1
+    number[np.isnan(known)] = -1
     return number
 
 

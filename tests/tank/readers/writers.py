@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import zstandard
 from mcap.writer import Writer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.io import savemat
@@ -75,6 +74,12 @@ TITLES = ["time [s]", *(f"u_{n} [us]" for n in range(1, 7)), "depth [m]", "roll 
 TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "heave velocity [m/s]", "voltage [V]"]
 
 
+VARIABLES = {
+    ("pwm." if title.startswith("u_") else "") + title.partition(" [")[0].replace(" ", "_"): title for title in TITLES
+}
+"""What the variables of MATLAB mean, whose names have no units; [columns] of rov.toml says it."""
+
+
 def columns(dive: Dive) -> list[Array]:
     moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity.T, dive.voltage]
     return [dive.start + dive.time, *dive.pulses.T, *moved]
@@ -85,9 +90,9 @@ def csv(folder: Path, dive: Dive) -> Path:
 
 
 def matlab(folder: Path, dive: Dive) -> Path:
-    """Write vectors of MATLAB, whose names are the headers without units, and the pulses in a structure."""
-    own = dict(zip((title.partition(" [")[0].replace(" ", "_") for title in TITLES), columns(dive), strict=True))
-    pulses = {name: own.pop(name) for name in [*own] if name.startswith("u_")}
+    """Write vectors of MATLAB, with the pulses in a structure."""
+    own = dict(zip(VARIABLES, columns(dive), strict=True))
+    pulses = {name.removeprefix("pwm."): own.pop(name) for name in VARIABLES if name.startswith("pwm.")}
     savemat(folder / "dive.mat", {**own, "pwm": pulses})
     return folder / "dive.mat"
 
@@ -137,7 +142,7 @@ def _mavlink(dive: Dive) -> Iterator[tuple[float, str, dict[str, float]]]:
     """Yield the time, the name and the fields of each message."""
     for n, time in enumerate(dive.start + dive.time):
         servos = {f"servo{k}_raw": int(pulse) for k, pulse in enumerate(dive.pulses[n], start=1)}
-        yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6), "port": 0, **servos}
+        yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6) % 2**32, "port": 0, **servos}
         boot = {"time_boot_ms": round(time * 1e3)}
         angles = dict(zip(("roll", "pitch", "yaw"), dive.euler[n].tolist(), strict=True))
         rates = dict(zip(("rollspeed", "pitchspeed", "yawspeed"), RATES, strict=True))
@@ -215,7 +220,7 @@ def dataflash_text(path: Path, messages: Iterable[tuple[Any, ...]]) -> Path:
     declared += [(kind, form, name, columns) for name, (kind, form, columns) in FORMATS.items()]
     lines = [f"FMT, {kind}, 89, {name}, {form}, {columns}" for kind, form, name, columns in declared]
     for name, *values in messages:
-        lines.append(", ".join([name, *(v.decode() if isinstance(v, bytes) else f"{v:.10g}" for v in values)]))
+        lines.append(", ".join([name, *(v.decode() if isinstance(v, bytes) else f"{v:.16g}" for v in values)]))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
@@ -387,12 +392,15 @@ class Ros:
             twist=self.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
         )
 
-    def write(self, folder: Path, messages: Messages, suffix: str = ".db3") -> Path:
-        """Write a bag, and return the path of its file."""
+    def write(self, folder: Path, messages: Messages, suffix: str = ".db3", *compression: Any) -> Path:
+        """Write a bag, and return the path of its file. The compression is what `set_compression` of rosbags takes."""
         found = sorted(messages, key=lambda entry: entry[1])
         path = folder / "dive.bag" if self.version == 1 else folder / "dive"
         plugin = StoragePlugin.MCAP if suffix == ".mcap" else StoragePlugin.SQLITE3
-        with Writer1(path) if self.version == 1 else Writer2(path, version=9, storage_plugin=plugin) as writer:
+        unopened = Writer1(path) if self.version == 1 else Writer2(path, version=9, storage_plugin=plugin)
+        if compression:
+            unopened.set_compression(*compression)
+        with unopened as writer:
             connections: dict[str, Any] = {}
             for topic, time, message in found:
                 kind = message.__msgtype__
@@ -400,7 +408,7 @@ class Ros:
                     connections[topic] = writer.add_connection(topic, kind, typestore=self.store)
                 pack = self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr
                 writer.write(connections[topic], round((START + time + ARRIVAL) * 1e9), pack(message, kind))
-        return path if self.version == 1 else next(path.glob(f"*{suffix}"))
+        return path if self.version == 1 else next(path.glob(f"*{suffix}*"))
 
 
 def outputs(ros: Ros, dive: Dive, n: int) -> Any:
@@ -434,11 +442,8 @@ def bag(suffix: str) -> Callable[[Path, Dive], Path]:
 
 def packed_bag(folder: Path, dive: Dive) -> Path:
     """Write a bag of ROS 2 as `ros2 bag record --compression-mode file` leaves it."""
-    path = bag(".db3")(folder, dive)
-    packed = path.with_name(f"{path.name}.zstd")
-    packed.write_bytes(zstandard.compress(path.read_bytes()))
-    path.unlink()
-    return packed
+    ros = Ros(2)
+    return ros.write(folder, messages_of(ros, dive), ".db3", CompressionMode.FILE, CompressionFormat.ZSTD)
 
 
 LOGS: Mapping[str, Callable[[Path, Dive], Path]] = {
