@@ -70,7 +70,9 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
     else names that follow from the headers. Raises DataFileError.
     """
     layout = described.description.layout if described.description else None
-    return _inspected(path, [*layouts], layout, described.tables)
+    tables = described.tables
+    told = RovTables(columns=tables.columns, topics=tables.topics, logs=tables.logs)
+    return _inspected(path, [*layouts], layout, told)
 
 
 @guarded

@@ -59,6 +59,7 @@ class Format:
 
 
 _PYMAVLINK, _ROSBAGS = "pymavlink: pip install 'rov-fmu[mavlink]'", "rosbags and mcap: pip install 'rov-fmu[ros]'"
+TABLE = Format("a CSV file", rb"[^\0]*\Z", partial(read_lines, kind=UnreadableFileError, most=LARGEST))
 FORMATS = (
     Format("a DataFlash log", rb"\xa3\x95", read=read_dataflash, needs=_PYMAVLINK),
     Format("a ULog", rb"ULog\x01\x12\x35", read=read_ulog, needs="pyulog: pip install 'rov-fmu[px4]'"),
@@ -72,7 +73,7 @@ FORMATS = (
     # µs since 1970, most significant byte first, and then the first byte of a MAVLink message
     Format("a telemetry log", rb"(?s)\0.{7}[\xfe\xfd]", read=read_telemetry, needs=_PYMAVLINK),
     Format("a DataFlash log in text", rb"(?m)[^\0]*?^FMT, ?\d", read=read_dataflash_text, needs=_PYMAVLINK),
-    Format("a CSV file", rb"[^\0]*\Z", partial(read_lines, kind=UnreadableFileError, most=LARGEST)),
+    TABLE,
 )
 """All formats, and the only table of them."""
 

@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -146,6 +147,20 @@ def test_all_that_reads_a_file_shares_one_budget(tmp_path: Path) -> None:
                 use()
         path.write_text("time [s],depth [m]\n", encoding="utf-8")
         assert header_of(path) == ["time [s]", "depth [m]"]
+
+
+def test_a_file_that_is_gone_as_it_is_read_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time [s]\n", encoding="utf-8")
+    call = parsers._Parser.call
+
+    def late(*arguments: Any) -> object:
+        path.unlink()
+        return call(*arguments)
+
+    monkeypatch.setattr(parsers._Parser, "call", late)
+    with pytest.raises(DataFileError, match="there is no such file"):
+        header_of(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes among its files")
