@@ -129,7 +129,7 @@ def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effecti
     cause: list[Array] = []
     for piece in pieces:
         for values, into in ((piece.slow, slow), (piece.causes[name] - piece.causes[name].mean(), cause)):
-            into.append(_independent(piece.time, values, time_constant))
+            into.append(independent(piece.time, values, time_constant))
     f, c = np.concatenate(slow), np.concatenate(cause)
     power = float(c @ c)
     if power <= 0.0:
@@ -138,7 +138,7 @@ def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effecti
     return effective * log(float(f @ f) / max(float(rest @ rest), 1e-300)) - log(effective)
 
 
-def _independent(time: Array, values: Array, time_constant: float) -> Array:
+def independent(time: Array, values: Array, time_constant: float) -> Array:
     """Return independent values of equal variance from those of a process with a time constant, which depends on its
     past only by its last value."""
     kept = np.exp(-np.diff(time) / time_constant)

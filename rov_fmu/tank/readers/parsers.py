@@ -55,11 +55,11 @@ class Format:
     suffix: str = ""
     """The suffix without which its parser does not know the format."""
     growth: int = 1
-    """How many times as large as the file an honest content may be."""
+    """How many times as large as the file an honest content may be: it is compressed, or a number has few digits."""
 
 
 _PYMAVLINK, _ROSBAGS = "pymavlink: pip install 'rov-fmu[mavlink]'", "rosbags and mcap: pip install 'rov-fmu[ros]'"
-TABLE = Format("a CSV file", rb"[^\0]*\Z", partial(read_lines, kind=UnreadableFileError, most=LARGEST))
+TABLE = Format("a CSV file", rb"[^\0]*\Z", partial(read_lines, kind=UnreadableFileError, most=LARGEST), growth=3)
 FORMATS = (
     Format("a DataFlash log", rb"\xa3\x95", read=read_dataflash, needs=_PYMAVLINK),
     Format("a ULog", rb"ULog\x01\x12\x35", read=read_ulog, needs="pyulog: pip install 'rov-fmu[px4]'"),
