@@ -53,6 +53,10 @@ class Axis:
         """Return the name of a coefficient of the axis by its key: a_d, b_d_reverse, alpha ..."""
         return coefficient_name(key, self.velocity)
 
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        """Pickle the axis by its name: another process has it already, and axes are compared by identity."""
+        return _axis_named, (self.name,)
+
     @cached_property
     def is_rotation(self) -> bool:
         """True when the vehicle turns about the axis instead of moving along it."""
@@ -104,6 +108,10 @@ EXTERNAL = frozenset(axis.external for axis in AXES.values())
 """The names of the forces and moments on the body: X_ext ..."""
 COUPLED_AXES = (SURGE, SWAY, YAW)
 """The axes that the Coriolis and Munk terms couple in a vehicle without roll and pitch."""
+
+
+def _axis_named(name: str) -> Axis:
+    return AXES[name]
 
 
 _PAPER = "Enevoldsen et al. 2018"

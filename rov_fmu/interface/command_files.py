@@ -7,15 +7,16 @@ import numpy as np
 
 from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import TIME, Array
-from rov_fmu.io.csv_table import read_header, read_series
+from rov_fmu.io.csv_table import read_series
 from rov_fmu.io.messages import FileError, only, shown
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.description import RovFile
 from rov_fmu.tank.inspection.headers import header_parts, layout_of
 from rov_fmu.tank.inspection.one_log import description_beside, one_log
-from rov_fmu.tank.readers.parsers import open_table
+from rov_fmu.tank.readers.parsers import guarded, header_of, one_parser, open_table
 
 
+@one_parser()
 def read_inputs(path: Path, layout: Layout) -> dict[str, Array]:
     """Return the time (s) as `time`, and the values of inputs by their names in the FMU; each is held up to the next.
 
@@ -29,24 +30,22 @@ def read_inputs(path: Path, layout: Layout) -> dict[str, Array]:
 
 def _is_plain(path: Path, rov_file: RovFile) -> bool:
     """Return True for a table of which no header after the first has a unit or is in [columns]."""
-    open_stream = open_table(path)
-    if not open_stream:
-        return False
-    renamed = rov_file.tables.columns
-    return not any(title in renamed or header_parts(title)[1] for title in read_header(path, open_stream)[1:])
+    header, renamed = header_of(path), rov_file.tables.columns
+    return header is not None and not any(title in renamed or header_parts(title)[1] for title in header[1:])
 
 
+@guarded
 def _of_table(path: Path, layout: Layout) -> dict[str, Array]:
     def why_wrong(name: str) -> str | None:
         return None if name in layout.inputs else f"there is no such input{only(name, layout.inputs)}"
 
-    (_, times), *columns = read_series(path, why_wrong).items()
+    (_, times), *columns = read_series(path, why_wrong, open_table(path)).items()
     return {name: np.asarray(values) for name, values in [(TIME, times), *columns]}
 
 
 def _of_log(path: Path, layout: Layout, rov_file: RovFile) -> dict[str, Array]:
-    if open_stream := open_table(path):
-        _check_header(path, layout, read_header(path, open_stream))
+    if header := header_of(path):
+        _check_header(path, layout, header)
     elif layout.mix:
         raise FileError(
             f"{path}: has the commands of thrusters, but those of this vehicle are {', '.join(layout.commands)}"

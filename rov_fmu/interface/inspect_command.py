@@ -55,6 +55,7 @@ def lacks_description(folder: Path) -> bool:
     return folder.is_dir() and not (folder / ROV_FILE).exists() and bool(list_files(folder).tests)
 
 
+@one_parser()
 def inspect_logs(path: Path) -> Inspected:
     """Return what a log, or each log in a folder, contains, with a draft of rov.toml.
 
@@ -72,13 +73,12 @@ def inspect_logs(path: Path) -> Inspected:
     inspections: list[Inspection] = []
     mistakes: list[str] = []
     findings: list[Finding] = listing.findings
-    with one_parser():
-        for log in logs_among(listing.tests, described.tables.columns):
-            try:
-                inspections += inspect(log, layouts.values(), described)
-            except DataFileError as error:
-                mistakes += str(error).splitlines()
-                findings.append(unreadable(log, error))
+    for log in logs_among(listing.tests, described.tables.columns):
+        try:
+            inspections += inspect(log, layouts.values(), described)
+        except DataFileError as error:
+            mistakes += str(error).splitlines()
+            findings.append(unreadable(log, error))
     if not inspections:
         raise DataFileError(*([*mistakes, *listing.lines("unreadable file")] if mistakes else listing.no_tests()))
     tables = headers_of_tables(folder)

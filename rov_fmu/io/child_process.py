@@ -238,15 +238,18 @@ def _serve() -> None:
     while True:
         too_large.clear()
         try:
-            with limits.applied():
-                result, error = function(*arguments), None
-        except Exception as raised:
-            result, error = None, raised
-        exceeded = _exceeded(error, limits) or ("disk" if error and too_large else None)
-        if target is None:
-            target, result = result, None
-        _send(answers, (result, None if exceeded else _portable(error), exceeded))
-        result = error = None  # the memory is free before the next call
+            with limits.applied():  # also of what takes memory while it is packed
+                result = function(*arguments)
+                if target is None:
+                    target, result = result, None
+                answer = pickle.dumps((result, None, None), pickle.HIGHEST_PROTOCOL)
+        except Exception as error:
+            exceeded = _exceeded(error, limits) or ("disk" if too_large else None)
+            answer = pickle.dumps((None, None if exceeded else _portable(error), exceeded))
+        result = None
+        answers.write(answer)
+        answers.flush()
+        del answer  # the memory is free before the next call
         method, arguments, limits = requests.get()
         function = getattr(target, method)
 

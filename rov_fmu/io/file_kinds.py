@@ -15,8 +15,8 @@ MAVLINK_SUFFIXES = (DATAFLASH_SUFFIX, ".tlog")
 """The suffixes of logs of ArduSub; a .tlog is the telemetry log of a ground station."""
 ULOG_SUFFIX = ".ulg"
 """The suffix of a log of PX4."""
-BAG_SUFFIXES = (".bag", ".db3", ".mcap")
-"""The suffixes of a bag of ROS 1 and of the files in a bag of ROS 2."""
+BAG_SUFFIXES = (".bag", ".db3", ".mcap", ".zstd")
+"""The suffixes of a bag of ROS 1 and of the files in a bag of ROS 2, which it may compress: dive.db3.zstd."""
 LOG_SUFFIXES = (*MAVLINK_SUFFIXES, ULOG_SUFFIX, *BAG_SUFFIXES)
 """The suffixes of logs that are no tables."""
 IDENTIFIED = "rov-fmu identify"

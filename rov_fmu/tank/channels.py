@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.arrays import Array, Flags, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
     EULER,
@@ -38,14 +38,14 @@ from rov_fmu.tank.catalogue import (
     Quantity,
     words_of,
 )
-from rov_fmu.tank.clocks import ascending
+from rov_fmu.tank.clocks import ascending, first_in_each
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Source
 
 _ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """Turns east, north, up into north, east, down."""
 _FLU = np.diag([1.0, -1.0, -1.0])
 """Turns forward, left, up into forward, starboard, down."""
-_LARGEST = 1e12
+IMPOSSIBLE = 1e12
 """The size of a time or of a value that no clock and no sensor shows."""
 _COMPARED, _LEAST_COMPARED = 1.0, 8
 """The time over which the changes of a position are compared with a velocity, s, and the least number of changes."""
@@ -73,12 +73,15 @@ class Topic:
     def of_messages(cls, source: Source, time: Array, fields: Mapping[str, Array]) -> "Topic":
         """Return the topic of messages in any order. Of messages with the same time, the last number counts.
 
-        Times that no clock shows are left out, and values that no sensor shows become NaN.
+        Values that no sensor shows become NaN.
         """
-        timed = np.abs(time) < _LARGEST
-        known = (np.where(np.abs(values[timed]) < _LARGEST, values[timed], np.nan) for values in fields.values())
-        ordered, *columns = ascending(time[timed], *known)
+        known = (np.where(np.abs(values) < IMPOSSIBLE, values, np.nan) for values in fields.values())
+        ordered, *columns = ascending(time, *known)
         return cls(source, ordered, dict(zip(fields, columns, strict=True)))
+
+    def where(self, kept: Flags) -> "Topic":
+        """Return the topic with only some of its messages."""
+        return replace(self, time=self.time[kept], fields={name: own[kept] for name, own in self.fields.items()})
 
     def full_fields(self) -> Iterator[tuple[str, Array]]:
         """Yield the fields with the name of the topic, as rov.toml names them."""
@@ -233,7 +236,7 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     if len(known) < len(time) or not np.isfinite(np.hstack([velocity.values, position.values])).all():
         return ""
     earth, body = _frames(velocity)
-    ends = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], _COMPARED)))
+    ends = first_in_each(time, 1.0 / _COMPARED)
     moved = np.diff((position.values @ earth.T)[ends], axis=0)
     rates = {"the body": rotation.apply(velocity.values @ body.T), "the earth": velocity.values @ earth.T}
     paths = (cumulative_trapezoid(values, time, axis=0, initial=0.0) for values in rates.values())

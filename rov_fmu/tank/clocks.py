@@ -15,6 +15,8 @@ LEAST_AFTER = 10
 """The least number of messages in a row after a restart. Fewer messages are only out of order."""
 AGAIN = 0.5
 """The least number of earlier messages that have times in the range of these messages, as a share of their number."""
+_FAR, _INTERVALS = 3600.0, 1000.0
+"""A time is far from another one if both this time, s, and this many usual intervals are between them."""
 _OTHER_CLOCK = 1.0
 """If the times of messages and of their arrival differ by more than this, they come from different clocks, s."""
 
@@ -56,6 +58,37 @@ def restart_rows(time: Array) -> list[int]:
         if end - start >= LEAST_AFTER and (again or last < before.min()):
             return [start, *(start + row for row in restart_rows(time[start:]))]
     return []
+
+
+def parts_of_clock(time: Array) -> NDArray[np.intp]:
+    """Return the number of the part of a log to which each time belongs, in the order of time.
+
+    Parts are far from each other: a clock was set between them, or the log was interrupted. A few times that are far
+    from all others, as one with a flipped bit, belong to none, and have -1. So have NaN and infinite times.
+    """
+    known = np.where(np.isfinite(time), time, np.nan)
+    order = np.argsort(known)  # NaN comes last
+    steps = np.diff(known[order])
+    usual = float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+    part = np.cumsum(np.append(0, steps > max(_FAR, _INTERVALS * usual)))[: len(time)]
+    size = np.bincount(part, np.isfinite(known[order]))
+    is_kept = size >= min(LEAST_AFTER, size.max(initial=1.0))
+    number = np.empty(len(time), np.intp)
+    number[order] = np.where(is_kept, np.cumsum(is_kept) - 1, -1)[part]
+    number[np.isnan(known)] = -1
+    return number
+
+
+def first_in_each(time: Array, rate: float, begin: float | None = None) -> NDArray[np.intp]:
+    """Return the first row in each interval that has rows, of a number of intervals per second (1/s). The first one
+    begins at `begin`, or else at the first row; `time` ascends.
+
+    The work grows with the rows, and not with the time between them, which a clock that is set can make a century.
+    """
+    if not len(time):
+        return np.empty(0, np.intp)
+    number = np.floor((time - (time[0] if begin is None else begin)) * rate + 1e-6)
+    return np.append(0, np.flatnonzero(np.diff(number)) + 1)
 
 
 def usual_delay(pairs: Array) -> float:

@@ -107,6 +107,9 @@ SENTENCES: dict[str, SentenceForm] = {
     # Rows of a log
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",
+    "stray times": (
+        "{files}: {count:#time stamp} hours or years from all others left out. The file is damaged, or a clock was set"
+    ),
     "rows without time": "{files}: {count:#row} without a time left out",
     "rows before commands": "{files}: {count:#row} before the first command left out",
     "late command": "{files}: {column} has no command before {at} s. Until then, its command is taken as 0",

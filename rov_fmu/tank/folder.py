@@ -20,7 +20,7 @@ from pathlib import Path
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, read_header
+from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
 from rov_fmu.io.reading import hash_of
 from rov_fmu.io.toml_file import join_names, key_line
@@ -32,7 +32,7 @@ from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.listing import has_usual_suffix, list_files
-from rov_fmu.tank.readers.parsers import one_parser, open_table
+from rov_fmu.tank.readers.parsers import header_of, one_parser
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import VehicleFileError
@@ -373,14 +373,14 @@ def has_log(path: Path, kind: str, columns: Mapping[str, str]) -> bool:
     `columns` is the table [columns] of rov.toml. Raises DataFileError if the name tells no kind.
     """
     try:
-        lines = open_table(path)
-        if not lines:
-            return True
-        header = [columns.get(title, title) for title in read_header(path, lines)]
+        titles = header_of(path)
     except DataFileError:
         if kind:
             return False  # the table is read with its mistakes
         raise
+    if titles is None:
+        return True
+    header = [columns.get(title, title) for title in titles]
     measured = columns_of(kind) if kind else {}
     measured.pop(COMMAND, None)
     return has_column(header, {"time": TIME}) and not has_column(header, measured)

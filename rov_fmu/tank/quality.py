@@ -8,6 +8,7 @@ import numpy as np
 
 from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.clocks import first_in_each
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
@@ -164,8 +165,8 @@ def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> 
         return []
     time, values = replace(position, values=unwrapped(position)).samples
     at, speeds = velocity.samples
-    ends = np.arange(max(time[0], at[0]), min(time[-1], at[-1]), _APART)
-    rows = np.unique(np.searchsorted(time, ends))
+    both = np.flatnonzero((time >= at[0]) & (time <= at[-1]))
+    rows = both[first_in_each(time[both], 1.0 / _APART)]
     travelled = np.interp(time[rows], at, cumulative_trapezoid(speeds, at, initial=0.0))
     implied, actual = (np.diff(path) / np.diff(time[rows]) for path in (travelled, values[rows]))
     if len(implied) < LEAST_SAMPLES or not spread(implied):

@@ -30,10 +30,11 @@ from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.no_measurement import measured_only
 from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
-from rov_fmu.tank.readers.parsers import format_of, read_parsed
+from rov_fmu.tank.readers.parsers import guarded, open_table, read_content
 from rov_fmu.tank.readers.tables import read_table
 
 
+@guarded
 def read_logs(
     path: Path,
     layout: Layout,
@@ -46,11 +47,12 @@ def read_logs(
 
     The commands are those of the thrusters of the layout.
     """
-    kind, entries = format_of(path), names.topics
-    if kind.open:
-        content, entries = read_table(path, layout, axis, names, kind.open(path), is_part=is_part)
+    entries = names.topics
+    if lines := open_table(path):
+        content, entries = read_table(path, layout, axis, names, lines, is_part=is_part)
     else:
-        content = read_parsed(path, kind, {name.partition(".")[0] for name in (*entries, *names.valid)})
+        content = read_content(path, {name.partition(".")[0] for name in (*entries, *names.valid)})
+    content.split_by_clock()
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
     return [_log(path, content, piece, layout, entries, names, axis) for piece in content.pieces]
 

@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum
-from rov_fmu.identify.unexplained.causes import cause_of
+from rov_fmu.identify.unexplained.causes import cause_of, independent
 from rov_fmu.identify.unexplained.disturbances import disturbances
 from rov_fmu.tank.arrays import Array
 from tests.folders import HEAD, folder_of
@@ -87,6 +87,18 @@ def test_no_cause_is_named_where_none_is_clear(objective: Objective) -> None:
 def test_a_change_of_all_thrust_follows_the_largest_command_and_the_voltage_itself(objective: Objective) -> None:
     assert cause(objective, np.abs(COMMAND), None) == "the command"
     assert cause(objective, VOLTAGE, None) == "the voltage"
+
+
+def test_independent_values_are_those_of_the_whole_correlation() -> None:
+    """At any times, by linear algebra with the correlation of all pairs; a gap of years costs nothing."""
+    rng = np.random.default_rng(3)
+    time, values = np.cumsum(rng.exponential(1.0, 40)), rng.normal(size=40)
+    correlation = np.exp(-np.abs(time[:, None] - time) / 5.0)
+    expected = np.linalg.solve(np.linalg.cholesky(correlation), values)
+    assert independent(time, values, 5.0) == pytest.approx(expected)
+    apart = independent(time + 1e9 * (np.arange(40) >= 20), values, 5.0)
+    assert apart[20] == values[20]
+    assert apart[21:] == pytest.approx(expected[21:], rel=1e-4)
 
 
 def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> None:

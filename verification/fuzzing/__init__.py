@@ -1,1 +1,1 @@
-"""Fuzzing of the FMU's C with libFuzzer and clang's sanitizers: python -m verification.fuzzing."""
+"""Fuzzing of the FMU's C with libFuzzer and clang's sanitizers, and of logs: python -m verification.fuzzing."""

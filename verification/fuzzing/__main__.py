@@ -1,4 +1,4 @@
-"""python -m verification.fuzzing: random calls of the FMI functions under sanitizers."""
+"""python -m verification.fuzzing: random calls of the FMI functions under sanitizers, and damaged logs."""
 
 import shutil
 import sys
@@ -24,7 +24,9 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.references.vehicles import THRUST
 
 from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
+from .logs import try_damaged
 
+_PROGRAM = "python -m verification.fuzzing"
 _ROUND = 60  # s
 VEHICLES = {
     "bluerov2_heavy": SHIPPED["bluerov2_heavy"],
@@ -55,6 +57,7 @@ def _positive(text: str) -> int:
 )
 @click.option("--vehicle", "chosen", type=click.Choice(list(VEHICLES)), help="Only this one (default: all in turn).")
 @click.option("--fmi", type=click.Choice(["2", "3"]), help="Only this version of FMI (default: both in turn).")
+@click.option("--logs", type=_positive, metavar="N", help="Read N damaged copies of each of INPUTS, logs or tables.")
 @click.option("--keep", is_flag=True, help="Put what led to new places into the corpus.")
 def _command(
     inputs: tuple[Path, ...],
@@ -63,15 +66,19 @@ def _command(
     jobs: int,
     chosen: str | None,
     fmi: str | None,
+    logs: int | None,
     keep: bool,
 ) -> None:
     """Turn random bytes into calls of the FMI functions on several instances, and look after each call whether it kept
     its promises, under AddressSanitizer and UndefinedBehaviorSanitizer (clang).
 
-    INPUTS, where there are any, are run once instead.
+    INPUTS, where there are any, are run once instead. With --logs, they are logs or tables, which are damaged and read.
     """
     if missing := [path for path in inputs if not path.exists()]:
         raise FileError(f"{missing[0]}: there is no such file")
+    if logs:
+        _try_logs(inputs, logs)
+        return
     with tempfile.TemporaryDirectory(prefix="fuzz-", ignore_cleanup_errors=True) as name:
         corpus = Path(name) / "corpus"
         pairs = product([chosen] if chosen else VEHICLES, [int(fmi)] if fmi else (2, 3))
@@ -98,10 +105,25 @@ def _command(
                 )
                 _print_counts(what, *counts)
             except FindingError as finding:
-                again = [_keep(f"--vehicle {vehicle} --fmi {version}", found) for found in finding.inputs]
+                again = [_keep(f"{_PROGRAM} --vehicle {vehicle} --fmi {version}", found) for found in finding.inputs]
                 raise FindingError("\n".join([f"{what}: {finding}", *again])) from None
         if keep and not inputs:
             print(f"the corpus now has {pack_corpus(list(targets.values()), corpus)} inputs")
+
+
+def _try_logs(inputs: Sequence[Path], count: int) -> None:
+    """Read damaged copies of logs and tables, and print what became of them."""
+    result = table(f"{count} damaged copies of each", "file", ("read", "refused", "longest [s]", "largest [GB]"))
+    for path in inputs:
+        with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
+            try:
+                tried = try_damaged(path, range(count), Path(name))
+            except FindingError as finding:
+                again = [_keep("rov-fmu identify --inspect", one) for one in finding.inputs]
+                raise FindingError("\n".join([str(finding), *again])) from None
+        seconds, memory = f"{tried.seconds:.1f}", f"{tried.memory / 1e9:.2f}"
+        result.add_row(path.name, str(tried.read), str(tried.refused), seconds, memory)
+    console().print(result)
 
 
 def _build(pair: tuple[str, int], target: Path) -> None:
@@ -109,11 +131,11 @@ def _build(pair: tuple[str, int], target: Path) -> None:
     build_target(native_content(load_vehicle(VEHICLES[vehicle]), fmi=version).sources, target, version)
 
 
-def _keep(options: str, found: Path) -> str:
+def _keep(command: str, found: Path) -> str:
     """Copy an input to this folder, and return its content as text, because the log may outlive the machine."""
     copy = shutil.copy(found, ".")
     content = b64encode(found.read_bytes()).decode()
-    return f"again with: python -m verification.fuzzing {options} {copy}, in base64:\n{content}"
+    return f"again with: {command} {copy}, in base64:\n{content}"
 
 
 def _campaign(target: Path, corpus: Path, jobs: int, calls: int | None, seconds: int | None) -> tuple[Counts, float]:
@@ -138,9 +160,7 @@ def _print_counts(what: str, counts: Counts, seconds: float) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code: 0 nothing was found, 1 a finding, 2 bad input, 130 interrupted."""
     codes = {FindingError: 1, FileError: 2, BuildError: 2, OSError: 2, click.ClickException: 2}
-    return exit_code(
-        "fuzz", lambda: _command(arguments, "python -m verification.fuzzing", standalone_mode=False), codes
-    )
+    return exit_code("fuzz", lambda: _command(arguments, _PROGRAM, standalone_mode=False), codes)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import MOST, first_of
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import first_in_each
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 from rov_fmu.tank.quality import gaps, unwrapped
@@ -211,8 +212,7 @@ def _samples(
     times, values, sensors = [], [], []
     for n, one in enumerate(measured):
         time, value = one.channel.time, one.channel.values
-        group = np.floor((time - begin) * rate + 1e-6).astype(np.int64)
-        first = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
+        first = first_in_each(time, rate, begin)
         if averaged and len(first) < 0.8 * len(time):
             count = np.diff(first, append=len(time))
             time, value = np.add.reduceat(time, first) / count, np.add.reduceat(value, first) / count

@@ -15,24 +15,29 @@ from rov_fmu.c.filter import Run
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import first_in_each
 
 ENOUGH, AHEAD = 10.0, 6.0
 """A cause is named if 2 ln of its Bayes factor exceeds that of no cause by so much, and that of the next one."""
 _CHANNELS = {"voltage": "the voltage", "roll angle": "the roll", "pitch angle": "the pitch", "depth": "the depth"}
 """The channels that may be causes, and their names."""
 _STEP = 1.0
-"""The time between two values that are compared, s."""
+"""The usual time between two values that are compared, s."""
 _LEAST = 3.0
 """A log tells something about causes if it is longer than so many time constants of the slow process."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """The slow process in one log, and what it may follow, at equal times."""
+    """The slow process in one log, and what it may follow, at the same times."""
 
     time: Array
     slow: Array
     causes: Mapping[str, Array]
+
+    def constants(self, time_constant: float) -> float:
+        """Return the number of time constants that the log tells of. A gap counts as one at most."""
+        return float(np.minimum(np.diff(self.time) / time_constant, 1.0).sum())
 
 
 def cause_of(
@@ -48,11 +53,11 @@ def cause_of(
         for n, (run, place) in enumerate(zip(runs, places, strict=True))
         if place >= 0
     ]
-    pieces = [piece for piece in pieces if np.ptp(piece.time) > _LEAST * time_constant]
+    pieces = [piece for piece in pieces if piece.constants(time_constant) > _LEAST]
     if not pieces:
         return ""
     common = set.intersection(*(set(piece.causes) for piece in pieces))
-    effective = sum(float(np.ptp(piece.time)) for piece in pieces) / time_constant
+    effective = sum(piece.constants(time_constant) for piece in pieces)
     found = {name: _evidence(pieces, name, time_constant, effective) for name in sorted(common)}
     if not found:
         return ""
@@ -64,7 +69,7 @@ def cause_of(
 
 def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, axis: Axis | None) -> _Piece:
     one, record = objective.logs[number], objective.records[number]
-    time = np.arange(record.time[0], record.time[-1], _STEP)
+    time = record.time[first_in_each(record.time, 1.0 / _STEP)]
 
     def at(times: Array, values: Array) -> Array:
         return np.asarray(np.interp(time, times, values), np.float64)
@@ -123,9 +128,8 @@ def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effecti
     slow: list[Array] = []
     cause: list[Array] = []
     for piece in pieces:
-        root = np.linalg.cholesky(_correlation(piece.time, time_constant))
         for values, into in ((piece.slow, slow), (piece.causes[name] - piece.causes[name].mean(), cause)):
-            into.append(np.linalg.solve(root, values))
+            into.append(independent(piece.time, values, time_constant))
     f, c = np.concatenate(slow), np.concatenate(cause)
     power = float(c @ c)
     if power <= 0.0:
@@ -134,6 +138,9 @@ def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effecti
     return effective * log(float(f @ f) / max(float(rest @ rest), 1e-300)) - log(effective)
 
 
-def _correlation(time: Array, time_constant: float) -> Array:
-    apart = np.abs(time[:, None] - time)
-    return np.asarray(np.exp(-apart / time_constant) + 1e-6 * np.eye(len(time)), np.float64)
+def independent(time: Array, values: Array, time_constant: float) -> Array:
+    """Return independent values of equal variance from those of a process with a time constant, which depends on its
+    past only by its last value."""
+    kept = np.exp(-np.diff(time) / time_constant)
+    new = np.sqrt(np.maximum(1.0 - kept**2, 1e-6))
+    return np.append(values[:1], (values[1:] - kept * values[:-1]) / new)

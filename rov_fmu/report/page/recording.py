@@ -23,7 +23,7 @@ from rov_fmu.tank.description import has_wrench
 from rov_fmu.tank.inspection.one_log import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import unwrapped
-from rov_fmu.tank.readers.parsers import format_of, read_parsed
+from rov_fmu.tank.readers.parsers import one_parser, read_topics
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _MOST_SAMPLES = 20_000
@@ -35,6 +35,7 @@ def topic_name(text: str) -> str:
     return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
 
 
+@one_parser()
 def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -> dict[str, Any]:
     """Return the recording in a log, as fmu_src/live/recording.js declares it.
 
@@ -120,7 +121,7 @@ def _add_identified(
     own = f"/{topic_name(log.file)}/"
     known = [topic_name(signal["quantity"]) for signal in signals]
     known += [f"unknown_force/{form.axis.name}" for form in layout.axes]
-    content = read_parsed(path, format_of(path), {own + name for name in known})
+    content = read_topics(path, {own + name for name in known})
     topics = {topic.source.topic.removeprefix(own): topic for piece in content.pieces for topic in piece.topics}
     if not topics:
         raise DataFileError(f"{path}: has nothing about {log.file}; `rov-fmu identify --mcap` writes such a file")

@@ -12,7 +12,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
-from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns, read_header
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (
     COMMANDS,
@@ -29,7 +29,7 @@ from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_c
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
 from rov_fmu.tank.readers.listing import list_files
-from rov_fmu.tank.readers.parsers import open_table
+from rov_fmu.tank.readers.parsers import header_of
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>[^\])]*)[\])]\s*")
 _PERCENT = re.compile(r"(?P<name>.*\S)\s+(?P<unit>%)")
@@ -353,9 +353,7 @@ def headers_of_tables(folder: Path) -> TableHeaders:
                 _, curve = parts_of_name(path.stem.lower(), None)
                 tested.add(curve)
             with suppress(DataFileError):
-                for title, meant in guessed_of_table(
-                    kind, axis_in_name(path), read_header(path, open_table(path))
-                ).items():
+                for title, meant in guessed_of_table(kind, axis_in_name(path), header_of(path) or []).items():
                     columns[title] = meant or columns.get(title, "")
     return TableHeaders(tuple(_curves(tested)), columns)
 

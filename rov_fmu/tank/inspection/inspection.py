@@ -6,7 +6,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
-from types import MappingProxyType
 from typing import TextIO
 
 import numpy as np
@@ -24,7 +23,7 @@ from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_ta
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.tank.readers.parsers import open_table
+from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
 
 
@@ -70,9 +69,15 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
     its rov.toml are obeyed. Without one, the thrusters of a CSV log have the names of the first layout that fits, or
     else names that follow from the headers. Raises DataFileError.
     """
-    axis = axis_in_name(path)
-    description, tables = described.description, described.tables
-    layout = description.layout if description else Layout((), (), ())
+    layout = described.description.layout if described.description else None
+    tables = described.tables
+    told = RovTables(columns=tables.columns, topics=tables.topics, logs=tables.logs)
+    return _inspected(path, [*layouts], layout, told)
+
+
+@guarded
+def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, tables: RovTables) -> list[Inspection]:
+    axis, layout = axis_in_name(path), described or Layout((), (), ())
     columns: Mapping[str, str] = {}
     unread: dict[str, str] = {}
     if open_stream := open_table(path):
@@ -85,7 +90,7 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
         columns = renamed = {title: tables.columns[title] for title in titles if title in tables.columns}
         if kind := kind_of_table(path, columns):
             return [_of_table(path, kind, columns, ranges)]
-        if not description:
+        if not described:
             layout, columns = guessed(titles, numbers, axis, layouts)
         names, _ = names_of(layout, RovTables(columns=columns, logs=tables.logs))
         is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
@@ -98,7 +103,7 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
         if count < 2 or not has_time:
             return [Inspection(path, path.name, (), (), unread, (), columns)]
     else:
-        names, _ = names_of(layout if description else None, tables)
+        names, _ = names_of(described, tables)
         axis = None
     logs = map(checked, read_logs(path, layout, names, axis, is_part=True))
     return [_of_log(path, log, unread, columns) for log in logs]
@@ -149,7 +154,7 @@ def _of_unnamed_table(path: Path, renamed: Mapping[str, str], ranges: Mapping[st
     return None
 
 
-def logs_among(tests: Sequence[Path], columns: Mapping[str, str] = MappingProxyType({})) -> Sequence[Path]:
+def logs_among(tests: Sequence[Path], columns: Mapping[str, str] = {}) -> Sequence[Path]:
     """Return the logs among tests, or without logs the tables. `columns` is the table [columns] of rov.toml."""
     return [file for file in tests if not kind_of_table(file, columns)] or tests
 

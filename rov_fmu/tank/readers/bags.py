@@ -12,6 +12,7 @@ from contextlib import suppress
 from itertools import islice
 from math import nan
 from pathlib import Path
+from shutil import copyfileobj
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ _FIRST = 100
 """The number of messages of an unknown topic whose ranges are told."""
 _RC_OUT = "std_msgs/Header header\nuint8 rssi\nuint16[] channels\n"
 """The definition of mavros_msgs/RCOut, for bags without definitions."""
+_ZSTD = b"\x28\xb5\x2f\xfd"
+"""The first bytes of what zstd compressed. A message of ROS 2 begins with 0."""
 _MAVLINK_TOPIC = re.compile(r"mavlink/(\d+)/(\d+)/(\w+)")
 """The topics of BlueOS: system, component and kind of the message."""
 
@@ -49,7 +52,7 @@ def read_bag(path: Path, named: Collection[str]) -> Content:
         unread = described((_first_messages(reader, connection) for connection in others.values()), counts)
         for connection, arrival, raw in reader.messages(read) if read else ():
             try:
-                message: Any = reader.deserialize(raw, connection.msgtype)
+                message: Any = reader.deserialize(_unpacked(raw), connection.msgtype)
             except Exception:  # a damaged message, or one of an unknown type
                 damaged += 1
                 continue
@@ -64,6 +67,23 @@ def read_bag(path: Path, named: Collection[str]) -> Content:
     content = content_of(path.name, messages, damaged=damaged)
     content.unread = unread
     return content
+
+
+def _unpacked(raw: bytes) -> bytes:
+    """Return a message, which a bag may have compressed on its own. Raises ZstdError for a damaged one."""
+    if not raw.startswith(_ZSTD):
+        return raw
+    import zstandard
+
+    return zstandard.ZstdDecompressor().decompressobj().decompress(raw)
+
+
+def unpack(path: Path, to: Path) -> None:
+    """Write the file that zstd compressed, such as a bag of ROS 2 with `--compression-mode file`. Raises ZstdError."""
+    import zstandard
+
+    with path.open("rb") as packed, to.open("wb") as file:
+        copyfileobj(zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True), file)
 
 
 def _frames(message: Any, kind: str) -> tuple[str, str]:
@@ -97,7 +117,7 @@ def _first_messages(reader: Any, connection: Any) -> Topic:
     rows: list[Mapping[str, float]] = []
     with suppress(Exception):  # a message that is damaged, or of an unknown type
         for _, _, raw in islice(reader.messages([connection]), _FIRST):
-            rows.append(dict(_numbers("", reader.deserialize(raw, connection.msgtype))))
+            rows.append(dict(_numbers("", reader.deserialize(_unpacked(raw), connection.msgtype))))
     return topic_of(Source(connection.topic, connection.msgtype), np.arange(float(len(rows))), rows)
 
 

@@ -8,8 +8,8 @@ from types import MappingProxyType
 import numpy as np
 
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import restarts, usual_delay
+from rov_fmu.tank.channels import IMPOSSIBLE, Topic
+from rov_fmu.tank.clocks import parts_of_clock, restarts, usual_delay
 from rov_fmu.tank.commands import Parameters
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
@@ -50,6 +50,29 @@ class Content:
         """Add a finding about something that was counted, if there is any."""
         if count:
             self.findings.append(about(self.file, kind, count=count, **words))
+
+    def split_by_clock(self) -> None:
+        """Split the log where a clock was set, and leave out and count the messages with times that none has shown."""
+        times = [topic.time for piece in self.pieces for topic in piece.topics]
+        together = np.concatenate([np.empty(0), *times])
+        is_possible = np.abs(together) < IMPOSSIBLE
+        part = parts_of_clock(together)
+        if is_possible.any():
+            part[~is_possible] = -1
+        self.count("stray times", int((part < 0).sum()))
+        if not part.any():
+            return
+        own = iter(np.split(part, np.cumsum([*map(len, times)])[:-1]))
+        pieces, self.pieces = self.pieces, []
+        for piece in pieces:
+            parts = [next(own) for _ in piece.topics]
+            since = piece.since
+            for number in np.unique(np.concatenate([np.empty(0, np.intp), *parts])).tolist():
+                topics = [topic.where(of == number) for topic, of in zip(piece.topics, parts, strict=True)]
+                topics = [topic for topic in topics if len(topic.time)]
+                if number >= 0:
+                    self.pieces.append(Piece(topics, piece.parameters, since))
+                    since += float(max(t.time[-1] for t in topics) - min(t.time[0] for t in topics))
 
 
 def content_of(

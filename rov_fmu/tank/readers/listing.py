@@ -11,7 +11,7 @@ from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.readers.other_files import EMPTY, IN_FOLDER, NO_FILE, NO_TABLE, PICTURE
-from rov_fmu.tank.readers.parsers import FORMATS, TABLE, format_of
+from rov_fmu.tank.readers.parsers import FORMAT_NAMES, TABLE, format_of
 
 BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
@@ -44,7 +44,7 @@ class Listing:
 
     def no_tests(self) -> list[str]:
         """Return the lines about a folder without logs and tables."""
-        none = f"{self.folder}: there is no log and no table in this folder. These formats are read: {FORMATS}"
+        none = f"{self.folder}: there is no log and no table in this folder. These formats are read: {FORMAT_NAMES}"
         return [none, *self.lines("unreadable file", "other files")]
 
 

@@ -1,4 +1,5 @@
-"""Read logs of ArduSub with pymavlink: telemetry of a ground station (.tlog), and DataFlash logs of the vehicle (.bin).
+"""Read logs of ArduSub with pymavlink: telemetry of a ground station (.tlog), and DataFlash logs of the vehicle, as it
+writes them (.bin) and as ground stations convert them to text (.log).
 
 The catalogue says which messages are read and what they measure. The autopilot's filter marks velocities that it does
 not know (EKF_STATUS_REPORT, XKF4), and XKF4.PI names the core of the filter that the autopilot used.
@@ -110,16 +111,39 @@ def read_dataflash(path: Path, named: Collection[str]) -> Content:
 
     with closing(Reader(str(path))) as reader:
         counts = {name: reader.counts[kind] for kind, name in reader.id_to_name.items() if reader.counts[kind]}
-        wanted = ["PARM", *(name for name in counts if _is_read(named, name))]
-        content = read_messages(path, _of_dataflash(reader, wanted), named)
+        return _of_dataflash(path, reader, counts, named)
+
+
+def read_dataflash_text(path: Path, named: Collection[str]) -> Content:
+    """Read the same messages in a log that was converted to text."""
+    from pymavlink import DFReader
+
+    class Reader(DFReader.DFReader_text):  # type: ignore[misc]
+        def init_clock(self) -> None:
+            """Use the time since boot, as in the log of the vehicle."""
+            self.init_clock_usec()
+
+    reader = Reader(str(path))
+    with closing(reader.filehandle):
+        return _of_dataflash(path, reader, reader.counts, named)
+
+
+def _of_dataflash(path: Path, reader: Any, counts: Mapping[str, int], named: Collection[str]) -> Content:
+    """Return the content of a log of the vehicle; `counts` has the number of messages of each kind."""
+    wanted = ["PARM", *(name for name in counts if _is_read(named, name))]
+    content = read_messages(path, _messages(reader, wanted), named)
     content.unread = {name: f"{count} messages" for name, count in counts.items() if name not in (*wanted, "FMT")}
     return content
 
 
-def _of_dataflash(reader: Any, wanted: Collection[str]) -> Iterator[Message | None]:
+def _messages(reader: Any, wanted: Collection[str]) -> Iterator[Message | None]:
     """Yield the messages of some kinds in a log of the vehicle. One without a time is damaged."""
     while message := reader.recv_match(type=wanted):
-        kind, numbers = message.get_type(), _numbers(message)
+        try:
+            kind, numbers = message.get_type(), _numbers(message)
+        except ValueError:  # a text that is no number
+            yield None
+            continue
         part = next((f"{word} {numbers[key]:g}" for key, word in _INSTANCES.items() if key in numbers), "")
         arrival = numbers.get("TimeUS", nan) * 1e-6
         parameter = str(message.Name) if kind == "PARM" else ""

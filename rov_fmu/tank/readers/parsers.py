@@ -1,30 +1,34 @@
-"""The formats of logs, and the logs that need a parser of somebody else, in a child process within a budget.
+"""The formats of logs and tables, and the child process in which every file of a test is read, within a budget.
 
 The file of a stranger may be damaged, or made to exhaust the machine: a few kB can stand for many GB of messages. A
-reader therefore runs with everything that uses what its parser returns in the child process, and only the topics of
-the log come back.
+function that reads such a file is `guarded`: it runs in the child process, with everything that uses what a parser
+returns, and only its result comes back. A format can be read nowhere else.
 """
 
+import os
+import re
 import shutil
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
+from functools import wraps
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from threading import RLock
-from typing import TextIO
+from time import monotonic
+from typing import Any, Concatenate, ParamSpec, TextIO, TypeVar
 
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
-from rov_fmu.io.csv_table import UTF_16_MARKS, DataFileError, UnreadableFileError, open_text
-from rov_fmu.io.messages import NO_FILE, brief, listed
+from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, open_text, read_header
+from rov_fmu.io.messages import NO_FILE, FileError, brief, listed
 from rov_fmu.tank.findings import about
-from rov_fmu.tank.readers.bags import read_bag, read_mcap
+from rov_fmu.tank.readers.bags import read_bag, read_mcap, unpack
 from rov_fmu.tank.readers.content import Content
-from rov_fmu.tank.readers.mavlink import read_dataflash, read_telemetry
+from rov_fmu.tank.readers.mavlink import read_dataflash, read_dataflash_text, read_telemetry
 from rov_fmu.tank.readers.other_files import EMPTY, reason_against
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.tank.readers.ulog import read_ulog
@@ -36,41 +40,50 @@ class Format:
 
     name: str
     """Its name, with an article."""
+    begins: bytes
+    """A regular expression that matches the first bytes of such a file. The first format that matches counts."""
     open: Callable[[Path], Callable[[], TextIO]] | None = None
     """Return a function that opens the lines of a table."""
     read: Callable[[Path, Collection[str]], Content] | None = None
     """Read a log that is no table with a parser of somebody else, with the topics that rov.toml names."""
+    unpack: Callable[[Path, Path], None] | None = None
+    """Write the file that is packed in a file."""
     needs: str = ""
     """The parser, and the extra of this package that installs it."""
     repair: str = ""
     """The command that may repair a file that was cut short."""
     suffix: str = ""
     """The suffix without which its parser does not know the format."""
+    growth: int = 1
+    """How many times as large as the file an honest content may be: it is compressed, or a number has few digits."""
 
 
 _PYMAVLINK, _ROSBAGS = "pymavlink: pip install 'rov-fmu[mavlink]'", "rosbags and mcap: pip install 'rov-fmu[ros]'"
-_MATLAB = Format("a .mat file", open_matlab)
-_BEGINNINGS = {
-    b"\xa3\x95": Format("a DataFlash log", None, read_dataflash, _PYMAVLINK),
-    b"ULog\x01\x12\x35": Format("a ULog", None, read_ulog, "pyulog: pip install 'rov-fmu[px4]'"),
-    b"#ROSBAG V": Format("a bag of ROS 1", None, read_bag, _ROSBAGS, "rosbag reindex", ".bag"),
-    b"SQLite format 3\0": Format("a bag of ROS 2", None, read_bag, _ROSBAGS, "sqlite3 .recover", ".db3"),
-    b"\x89MCAP0\r\n": Format("an MCAP file", None, read_mcap, _ROSBAGS, "mcap recover", ".mcap"),
-    b"MATLAB 5.0 MAT-file": _MATLAB,
-    b"MATLAB 7.3 MAT-file": _MATLAB,
-}
-"""The formats by their first bytes."""
-TABLE = Format("a CSV file", open_text)
-_TELEMETRY = Format("a telemetry log", None, read_telemetry, _PYMAVLINK)
-_MAVLINK_STARTS = (b"\xfe", b"\xfd")
-"""The first byte of a MAVLink message, which follows eight bytes of time in a telemetry log."""
-FORMATS = listed(dict.fromkeys(kind.name for kind in (TABLE, _TELEMETRY, *_BEGINNINGS.values())))
-"""The formats that are read."""
+TABLE = Format("a CSV file", rb"\xff\xfe|\xfe\xff|[^\0]*\Z", open_text, growth=3)
+FORMATS = (
+    Format("a DataFlash log", rb"\xa3\x95", read=read_dataflash, needs=_PYMAVLINK),
+    Format("a ULog", rb"ULog\x01\x12\x35", read=read_ulog, needs="pyulog: pip install 'rov-fmu[px4]'"),
+    Format("a bag of ROS 1", rb"#ROSBAG V", read=read_bag, needs=_ROSBAGS, repair="rosbag reindex", suffix=".bag"),
+    Format(
+        "a bag of ROS 2", rb"SQLite format 3\0", read=read_bag, needs=_ROSBAGS, repair="sqlite3 .recover", suffix=".db3"
+    ),
+    Format("an MCAP file", rb"\x89MCAP0\r\n", read=read_mcap, needs=_ROSBAGS, repair="mcap recover", suffix=".mcap"),
+    Format("a file that zstd compressed", rb"\x28\xb5\x2f\xfd", unpack=unpack, needs=_ROSBAGS, growth=8),
+    Format("a .mat file", rb"MATLAB (5\.0|7\.3) MAT-file", open_matlab, growth=4),
+    # µs since 1970, most significant byte first, and then the first byte of a MAVLink message
+    Format("a telemetry log", rb"(?s)\0.{7}[\xfe\xfd]", read=read_telemetry, needs=_PYMAVLINK),
+    Format("a DataFlash log in text", rb"(?m)[^\0]*?^FMT, ?\d", read=read_dataflash_text, needs=_PYMAVLINK),
+    TABLE,
+)
+"""All formats, and the only table of them."""
+FORMAT_NAMES = listed(dict.fromkeys(kind.name for kind in FORMATS))
 
 
 def format_of(path: Path) -> Format:
     """Return the format of a log by its first bytes. Raises DataFileError for a file that is none."""
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise DataFileError(f"{path}: is a device or a pipe, and not a file")
         with path.open("rb") as file:
             head = file.read(1024)
     except FileNotFoundError:
@@ -79,32 +92,40 @@ def format_of(path: Path) -> Format:
         raise UnreadableFileError(f"{path}: cannot be read: {error.strerror or error}") from error
     if not head:
         raise UnreadableFileError(f"{path}: {EMPTY}")
-    for beginning, kind in _BEGINNINGS.items():
-        if head.startswith(beginning):
-            return kind
-    if head[8:9] in _MAVLINK_STARTS and head[0] == 0:  # µs since 1970, most significant byte first
-        return _TELEMETRY
     reason = reason_against(path, head)
-    if not reason and (b"\0" not in head or head.startswith(UTF_16_MARKS)):
-        return TABLE
-    reason = reason or f"its first bytes are those of none of the formats that are read: {FORMATS}"
+    kind = next((kind for kind in FORMATS if re.match(kind.begins, head)), None)
+    if kind and not (kind is TABLE and reason):
+        return kind
+    reason = reason or f"its first bytes are those of none of the formats that are read: {FORMAT_NAMES}"
     raise UnreadableFileError(f"{path}: {reason}")
 
 
-def open_table(path: Path) -> Callable[[], TextIO] | None:
-    """Return a function that opens the lines of a table; None for another log. Raises DataFileError."""
-    opens = format_of(path).open
-    return opens(path) if opens else None
+# ---- The child process -----------------------------------------------------------------------------------------------
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 
-def read_parsed(path: Path, kind: Format, named: Collection[str]) -> Content:
-    """Read a log with its parser. Raises DataFileError, also if it exceeds its budget."""
-    with one_parser():
-        return _PARSER.read(path, kind, named, budget(path.stat().st_size))
+def guarded(function: Callable[Concatenate[Path, _P], _T]) -> Callable[Concatenate[Path, _P], _T]:
+    """Let a function that reads a file, its first argument, run in the child process, within the budget of the file.
+
+    Its other arguments and its result are pickled. It then raises DataFileError, too, for a file that is damaged or
+    exceeds its budget.
+    """
+
+    @wraps(function)
+    def in_child(path: Path, /, *arguments: _P.args, **options: _P.kwargs) -> _T:
+        if _PARSER.is_child:
+            return function(path, *arguments, **options)
+        with one_parser():
+            result: _T = _PARSER.call(in_child, path, arguments, options)
+            return result
+
+    return in_child
 
 
 def budget(size: int) -> Limits:
-    """Return the budget for a file of a size in bytes.
+    """Return the budget for a file with a content of a size in bytes.
 
     The slowest parser takes about 0.5 s and 4 MB of memory for each MB of messages that it reads.
     """
@@ -113,7 +134,10 @@ def budget(size: int) -> Limits:
 
 @contextmanager
 def one_parser() -> Iterator[None]:
-    """Read the logs of the block in the same child process, because each start takes about half a second."""
+    """Read the files of the block in the same child process, because each start takes about half a second.
+
+    All that reads a file in the block shares the time of its budget.
+    """
     with _PARSER.lock:
         _PARSER.users += 1
     try:
@@ -123,30 +147,46 @@ def one_parser() -> Iterator[None]:
             _PARSER.users -= 1
             if not _PARSER.users:
                 _PARSER.close()
+                _PARSER.spent.clear()
 
 
 class _Parser:
-    """The child process that reads logs, while there is a user of it."""
+    """The child process that reads files, while there is a user of it."""
 
     def __init__(self) -> None:
         self.lock = RLock()
         self.users = 0
+        self.is_child = False
+        """True in the child process."""
+        self.spent: dict[tuple[int, ...], float] = {}
+        """The time that was spent on each file, s. A file that was written anew is another one."""
         self._child: ChildProcess | None = None
 
-    def read(self, path: Path, kind: Format, named: Collection[str], limits: Limits) -> Content:
-        """Read a log. Raises DataFileError."""
+    def call(self, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
+        """Return what a function returns. Raises what it raises, and UnreadableFileError."""
+        growth, file = format_of(path).growth, path.stat()
+        limits = budget(growth * file.st_size)
         with self.lock:
+            key = (file.st_dev, file.st_ino, file.st_mtime_ns, file.st_size)
+            left = replace(limits, time=limits.time and limits.time - self.spent.get(key, 0.0))
+            if left.time is not None and left.time <= 0.0:
+                raise _exceeding(path, LimitError("time", limits))
             try:
                 self._child = self._child or ChildProcess(Functions, limits=limits)
-                content: Content = self._child.call("call", read_guarded, Path.cwd(), path, kind, named, limits=limits)
+                begin = monotonic()
+                try:
+                    call = _call, Path.cwd(), function, path, arguments, options
+                    return self._child.call("call", *call, limits=left)
+                finally:
+                    self.spent[key] = self.spent.get(key, 0.0) + monotonic() - begin
             except ChildError as error:
                 self.close()
-                end = " to be read" if isinstance(error, LimitError) else ""
-                reason = str(error) if end else f"its parser {error}"
-                raise UnreadableFileError(f"{path}: {reason}{end}") from error
-            if limits.memory != budget(0).memory:
-                self.close()  # memory that it keeps would count for the next file, which may have a smaller budget
-            return content
+                if isinstance(error, LimitError):
+                    raise _exceeding(path, LimitError(error.limit, limits)) from error
+                raise UnreadableFileError(f"{path}: its parser {error}") from error
+            finally:
+                if limits.memory != budget(0).memory:
+                    self.close()  # memory that it keeps would count for the next file, which may have a smaller budget
 
     def close(self) -> None:
         """End the process."""
@@ -158,46 +198,98 @@ class _Parser:
 _PARSER = _Parser()
 
 
-def read_guarded(folder: Path, path: Path, kind: Format, named: Collection[str]) -> Content:
-    """Read a log. Any exception means that the file is damaged: a DataFileError, which names the file by `path`.
+def _exceeding(path: Path, error: LimitError) -> UnreadableFileError:
+    return UnreadableFileError(f"{path}: {error} to be read")
 
-    `folder` is what a relative path starts from: the caller's working directory, which this process may not share. What
-    a parser prints is about damage.
+
+def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
+    """Return what a guarded function returns, in the child process.
+
+    Any exception means that the file is damaged: a parser may raise anything on damaged bytes, and return anything.
+    `folder` is the working directory of the caller, from which its relative paths start.
     """
-    printed = StringIO()
+    _PARSER.is_child = True
+    home = Path.cwd()
+    os.chdir(folder)
     try:
-        with (
-            np.errstate(all="ignore"),
-            warnings.catch_warnings(),
-            redirect_stdout(printed),
-            redirect_stderr(printed),
-        ):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            content = _read(folder / path, kind, named)
-    except ImportError:
-        raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
-    except Exception as error:  # a parser may raise anything on damaged bytes, and return anything
-        reason = brief(str(error)) or type(error).__name__
+            return function(path, *arguments, **options)
+    except FileError:
+        raise
+    except Exception as error:
+        told = re.sub(rf"{re.escape(gettempdir())}\S*", path.name, str(error))  # where it was unpacked
+        kind, reason = format_of(path), brief(told) or type(error).__name__
         hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
         raise UnreadableFileError(
             f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
         ) from error
+    finally:
+        os.chdir(home)  # Windows does not remove a folder in which a process works
+
+
+# ---- In the child process --------------------------------------------------------------------------------------------
+
+
+def open_table(path: Path) -> Callable[[], TextIO] | None:
+    """Return a function that opens the lines of a table; None for another log. Raises DataFileError."""
+    assert _PARSER.is_child, "only a guarded function may read a file"
+    opens = format_of(path).open
+    return opens(path) if opens else None
+
+
+def read_content(path: Path, named: Collection[str]) -> Content:
+    """Return the content of a log that is no table. What a parser prints is about damage. Raises DataFileError."""
+    assert _PARSER.is_child, "only a guarded function may read a file"
+    kind, printed = format_of(path), StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed), TemporaryDirectory() as folder:
+            file = path
+            if kind.unpack:
+                file = Path(folder) / "unpacked"
+                kind.unpack(path, file)
+                kind = _format_of_unpacked(path, file)
+            assert kind.read
+            content = kind.read(_under_its_suffix(file, kind, Path(folder)), named)
+    except ModuleNotFoundError:
+        raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
     if printed.getvalue():
         content.findings.append(about(path.name, "damaged log"))
-    return content
-
-
-def _read(path: Path, kind: Format, named: Collection[str]) -> Content:
-    """Read a log, under a name with the suffix that its parser needs."""
-    assert kind.read
-    if path.name.lower().endswith(kind.suffix):
-        return kind.read(path, named)
-    with TemporaryDirectory() as folder:
-        link = Path(folder) / f"log{kind.suffix}"
-        try:
-            link.symlink_to(path.resolve())
-        except OSError:  # on a system without links
-            shutil.copyfile(path, link)
-        content = kind.read(link, named)
     findings = [replace(finding, file=path.name) for finding in content.findings]
     return replace(content, file=path.name, findings=findings)
+
+
+def _format_of_unpacked(path: Path, file: Path) -> Format:
+    """Return the format of a log that was packed in another file. Raises DataFileError."""
+    try:
+        kind = format_of(file)
+    except DataFileError as error:
+        raise UnreadableFileError(str(error).replace(str(file), f"{path}, unpacked")) from error
+    if not kind.read:
+        raise UnreadableFileError(f"{path}: only logs are read in packed files, and not {kind.name}: unpack it")
+    return kind
+
+
+def _under_its_suffix(path: Path, kind: Format, folder: Path) -> Path:
+    """Return a path to a file that has the suffix that its parser needs, if necessary in a temporary folder."""
+    if path.name.lower().endswith(kind.suffix):
+        return path
+    link = folder / f"log{kind.suffix}"
+    try:
+        link.symlink_to(path.resolve())
+    except OSError:  # on a system without links
+        shutil.copyfile(path, link)
+    return link
+
+
+@guarded
+def header_of(path: Path) -> list[str] | None:
+    """Return the headers of a table; None for another log. Raises DataFileError."""
+    lines = open_table(path)
+    return read_header(path, lines) if lines else None
+
+
+@guarded
+def read_topics(path: Path, named: Collection[str]) -> Content:
+    """Return the topics with some names in a log that is no table. Raises DataFileError."""
+    return read_content(path, named)

@@ -37,7 +37,7 @@ from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import ATMOSPHERE, HULL, LEAST_PRESSURE, PRESSURE_GRADIENT, TIMES
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.clocks import AGAIN, LATE, LEAST_AFTER, ascending, restart_rows
+from rov_fmu.tank.clocks import AGAIN, LATE, LEAST_AFTER, ascending, parts_of_clock, restart_rows
 from rov_fmu.tank.columns import (
     AXIS,
     COMMAND,
@@ -235,6 +235,8 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
     A row without a command keeps its measurements: in many tables, each message has a row of its own. Rows before the
     first command are only counted, because nothing is learnt from them.
     """
+    stray = np.isfinite(columns["time"]) & (parts_of_clock(columns["time"]) < 0)
+    columns["time"][stray] = np.nan
     timed = np.isfinite(columns["time"])
     told = np.any([np.isfinite(columns[name]) for name in commanding or ["time"]], axis=0) & timed
     if not told.any():
@@ -259,7 +261,8 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
         since += float(time[-1] - time[0])
     content.count("rows sorted", len(late))
     content.count("time stamps merged", merged)
-    content.count("rows without time", int((~timed).sum()))
+    content.count("stray times", int(stray.sum()))
+    content.count("rows without time", int((~timed).sum() - stray.sum()))
     content.count("rows before commands", int((columns["time"][rows] < columns["time"][told].min()).sum()))
 
 

@@ -9,7 +9,7 @@ from rov_fmu.io.csv_table import BEYOND, DataFileError, KnownColumns, read_colum
 from rov_fmu.io.messages import MOST
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.readers.parsers import open_table
+from rov_fmu.tank.readers.parsers import guarded, open_table
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class Row:
     value: float
 
 
+@guarded
 def read_rows(
     path: Path, kind: str, axis: Axis | None = None, names: Mapping[str, str] = {}
 ) -> tuple[list[Row], frozenset[str], list[Finding]]:

@@ -35,7 +35,11 @@ DIVE = Dive(
 
 
 _RATES = {"roll velocity", "pitch velocity", "yaw velocity"}
-LACKING: dict[object, set[str]] = {writers.flash: _RATES, writers.csv: {*_RATES, "distance"}}
+LACKING: dict[object, set[str]] = {
+    writers.flash: _RATES,
+    writers.flash_text: _RATES,
+    writers.csv: {*_RATES, "distance"},
+}
 """The quantities that the logs of some writers do not have."""
 
 

@@ -4,7 +4,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode
 
+from rov_fmu.tank import folder
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
@@ -26,6 +29,29 @@ def test_frames_that_are_named_ned_are_those_of_the_sea_already(tmp_path: Path) 
         "dive.db3: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
         "push ahead above its neutral pulse",
     )
+
+
+COMPRESSED = [
+    (1, ".bag", (Writer1.CompressionFormat.BZ2,)),
+    (1, ".bag", (Writer1.CompressionFormat.LZ4,)),
+    (2, ".db3", (CompressionMode.MESSAGE, CompressionFormat.ZSTD)),
+    (2, ".mcap", (CompressionMode.MESSAGE, CompressionFormat.ZSTD)),
+    (2, ".mcap", (CompressionMode.FILE, CompressionFormat.ZSTD)),
+    (2, ".mcap", (CompressionMode.STORAGE, CompressionFormat.ZSTD)),
+]
+"""The version of ROS, the suffix, and the compression: of the pieces of a file, of each message or of the file."""
+
+
+@pytest.mark.parametrize(("version", "suffix", "compression"), COMPRESSED)
+def test_compressed_bags_are_those_that_were_compressed(
+    version: int, suffix: str, compression: tuple[Any, ...], tmp_path: Path
+) -> None:
+    ros = Ros(version)
+    path = ros.write(tmp_path, messages_of(ros, DIVE), suffix, *compression)
+    assert path in folder.test_files(tmp_path)
+    log = read_log(path, BLUEROV2)
+    motion.check(log.log)
+    assert [finding.kind for finding in log.findings] == ["source of commands", "unknown direction"]
 
 
 def test_a_damaged_message_is_left_out(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Clocks that restart, and times in every unit."""
 
+from dataclasses import replace
 from math import nan
 from pathlib import Path
 
@@ -7,13 +8,19 @@ import numpy as np
 import pytest
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.clocks import restart_rows, restarts, usual_delay
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.clocks import first_in_each, parts_of_clock, restart_rows, restarts, usual_delay
+from rov_fmu.tank.columns import Names, names_of
+from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
+from rov_fmu.tank.quality import scales_differ
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.content import Messages, content_of
-from tests.tank.readers.motion import BLUEROV2
+from tests.tank.logs import channel, read_log
+from tests.tank.readers.motion import BLUEROV2, DIVE
+from tests.tank.readers.writers import SEEDS, VARIABLES
+
+N = np.arange(100)
 
 
 def test_a_simulation_that_is_reset_is_two_pieces() -> None:
@@ -68,6 +75,69 @@ def test_a_delay_of_less_than_a_second_is_of_the_same_clock() -> None:
     sent = np.array([0.0, 1.0, np.nan, 3.0])
     for delay, usual in ((0.9, 0.0), (-0.9, 0.0), (1.1, 1.1), (-1.1, -1.1)):
         assert usual_delay(np.column_stack([sent, sent + delay])) == pytest.approx(usual)
+
+
+FLIPPED = [1.0 * 2**bit * 1e-9 for bit in range(42, 63)]
+"""What one flipped bit adds to a time in whole nanoseconds, s: from 73 minutes to 146 years."""
+
+
+@pytest.mark.parametrize("shift", [*FLIPPED, *(-shift for shift in FLIPPED)])
+@pytest.mark.parametrize("rate", [0.5, 10.0, 400.0])
+def test_a_time_that_is_far_from_all_others_is_no_time_of_the_log(shift: float, rate: float) -> None:
+    time = 1e6 + np.arange(100) / rate
+    time[[30, 31]] += shift
+    time[50] = np.nan
+    assert np.flatnonzero(parts_of_clock(time)).tolist() == [30, 31, 50]
+    assert not parts_of_clock(time)[[*range(30), 99]].any()
+
+
+@pytest.mark.parametrize(
+    ("time", "parts"),
+    [
+        (np.append(np.arange(10.0), 1.7e9 + np.arange(10.0)), [0] * 10 + [1] * 10),  # the clock was set
+        (np.append(np.arange(9.0), 1.7e9 + np.arange(10.0)), [-1] * 9 + [0] * 10),  # it was set at the start
+        (np.append(np.arange(9.0), 3600.0 + np.arange(10.0)), [0] * 19),  # an hour is not far
+        (np.array([0.0, 1.0, 2.0, 1e9]), [0, 0, 0, -1]),  # a log of few times has its largest part
+        (1e7 * np.arange(20.0), [0] * 20),  # nor are years, where all are as far
+        (np.full(3, np.nan), [-1] * 3),
+        (np.full(3, np.inf), [-1] * 3),
+        (np.empty(0), []),
+    ],
+)
+def test_a_log_has_a_part_for_each_setting_of_its_clock(time: Array, parts: list[int]) -> None:
+    assert parts_of_clock(time).tolist() == parts
+
+
+@pytest.mark.parametrize("name", SEEDS)
+def test_in_every_format_a_stray_time_is_left_out_and_a_clock_that_is_set_splits_the_log(
+    name: str, tmp_path: Path
+) -> None:
+    """By twelve days, which all clocks can show: one of 32 bits counts milliseconds."""
+    names, _ = names_of(BLUEROV2, RovTables(columns=VARIABLES if name == "a .mat file" else {}))
+    days = 1e6
+    stray, later = DIVE.time + days * (N == 60), DIVE.time + days * (N >= 50)
+    read = read_log(SEEDS[name](tmp_path, replace(DIVE, time=stray)), BLUEROV2, names=names)
+    assert read.log.commands
+    assert len(read.log.commands.rows) == 99
+    assert all(channel.count == 99 for channel in read.log.channels)
+    assert [finding.kind for finding in read.findings].count("stray times") == 1
+    (tmp_path / "set").mkdir()
+    read = read_log(SEEDS[name](tmp_path / "set", replace(DIVE, time=later)), BLUEROV2, names=names)
+    assert [len(log.commands.rows) for log in read.logs if log.commands] == [50, 50]
+    (told,) = (finding for finding in read.findings if finding.kind == "clock restarts")
+    assert float(told.names["at"]) == pytest.approx(4.9, abs=1e-2)
+
+
+def test_work_grows_with_the_rows_and_not_with_the_time_between_them() -> None:
+    """The rows are those that a grid of times finds, which would need 10^15 of them here."""
+    time = np.cumsum(np.random.default_rng(0).exponential(0.3, 500))
+    grid = np.arange(time[0], time[-1], 2.0)
+    assert first_in_each(time, 0.5).tolist() == np.unique(np.searchsorted(time, grid)).tolist()
+    far = np.append(time, 1e15 + time)
+    assert first_in_each(far, 0.5).size < 500
+    walked = channel("distance", far, 2.0 * np.append(time, 1e3 + time))
+    assert scales_differ("a", walked, [walked, channel("surge velocity", far, 1.0 + 0.1 * np.sin(far))]) is not None
+    assert first_in_each(np.empty(0), 1.0).size == 0
 
 
 DATES = {

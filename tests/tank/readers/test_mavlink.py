@@ -13,6 +13,7 @@ from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.mavlink import Message, read_messages
+from rov_fmu.tank.readers.parsers import read_topics
 from tests.tank.logs import commanded, measured, read_log, used
 from tests.tank.readers.motion import BLUEROV2, DIVE
 from tests.tank.readers.writers import altitude, attitude, flash, servos, write_tlog
@@ -140,6 +141,7 @@ def test_what_is_no_log_is_one_clear_line(
 
 def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymavlink", None)
-    path = write_tlog(tmp_path / "a.tlog", [])
+    path = write_tlog(tmp_path / "a.tlog", [attitude(0.0, 0.0)])
+    monkeypatch.setattr(parsers._PARSER, "is_child", True)
     with pytest.raises(DataFileError, match=r"a telemetry log needs pymavlink: pip install 'rov-fmu\[mavlink\]'"):
-        parsers.read_guarded(tmp_path, path, parsers._TELEMETRY, ())
+        read_topics(path, ())

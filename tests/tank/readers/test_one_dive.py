@@ -15,10 +15,11 @@ TOLD = {
     ".tlog": ["time of arrival", "unknown direction"],
     "BlueOS": ["time of arrival", "damaged pieces", "source of commands"],
     ".bin": [],
+    "text": [],
     ".ulg": ["unknown direction"],
 }
 """The kinds of findings by format but for bags of ROS."""
-FORMATS = {**writers.LOGS, ".csv": writers.csv, "BlueOS": writers.blueos}
+FORMATS = {**writers.LOGS, ".csv": writers.csv, "text": writers.flash_text, "BlueOS": writers.blueos}
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -11,9 +11,10 @@ import numpy as np
 from mcap.writer import Writer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
@@ -73,6 +74,12 @@ TITLES = ["time [s]", *(f"u_{n} [us]" for n in range(1, 7)), "depth [m]", "roll 
 TITLES += ["surge velocity [m/s]", "sway velocity [m/s]", "heave velocity [m/s]", "voltage [V]"]
 
 
+VARIABLES = {
+    ("pwm." if title.startswith("u_") else "") + title.partition(" [")[0].replace(" ", "_"): title for title in TITLES
+}
+"""What the variables of MATLAB mean, whose names have no units; [columns] of rov.toml says it."""
+
+
 def columns(dive: Dive) -> list[Array]:
     moved = [dive.position[:, 2], *dive.euler.T, *dive.velocity.T, dive.voltage]
     return [dive.start + dive.time, *dive.pulses.T, *moved]
@@ -80,6 +87,14 @@ def columns(dive: Dive) -> list[Array]:
 
 def csv(folder: Path, dive: Dive) -> Path:
     return table(folder / "dive.csv", ",".join(TITLES), *columns(dive))
+
+
+def matlab(folder: Path, dive: Dive) -> Path:
+    """Write vectors of MATLAB, with the pulses in a structure."""
+    own = dict(zip(VARIABLES, columns(dive), strict=True))
+    pulses = {name.removeprefix("pwm."): own.pop(name) for name in VARIABLES if name.startswith("pwm.")}
+    savemat(folder / "dive.mat", {**own, "pwm": pulses})
+    return folder / "dive.mat"
 
 
 # ---- MAVLink ---------------------------------------------------------------------------------------------------------
@@ -127,7 +142,7 @@ def _mavlink(dive: Dive) -> Iterator[tuple[float, str, dict[str, float]]]:
     """Yield the time, the name and the fields of each message."""
     for n, time in enumerate(dive.start + dive.time):
         servos = {f"servo{k}_raw": int(pulse) for k, pulse in enumerate(dive.pulses[n], start=1)}
-        yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6), "port": 0, **servos}
+        yield time, "SERVO_OUTPUT_RAW", {"time_usec": round(time * 1e6) % 2**32, "port": 0, **servos}
         boot = {"time_boot_ms": round(time * 1e3)}
         angles = dict(zip(("roll", "pitch", "yaw"), dive.euler[n].tolist(), strict=True))
         rates = dict(zip(("rollspeed", "pitchspeed", "yawspeed"), RATES, strict=True))
@@ -199,20 +214,40 @@ def dataflash(path: Path, messages: Iterable[bytes]) -> Path:
     return path
 
 
+def dataflash_text(path: Path, messages: Iterable[tuple[Any, ...]]) -> Path:
+    """Write a log as ground stations convert it to text: a line for each message, with its numbers in their units."""
+    declared = [(128, "BBnNZ", "FMT", "Type,Length,Name,Format,Columns")]
+    declared += [(kind, form, name, columns) for name, (kind, form, columns) in FORMATS.items()]
+    lines = [f"FMT, {kind}, 89, {name}, {form}, {columns}" for kind, form, name, columns in declared]
+    for name, *values in messages:
+        lines.append(", ".join([name, *(v.decode() if isinstance(v, bytes) else f"{v:.16g}" for v in values)]))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
 def rcou(time: float, *pulses: int) -> bytes:
     return packed("RCOU", round(time * 1e6), *pulses, *[0] * (14 - len(pulses)))
 
 
-def flash(folder: Path, dive: Dive) -> Path:
-    messages = [packed("PARM", round(dive.start * 1e6), b"MOT_1_DIRECTION", 1.0, 0.0)]
+def _flash_messages(dive: Dive) -> Iterator[tuple[Any, ...]]:
+    """Yield the name and the values of each message."""
+    yield "PARM", round(dive.start * 1e6), b"MOT_1_DIRECTION", 1.0, 0.0
     for n, time in enumerate(dive.start + dive.time):
         degrees, stamp = np.degrees(dive.euler[n]), round(time * 1e6)
         heading = degrees[2] % 360.0
-        messages += [rcou(time, *dive.pulses[n].astype(int).tolist())]
-        messages += [packed("ATT", stamp, 0.0, degrees[0], 0.0, degrees[1], 0.0, heading, 0.0, 0.0, 3)]
+        yield "RCOU", stamp, *dive.pulses[n].astype(int).tolist(), *[0] * 8
+        yield "ATT", stamp, 0.0, degrees[0], 0.0, degrees[1], 0.0, heading, 0.0, 0.0, 3
         filtered = [*degrees[:2], heading, *dive.over_ground[n], 0.0, *dive.position[n], 0.0, 0.0, 0.0, 0.0]
-        messages += [packed("XKF1", stamp, 0, *filtered), packed("BAT", stamp, 0, dive.voltage[n])]
-    return dataflash(folder / "dive.bin", messages)
+        yield "XKF1", stamp, 0, *filtered
+        yield "BAT", stamp, 0, dive.voltage[n]
+
+
+def flash(folder: Path, dive: Dive) -> Path:
+    return dataflash(folder / "dive.bin", (packed(*message) for message in _flash_messages(dive)))
+
+
+def flash_text(folder: Path, dive: Dive) -> Path:
+    return dataflash_text(folder / "dive.log", _flash_messages(dive))
 
 
 # ---- ULog ------------------------------------------------------------------------------------------------------------
@@ -357,12 +392,15 @@ class Ros:
             twist=self.message("geometry_msgs/msg/TwistWithCovariance", twist=twist),
         )
 
-    def write(self, folder: Path, messages: Messages, suffix: str = ".db3") -> Path:
-        """Write a bag, and return the path of its file."""
+    def write(self, folder: Path, messages: Messages, suffix: str = ".db3", *compression: Any) -> Path:
+        """Write a bag, and return the path of its file. The compression is what `set_compression` of rosbags takes."""
         found = sorted(messages, key=lambda entry: entry[1])
         path = folder / "dive.bag" if self.version == 1 else folder / "dive"
         plugin = StoragePlugin.MCAP if suffix == ".mcap" else StoragePlugin.SQLITE3
-        with Writer1(path) if self.version == 1 else Writer2(path, version=9, storage_plugin=plugin) as writer:
+        unopened = Writer1(path) if self.version == 1 else Writer2(path, version=9, storage_plugin=plugin)
+        if compression:
+            unopened.set_compression(*compression)
+        with unopened as writer:
             connections: dict[str, Any] = {}
             for topic, time, message in found:
                 kind = message.__msgtype__
@@ -370,7 +408,7 @@ class Ros:
                     connections[topic] = writer.add_connection(topic, kind, typestore=self.store)
                 pack = self.store.serialize_ros1 if self.version == 1 else self.store.serialize_cdr
                 writer.write(connections[topic], round((START + time + ARRIVAL) * 1e9), pack(message, kind))
-        return path if self.version == 1 else next(path.glob(f"*{suffix}"))
+        return path if self.version == 1 else next(path.glob(f"*{suffix}*"))
 
 
 def outputs(ros: Ros, dive: Dive, n: int) -> Any:
@@ -402,10 +440,30 @@ def bag(suffix: str) -> Callable[[Path, Dive], Path]:
     return write
 
 
+def packed_bag(folder: Path, dive: Dive) -> Path:
+    """Write a bag of ROS 2 as `ros2 bag record --compression-mode file` leaves it."""
+    ros = Ros(2)
+    return ros.write(folder, messages_of(ros, dive), ".db3", CompressionMode.FILE, CompressionFormat.ZSTD)
+
+
 LOGS: Mapping[str, Callable[[Path, Dive], Path]] = {
     ".bin": flash,
     ".tlog": tlog,
     ".ulg": ulog,
     **{suffix: bag(suffix) for suffix in (".bag", ".db3", ".mcap")},
+    ".zstd": packed_bag,
 }
-"""The formats that a parser of somebody else reads."""
+"""The logs that have a suffix of their own, and that a parser of somebody else reads."""
+SEEDS: Mapping[str, Callable[[Path, Dive], Path]] = {
+    "a DataFlash log": flash,
+    "a DataFlash log in text": flash_text,
+    "a telemetry log": tlog,
+    "a ULog": ulog,
+    "a bag of ROS 1": bag(".bag"),
+    "a bag of ROS 2": bag(".db3"),
+    "an MCAP file": bag(".mcap"),
+    "a file that zstd compressed": packed_bag,
+    "a .mat file": matlab,
+    "a CSV file": csv,
+}
+"""A writer for every format, by its name in rov_fmu/tank/readers/parsers.py."""
