@@ -76,7 +76,7 @@ FORMATS = (
     TABLE,
 )
 """All formats, and the only table of them."""
-FORMAT_NAMES = listed(dict.fromkeys(kind.name for kind in FORMATS))
+FORMAT_NAMES = listed(dict.fromkeys(kind.name for kind in (TABLE, *FORMATS)))
 
 
 def format_of(path: Path) -> Format:

@@ -7,10 +7,10 @@ import pytest
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode
 
-from rov_fmu.tank import folder
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.readers.listing import list_files
 from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
@@ -48,7 +48,7 @@ def test_compressed_bags_are_those_that_were_compressed(
 ) -> None:
     ros = Ros(version)
     path = ros.write(tmp_path, messages_of(ros, DIVE), suffix, *compression)
-    assert path in folder.test_files(tmp_path)
+    assert path in list_files(tmp_path).tests
     log = read_log(path, BLUEROV2)
     motion.check(log.log)
     assert [finding.kind for finding in log.findings] == ["source of commands", "unknown direction"]
