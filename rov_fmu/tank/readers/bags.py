@@ -29,7 +29,7 @@ _FIRST = 100
 """The number of messages of an unknown topic whose ranges are told."""
 _RC_OUT = "std_msgs/Header header\nuint8 rssi\nuint16[] channels\n"
 """The definition of mavros_msgs/RCOut, for bags without definitions."""
-_ZSTD = b"\x28\xb5\x2f\xfd"
+ZSTD = b"\x28\xb5\x2f\xfd"
 """The first bytes of what zstd compressed. A message of ROS 2 begins with 0."""
 _MAVLINK_TOPIC = re.compile(r"mavlink/(\d+)/(\d+)/(\w+)")
 """The topics of BlueOS: system, component and kind of the message."""
@@ -71,7 +71,7 @@ def read_bag(path: Path, named: Collection[str]) -> Content:
 
 def _unpacked(raw: bytes) -> bytes:
     """Return a message, which a bag may have compressed on its own. Raises ZstdError for a damaged one."""
-    if not raw.startswith(_ZSTD):
+    if not raw.startswith(ZSTD):
         return raw
     import zstandard
 

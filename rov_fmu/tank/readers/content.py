@@ -52,7 +52,10 @@ class Content:
             self.findings.append(about(self.file, kind, count=count, **words))
 
     def split_by_clock(self) -> None:
-        """Split the log where a clock was set, and leave out and count the messages with times that none has shown."""
+        """Split the log where a clock was set, and leave out and count the messages with times that none has shown.
+
+        Topics that have clocks of their own, so that no topic shows both, stay together.
+        """
         times = [topic.time for piece in self.pieces for topic in piece.topics]
         together = np.concatenate([np.empty(0), *times])
         is_possible = np.abs(together) < IMPOSSIBLE
@@ -66,13 +69,15 @@ class Content:
         pieces, self.pieces = self.pieces, []
         for piece in pieces:
             parts = [next(own) for _ in piece.topics]
+            shown = [np.unique(of[of >= 0]) for of in parts]
+            is_set = any(len(numbers) > 1 for numbers in shown)
+            all_shown = np.unique(np.concatenate([np.empty(0, np.intp), *shown]))
             since = piece.since
-            for number in np.unique(np.concatenate([np.empty(0, np.intp), *parts])).tolist():
-                topics = [topic.where(of == number) for topic, of in zip(piece.topics, parts, strict=True)]
-                topics = [topic for topic in topics if len(topic.time)]
-                if number >= 0:
-                    self.pieces.append(Piece(topics, piece.parameters, since))
-                    since += float(max(t.time[-1] for t in topics) - min(t.time[0] for t in topics))
+            for numbers in all_shown[:, None] if is_set else [all_shown]:
+                kept = (topic.where(np.isin(of, numbers)) for topic, of in zip(piece.topics, parts, strict=True))
+                topics = [topic for topic in kept if len(topic.time)]
+                self.pieces.append(Piece(topics, piece.parameters, since))
+                since += float(np.ptp([end for topic in topics for end in topic.time[[0, -1]]])) if topics else 0.0
 
 
 def content_of(

@@ -26,7 +26,7 @@ from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitE
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, open_text, read_header
 from rov_fmu.io.messages import NO_FILE, FileError, brief, listed
 from rov_fmu.tank.findings import about
-from rov_fmu.tank.readers.bags import read_bag, read_mcap, unpack
+from rov_fmu.tank.readers.bags import ZSTD, read_bag, read_mcap, unpack
 from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_dataflash_text, read_telemetry
 from rov_fmu.tank.readers.other_files import EMPTY, reason_against
@@ -68,7 +68,7 @@ FORMATS = (
         "a bag of ROS 2", rb"SQLite format 3\0", read=read_bag, needs=_ROSBAGS, repair="sqlite3 .recover", suffix=".db3"
     ),
     Format("an MCAP file", rb"\x89MCAP0\r\n", read=read_mcap, needs=_ROSBAGS, repair="mcap recover", suffix=".mcap"),
-    Format("a file that zstd compressed", rb"\x28\xb5\x2f\xfd", unpack=unpack, needs=_ROSBAGS, growth=8),
+    Format("a file that zstd compressed", re.escape(ZSTD), unpack=unpack, needs=_ROSBAGS, growth=8),
     Format("a .mat file", rb"MATLAB (5\.0|7\.3) MAT-file", open_matlab, growth=4),
     # µs since 1970, most significant byte first, and then the first byte of a MAVLink message
     Format("a telemetry log", rb"(?s)\0.{7}[\xfe\xfd]", read=read_telemetry, needs=_PYMAVLINK),
@@ -244,12 +244,13 @@ def read_content(path: Path, named: Collection[str]) -> Content:
     kind, printed = format_of(path), StringIO()
     try:
         with redirect_stdout(printed), redirect_stderr(printed), TemporaryDirectory() as folder:
-            file = path
+            file, shown = path, f"{path}"
             if kind.unpack:
-                file = Path(folder) / "unpacked"
+                file, shown = Path(folder) / "unpacked", f"{path}, unpacked"
                 kind.unpack(path, file)
-                kind = _format_of_unpacked(path, file)
-            assert kind.read
+                kind = _format_of_unpacked(file, shown)
+            if not kind.read:
+                raise UnreadableFileError(f"{shown}: is {kind.name}, and not a log with messages")
             content = kind.read(_under_its_suffix(file, kind, Path(folder)), named)
     except ModuleNotFoundError:
         raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
@@ -259,15 +260,12 @@ def read_content(path: Path, named: Collection[str]) -> Content:
     return replace(content, file=path.name, findings=findings)
 
 
-def _format_of_unpacked(path: Path, file: Path) -> Format:
-    """Return the format of a log that was packed in another file. Raises DataFileError."""
+def _format_of_unpacked(file: Path, shown: str) -> Format:
+    """Return the format of a file that was packed in another one, which the error names. Raises DataFileError."""
     try:
-        kind = format_of(file)
+        return format_of(file)
     except DataFileError as error:
-        raise UnreadableFileError(str(error).replace(str(file), f"{path}, unpacked")) from error
-    if not kind.read:
-        raise UnreadableFileError(f"{path}: only logs are read in packed files, and not {kind.name}: unpack it")
-    return kind
+        raise UnreadableFileError(str(error).replace(str(file), shown)) from error
 
 
 def _under_its_suffix(path: Path, kind: Format, folder: Path) -> Path:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import first_in_each, parts_of_clock, restart_rows, restarts, usual_delay
 from rov_fmu.tank.columns import Names, names_of
 from rov_fmu.tank.description import RovTables
@@ -15,7 +16,7 @@ from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.quality import scales_differ
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.tank.readers.content import Messages, content_of
+from rov_fmu.tank.readers.content import Content, Messages, Piece, content_of
 from tests.tank.logs import channel, read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
 from tests.tank.readers.writers import SEEDS, VARIABLES
@@ -106,6 +107,18 @@ def test_a_time_that_is_far_from_all_others_is_no_time_of_the_log(shift: float, 
 )
 def test_a_log_has_a_part_for_each_setting_of_its_clock(time: Array, parts: list[int]) -> None:
     assert parts_of_clock(time).tolist() == parts
+
+
+def test_topics_with_clocks_of_their_own_stay_together() -> None:
+    """A driver counts since its start, and all others since 1970. Where all times are infinite, nothing is left."""
+    boot, epoch = (Topic(Source(name), start + np.arange(20.0), {}) for name, start in (("a", 5.0), ("b", 1.7e9)))
+    content = Content("a.mcap", [Piece([boot, epoch])])
+    content.split_by_clock()
+    assert [len(topic.time) for topic in content.pieces[0].topics] == [20, 20]
+    assert (len(content.pieces), content.findings) == (1, [])
+    content = Content("a.mcap", [Piece([replace(boot, time=np.full(20, np.inf))])])
+    content.split_by_clock()
+    assert [piece.topics for piece in content.pieces] == [[]]
 
 
 @pytest.mark.parametrize("name", SEEDS)

@@ -1,6 +1,7 @@
 """Logs that are damaged, or made to exhaust the machine: one line each, within the budget, and no file is left."""
 
 import os
+import re
 import sqlite3
 import struct
 import sys
@@ -20,7 +21,6 @@ from rov_fmu.io.child_process import Limits
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers import parsers
-from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.parsers import FORMATS, Format, budget, format_of, header_of, one_parser, read_topics
 from rov_fmu.tank.readers.tank_tables import read_rows
 from tests.tank.logs import read_log
@@ -28,8 +28,8 @@ from tests.tank.readers.motion import BLUEROV2, DIVE
 from tests.tank.readers.writers import SEEDS, Ros, bag, flash
 
 
-def read(path: Path) -> Content:
-    return read_topics(path, ())
+def read(path: Path) -> object:
+    return header_of(path) if format_of(path).open else read_topics(path, ())
 
 
 def _ulog(path: Path, *formats: str, data: bytes = bytes(100)) -> Path:
@@ -104,7 +104,7 @@ def test_a_small_file_that_exhausts_the_machine_is_one_line(
     with pytest.raises(DataFileError, match=limits):
         read(path)
     good = bag(".db3")(tmp_path / "good", DIVE)
-    assert read(good).pieces
+    assert read_topics(good, ()).pieces
     assert not [*temporary.iterdir()]
 
 
@@ -149,6 +149,18 @@ def test_all_that_reads_a_file_shares_one_budget(tmp_path: Path) -> None:
         assert header_of(path) == ["time [s]", "depth [m]"]
 
 
+def test_what_is_packed_must_be_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "dive.zstd"
+    for content, told in (
+        (b"time [s],u_1 [%]\n0,1\n", "is a CSV file, and not a log with messages"),
+        (b"\0\0", "its first bytes are those of none"),
+        (b"", "the file is empty"),
+    ):
+        path.write_bytes(zstandard.compress(content))
+        with pytest.raises(DataFileError, match=f"^{re.escape(str(path))}, unpacked: {told}"):
+            read(path)
+
+
 def test_a_file_that_is_gone_as_it_is_read_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.csv"
     path.write_text("time [s]\n", encoding="utf-8")
@@ -176,7 +188,7 @@ def test_the_budget_of_a_large_log_grows_with_its_size(tmp_path: Path) -> None:
     assert budget(200_000_000) == Limits(time=430.0, memory=2_200_000_000, disk=10**9)
     with one_parser():
         path = flash(tmp_path, DIVE)
-        assert len({id(parsers._PARSER._child) for _ in range(2) if read(path).pieces}) == 1
+        assert len({id(parsers._PARSER._child) for _ in range(2) if read_topics(path, ()).pieces}) == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
@@ -184,13 +196,13 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = flash(tmp_path, DIVE)
-    assert read(path).pieces  # from then on the process has imported the parser
+    assert read_topics(path, ()).pieces  # from then on the process has imported the parser
     with monkeypatch.context() as patch:
         patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
         with pytest.raises(DataFileError) as error:
             read(path)
     assert str(error.value) == f"{path}: needs more than 0.001 GB of memory to be read"
-    assert read(path).pieces
+    assert read_topics(path, ()).pieces
 
 
 def test_messages_without_a_time_or_an_output_are_no_traceback(tmp_path: Path) -> None:
