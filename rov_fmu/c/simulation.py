@@ -119,7 +119,7 @@ def simulate(
     failed = np.empty(vehicles, np.intp)
     run = load_library(vehicle, LANES_FILE).simulate_in_lanes if lanes else load_library(vehicle).simulate
     run.restype = ctypes.c_int if lanes else None
-    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (tables, times, lengths, recorded, result, failed)]
+    pointers = [*map(pointer, (tables, times, lengths, recorded, result, failed))]
 
     def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
         sizes = map(ctypes.c_ssize_t, (len(times), vehicles, first, last, len(record)))
@@ -130,6 +130,11 @@ def simulate(
     for one in np.flatnonzero(failed < len(times)):
         result[:, one, failed[one] :] = np.nan
     return Trajectories(result, failed)
+
+
+def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
+    """Return the address of an array, which must stay alive."""
+    return ctypes.c_void_p(array.ctypes.data)
 
 
 def reasons(layout: Layout, h: float) -> str:

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import on_cores, places_of, reasons, tables_of
+from rov_fmu.c.simulation import on_cores, places_of, pointer, reasons, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
-class _Going:
-    """Vehicles of the same layout that go on from where they were.
+class _Memory:
+    """The memory in which C keeps vehicles of the same layout between their steps.
 
-    C works in their memory, an array, so that Python frees it, and a copy of this object is a copy of the vehicles.
+    It is an array, so Python frees it, and a copy of this object is a copy of the vehicles.
     """
 
     def __init__(self, vehicle: Vehicle, count: int, file: Path) -> None:
@@ -58,10 +58,10 @@ class _Going:
         library, addresses = self._c
         tables, _alive = tables_of(self.vehicle, values, (len(which), 1))
         for n, vehicle in enumerate(which):
-            library.lone_begin(addresses[vehicle], ctypes.c_void_p(tables.ctypes.data), ctypes.c_ssize_t(n))
+            library.lone_begin(addresses[vehicle], pointer(tables), ctypes.c_ssize_t(n))
 
 
-class Stepper(_Going):
+class Stepper(_Memory):
     """One vehicle that is stepped from time 0 on, with the bits of the FMU. Each step is exact."""
 
     def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
@@ -101,7 +101,7 @@ class Stepper(_Going):
         return results
 
 
-class LaneStepper(_Going):
+class LaneStepper(_Memory):
     """Many vehicles that are stepped together, in the lanes of vectors on all cores, as `simulate` does with `lanes`.
 
     They begin at rest with the usual inputs. Raises BuildError when the engine cannot be compiled.
@@ -114,15 +114,14 @@ class LaneStepper(_Going):
     def step(self, h: float) -> NDArray[np.bool_]:
         """Step all vehicles over h > 0 seconds. Return True for those whose motion cannot be computed; they stay."""
         library, addresses = self._c
-        count = len(addresses)
-        times, length, failed = np.zeros(2), np.array([h]), np.empty(count, np.intp)  # each has a time of its own
-        nothing = ctypes.c_void_p()
-        before = [nothing, *(ctypes.c_void_p(one.ctypes.data) for one in (times, length))]
-        after = [nothing, nothing, ctypes.c_void_p(failed.ctypes.data)]
+        times, length, failed = np.zeros(2), np.array([h]), np.empty(len(addresses), np.intp)
+        of_steps = [pointer(times), pointer(length)]  # each vehicle has a time of its own
 
         def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
-            sizes = map(ctypes.c_ssize_t, (2, count, first, last, 0))
-            library.simulate_in_lanes(*before, *after, *sizes, ctypes.byref(stop), addresses[0])
+            sizes = map(ctypes.c_ssize_t, (2, len(addresses), first, last, 0))
+            library.simulate_in_lanes(
+                None, *of_steps, None, None, pointer(failed), *sizes, ctypes.byref(stop), addresses[0]
+            )
 
-        on_cores(run_part, count, 2, lanes=True)
+        on_cores(run_part, len(addresses), 2, lanes=True)
         return failed < 2

@@ -300,7 +300,7 @@ class VehicleModel(Vehicle):
         try:
             attitude = QUATERNION if layout.has_attitude else ()
             going = (*layout.state, *layout.continued, *layout.delayed)
-            others = attitude if many else (*going, *layout.commands)
+            others = (*attitude, *layout.continued) if many else (*going, *layout.commands)
             recording = [*recorded, *(name for name in others if name not in recorded)]
             trajectories = simulate(
                 self, step_times, values, recording, vehicles=vehicles, workers=workers, lanes=lanes

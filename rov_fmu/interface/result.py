@@ -63,7 +63,7 @@ class Result(Mapping[str, Array]):
 
     It also contains the heading psi_0 of a vehicle with roll or pitch, and the commands that act after the dead time,
     but not those that still wait for it: `VehicleModel.stepper` keeps them. Of many vehicles, it has what was
-    recorded."""
+    recorded, and the attitude."""
     failed: NDArray[np.intp]
     """The numbers of the vehicles whose motion could not be computed to the end; their arrays end with NaN."""
     commands: Mapping[str, Array] = field(default_factory=dict)
