@@ -80,7 +80,7 @@ def step_jacobian(
 
     def after(rows: Array) -> Array:
         """Return the states after a step with the numbers `free` in each row (states x rows)."""
-        given = {**values, **dict(zip(free, rows.T[:, :, np.newaxis], strict=True))}
+        given = dict(zip(free, rows.T[:, :, np.newaxis], strict=True))
         given |= {delayed_name(name): given[name] for name in layout.commands if layout.has_dead_time}
         return simulate(vehicle, [0.0, h], given, vehicles=len(rows), workers=1).values[:, :, 1]
 

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, lru_cache
 from itertools import chain
 from math import inf, isfinite, sin
@@ -110,6 +110,10 @@ class Vehicle:
     def __getitem__(self, name: str) -> float:
         """Return a coefficient."""
         return self.coefficients[name]
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what a copy has: the fields, without the compiled formulas."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def replaced(self, values: Values) -> Self:
         """Return the vehicle with other values of some coefficients, without checking the values. It is cheap."""

@@ -98,6 +98,7 @@ def test_commands_that_wait_for_the_dead_time_arrive_in_later_steps(dead_time: f
     for seed in (1, 2):
         start, _ = env.reset(seed=seed)
         np.testing.assert_allclose(_flown(env, actions, 5), expected(start, 5), rtol=1e-11, atol=1e-11)
+    vehicle.step({}, {}, 0.1)  # compiles formulas, which cannot be copied
     twin = deepcopy(env)
     there, here = (_flown(one, actions[:, 5:], 2) for one in (twin, env))
     np.testing.assert_array_equal(here, there)
