@@ -144,7 +144,7 @@ class Outputs:
     def __init__(self, servos: Servos, motors: int) -> None:
         """Begin without any pulse. ArduSub may drive so many motors, of which a vehicle may lack the last ones."""
         self._drives = {number: name for name, (number, _) in servos.items()}
-        self._last = max(*self._drives, motors)
+        self._last = max([*self._drives, motors])
         self._silent = {*self._drives}
         self._moving: set[int] = set()
         self._first: dict[int, int] = {}

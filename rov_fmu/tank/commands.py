@@ -198,7 +198,8 @@ def commands_of(
     by_name = dict(zip(names, numbers, strict=True))
     series, meanings = _fractions(path, best, by_name, parameters, keys)
     known = {topic for outputs in candidates for topic in outputs.topics}
-    used = {*best.used} if _are_pulses(path, best) else {*numbers} - {0}
+    used = {n for n, (_, values) in best.series.items() if np.isfinite(values).any()}
+    used = {*best.used} if _are_pulses(path, best) else used
     without = [name for name, n in by_name.items() if n not in used] if used & {*numbers} else []
     extra = [*_without_thruster(best, numbers, functions)]
     return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings], without, extra)
@@ -332,7 +333,7 @@ def _without_thruster(
     usual = float(np.median(changing)) if changing else np.inf
     for n, count in counts.items():
         own = functions.get(n) or Function(n, n if count >= _OFTEN * usual else 0)
-        if count and own.motor and n not in numbers:
+        if count and own.motor > len(numbers):
             yield own
 
 
