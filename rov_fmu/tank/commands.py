@@ -231,9 +231,10 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
                 continue
             for place, values in topic.fields.items():
                 if of_field := re.fullmatch(rule.field, place):
-                    alike = match.groups() and (name[: match.start(1)], name[match.end(1) :])
-                    number = int((match if alike else of_field)[1])
-                    found.setdefault(alike or topic, {})[number] = topic, values
+                    is_numbered = bool(match.groups())
+                    alike = (name[: match.start(1)], name[match.end(1) :]) if is_numbered else topic
+                    number = int((match if is_numbered else of_field)[1])
+                    found.setdefault(alike, {})[number] = topic, values
         for by_number in found.values():
             ordered = [by_number[n] for n in sorted(by_number)]
             series = {n: (topic.time, values) for n, (topic, values) in enumerate(ordered, start=1)}

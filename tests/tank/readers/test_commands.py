@@ -109,8 +109,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         IDLE.format(1530) + "1530,1530,1730,1330",
         "a",
         "",
-        "a 0 0 0.5 -0.5: | no thrust is 1530 us, because the outputs rest there and never at 1500 us. If that is wrong, "
-        "write neutral = 1500 into [logs] of rov.toml | full thrust is 1130 and 1930 us, and no thrust 1530 us",
+        "a 0 0 0.5 -0.5: | no thrust is 1530 us, because the outputs rest there and never at 1500 us. If that is wrong"
+        ", write neutral = 1500 into [logs] of rov.toml | full thrust is 1130 and 1930 us, and no thrust 1530 us",
     ),
     "the range of the motors about outputs that rest elsewhere": (
         IDLE.format(1470) + "1470,1470,1720,1220",
@@ -158,8 +158,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         f"{SERVOS} 1 . servo1_raw=1540,1540,1640,1740",
         "a",
         "",
-        "a 0.1 0.1 0.35 0.6: | no output ever rests at 1500 us, which is taken as no thrust, and most stay at 1540 us. If "
-        "that is no thrust, write neutral = 1540 into [logs] of rov.toml",
+        "a 0.1 0.1 0.35 0.6: | no output ever rests at 1500 us, which is taken as no thrust, and most stay at 1540 us. "
+        "If that is no thrust, write neutral = 1540 into [logs] of rov.toml",
     ),
     "neutral alone": (ONE, "a", f"neutral=1520 {SERVO1}", "0.5 -0.7"),
     "span alone": (ONE, "a", f"span=200 {SERVO1}", "1.1 -1.3"),
