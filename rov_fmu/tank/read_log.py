@@ -27,8 +27,8 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.commands import Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
-from rov_fmu.tank.no_measurement import measured_only
 from rov_fmu.tank.readers.content import Content, Piece, described
+from rov_fmu.tank.readers.no_measurement import measured_only
 from rov_fmu.tank.readers.parsers import format_of, read_parsed
 from rov_fmu.tank.readers.tables import read_table
 

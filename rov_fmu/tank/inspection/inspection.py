@@ -22,9 +22,9 @@ from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import kind_of_table, test_files
 from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.no_measurement import flag_columns
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
 

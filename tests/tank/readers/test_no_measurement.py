@@ -12,9 +12,9 @@ from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.no_measurement import flag_of, marks
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.no_measurement import flag_of, marks
 from tests.tank.logs import measured
 from tests.tank.readers.motion import BLUEROV2
 from tests.tank.readers.writers import Ros, table
