@@ -1,11 +1,13 @@
 """Numbers of logs that are no measurements: marks, and flags of validity, in tables, bags and .mat files."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import savemat
 
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import names_of
@@ -163,6 +165,18 @@ def test_a_mark_is_told_with_its_columns_and_its_value(tmp_path: Path) -> None:
         f"dive.csv: {COUNT} values of sway velocity [mm/s] left out, because 32.768 m/s {end}",
     ]
     assert measured(log, "sway velocity") == pytest.approx(-SPEED[~BURSTS])
+
+
+def test_a_mark_may_be_beyond_the_bounds_of_a_quantity_and_other_numbers_may_not(tmp_path: Path) -> None:
+    path, titles = tmp_path / "dive.csv", "time [s],u_5 [1],depth [m],surge velocity [m/s]"
+    log = read(table(path, titles, TIME, STEPS, DEPTH, np.where(BURSTS, -9999.0, SPEED)))
+    assert measured(log, "surge velocity") == pytest.approx(SPEED[~BURSTS])
+    with pytest.raises(DataFileError) as error:
+        read(table(path, titles, TIME, STEPS, DEPTH, 2000.0 * SPEED))
+    assert re.fullmatch(
+        rf"{path}, column 'surge velocity \[m/s\]' = \S+ m/s, as in \d+ rows: must be within -1000 ... 1000 m/s",
+        str(error.value),
+    )
 
 
 def test_marks_and_flags_of_matlab_and_of_a_bag(tmp_path: Path) -> None:
