@@ -17,6 +17,7 @@ from rov_fmu.tank.log import Source
 SERVOS = "SERVO_OUTPUT_RAW SERVO_OUTPUT_RAW"
 ARRAY = "std_msgs/msg/Float64MultiArray"
 NUMBER = "std_msgs/msg/Float64"
+ODOMETRY = "nav_msgs/msg/Odometry"
 WRENCH = "geometry_msgs/msg/Wrench . ."
 WRENCHES = f"/a {WRENCH} force.x=5,9 force.y=1,1 force.z=1,1; /b {WRENCH} force.x=1,2 force.y=3,-4 force.z=1,1 "
 WRENCHES += "torque.x=5,5 torque.y=6,7 torque.z=8,9"
@@ -56,6 +57,12 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         "",
         "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; `vehicle` in "
         "[logs] of rov.toml names another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
+    ),
+    "another vehicle without commands": (
+        f"/b/odom {ODOMETRY} b . x=1; /a/odom {ODOMETRY} a . x=1; /a/cmd {ARRAY} a . data[0]=0,1; /c/z/odom {ODOMETRY} c . x=1",
+        "a",
+        "",
+        "/a/cmd: a 0 1: | log: the log has the vehicles a and b. a is used; `vehicle` in [logs] of rov.toml names another",
     ),
     "a named vehicle": (VEHICLES, "a", "vehicle=rov_b", "/rov_b/cmd: a 0 -1: | rov_b is used"),
     "an unknown vehicle": (
