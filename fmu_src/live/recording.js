@@ -410,7 +410,7 @@ function special(unit, { pulses, forces }) {
   if (!pulses.units.map(folded).includes(word) || !Number.isFinite(first) || !second) return null;
   return (/** @type {number} */ x) => {
     const command = (x - first) / second;
-    return pulses.none.includes(x) && Math.abs(command) >= 1 ? 0 : command;
+    return pulses.none.includes(x) && Math.abs(command) > 1 ? 0 : command;
   };
 }
 

@@ -177,6 +177,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "unread cells",
             "no pulse",
             "no servo pulse",
+            "invalid",
             "beyond full thrust",
             "constant motion",
             "constant push",

@@ -861,7 +861,7 @@ def pulses(numbers: tuple[float, ...] = ()) -> Conversion:
 def _command(neutral: float, span: float, pulse: float) -> float:
     """Return a command. A pulse within the span is one, even if it has a value of `NO_OUTPUT`."""
     command = (pulse - neutral) / span
-    return 0.0 if pulse in NO_OUTPUT and abs(command) >= 1.0 else command
+    return 0.0 if pulse in NO_OUTPUT and abs(command) > 1.0 else command
 
 
 # ---- Forces as commands ----------------------------------------------------------------------------------------------

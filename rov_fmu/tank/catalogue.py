@@ -292,7 +292,7 @@ FLAGS = (
     (r"\b(heading|compass|magnetometer|yaw)\b", ("heading",)),
     (r"\b(attitude|ahrs|orientation|imu)\b", VECTORS[EULER]),
     (r"\b(gyro|rate|rates|imu)\b", VECTORS[RATES]),
-    (r"\b(position|pos|usbl|gps)\b", ("distance", "surge distance", "sway distance")),
+    (r"\b(position|pos|distance|usbl|gps)\b", ("distance", "surge distance", "sway distance")),
     (r"\b(voltage|battery)\b", ("voltage",)),
 )
 """The words in names of flags of validity, as regular expressions, and the quantities whose flags these are."""
@@ -309,7 +309,7 @@ HEADERS = (
     ("velocity", "velocity|vel|speed|rate"),
     ("time constant", "tau|constant|time"),
     ("", "|".join(sorted(NOT_MEASURED))),
-    ("", "acceleration|accel|acc|covariance"),
+    ("", "acceleration|accel|acc|covariance|valid|validity|invalid"),
     ("roll velocity", "roll|gyrox|(angular|gyro|rates)( .*)? x"),
     ("pitch velocity", "pitch|gyroy|(angular|gyro|rates)( .*)? y"),
     ("yaw velocity", "yaw|turn|heading|gyroz|(angular|gyro|rates)( .*)? z"),

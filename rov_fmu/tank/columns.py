@@ -164,7 +164,9 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
         if axis and quantity.axis == axis:
             short = "velocity" if quantity.is_velocity else axis.position
         also = (name,) if short != name else ()
-        column = replace(quantity.column, also=(*quantity.also, *also))
+        column = replace(
+            quantity.column, also=(*quantity.also, *also), minimum=None, maximum=None
+        )  # checked after marks are left out
         columns.setdefault(short, LogColumn(column, Entry(name, quantity)))  # the distance along the axis comes first
     return columns
 

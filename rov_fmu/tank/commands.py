@@ -29,7 +29,7 @@ from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import listed, shown
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.tank.arrays import Array, spread
-from rov_fmu.tank.catalogue import FORCE, NOT_COMMANDED, OUTPUTS, WRENCHES, Output, words_of
+from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, Output, words_of
 from rov_fmu.tank.channels import Topic, frames_of
 from rov_fmu.tank.clocks import ascending, held
 from rov_fmu.tank.findings import Finding, about
@@ -193,7 +193,7 @@ def commands_of(
     if missing := [name for name, n in zip(names, numbers, strict=True) if n and n not in best.series]:
         count = f"{shown(best.source.topic)} has {len(best.series)} outputs"
         raise DataFileError(f"{path}: no output of thruster {listed(missing)}: {count}")
-    vehicles = {outputs.source.vehicle for outputs in candidates}
+    vehicles = {outputs.source.vehicle for outputs in candidates} | _alike(vehicle, topics)
     findings = [*_choice(path, best, own, sorted(vehicles))]
     by_name = dict(zip(names, numbers, strict=True))
     series, meanings = _fractions(path, best, by_name, parameters, keys)
@@ -233,6 +233,18 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     return Commanded(chosen[best], best, topics={source.topic for source in found}, findings=findings)
 
 
+def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
+    """Return the other vehicles whose depth or position has a topic of the same name and type as that of a vehicle."""
+    gives_place = [message.kind for message in MESSAGES if message.gives in (POSITION, "depth")]
+    places: dict[tuple[str, str], set[str]] = {}
+    for source in (topic.source for topic in topics if vehicle):
+        if any(re.fullmatch(kind, source.kind) for kind in gives_place):
+            places.setdefault((source.kind, source.topic.removeprefix(f"/{source.vehicle}/")), set()).add(
+                source.vehicle
+            )
+    return {other for vehicles in places.values() if vehicle in vehicles for other in vehicles} - {vehicle}
+
+
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
     """Yield findings about the outputs and the vehicle that are used, if there are others."""
     if len(vehicles) > 1:
@@ -261,9 +273,10 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
                 continue
             for place, values in topic.fields.items():
                 if of_field := re.fullmatch(rule.field, place):
-                    alike = match.groups() and (name[: match.start(1)], name[match.end(1) :])
-                    number = int((match if alike else of_field)[1])
-                    found.setdefault(alike or topic, {})[number] = topic, values
+                    is_numbered = bool(match.groups())
+                    alike = (name[: match.start(1)], name[match.end(1) :]) if is_numbered else topic
+                    number = int((match if is_numbered else of_field)[1])
+                    found.setdefault(alike, {})[number] = topic, values
         for by_number in found.values():
             ordered = [by_number[n] for n in sorted(by_number)]
             series = {n: (topic.time, values) for n, (topic, values) in enumerate(ordered, start=1)}

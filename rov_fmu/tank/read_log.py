@@ -11,7 +11,10 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import BodyForce, Layout
-from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, DataFileError
+from rov_fmu.io.messages import shown
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import LATE, in_rows
 from rov_fmu.tank.columns import (
@@ -27,9 +30,9 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.commands import Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
-from rov_fmu.tank.no_measurement import measured_only
 from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
+from rov_fmu.tank.readers.no_measurement import measured_only
 from rov_fmu.tank.readers.parsers import guarded, open_table, read_content
 from rov_fmu.tank.readers.tables import read_table
 
@@ -73,7 +76,7 @@ def _log(
     piece = replace(piece, topics=topics)
     fields = {field: values for topic in piece.topics for field, values in topic.full_fields() if field in entries}
     rests, at_neutral = at_rest(file, {field: values for field, values in fields.items() if entries[field].is_pulse})
-    named, told, labels = _meant(piece, entries, rests)
+    named, told, labels = _meant(path, piece, entries, rests)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
     if layout.has_wrench:
@@ -115,11 +118,12 @@ def _log(
 
 
 def _meant(
-    piece: Piece, entries: Mapping[str, Entry], rests: Mapping[str, float]
+    path: Path, piece: Piece, entries: Mapping[str, Entry], rests: Mapping[str, float]
 ) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
     """Return the channels and the commands that `entries` say that fields are, and the fields of the commands.
 
-    `rests` has the pulses of no thrust by field, µs, where they are not the usual one.
+    `rests` has the pulses of no thrust by field, µs, where they are not the usual one. Raises DataFileError where
+    numbers that are no marks are beyond any vehicle.
     """
     channels: list[Channel] = []
     commands: dict[str, Series] = {}
@@ -131,14 +135,24 @@ def _meant(
                 numbers = np.where(np.isin(values, NO_OUTPUT), values, values - moved) if moved else values
                 converted = np.array([*map(entry.convert, numbers.tolist())]) if entry.convert else values
                 told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
-                if entry.quantity:
+                if quantity := entry.quantity:
+                    _check_bounds(path, field, quantity, converted)
                     source = replace(topic.source, topic=field)
-                    channels += of_scalar(entry.quantity, source, topic.time, converted)
+                    channels += of_scalar(quantity, source, topic.time, converted)
                 elif told.any():
                     labels[entry.name] = field
                     time = topic.time if told.all() else topic.time[told]
                     commands[entry.name] = time, np.nan_to_num(converted[told])
     return channels, commands, labels
+
+
+def _check_bounds(path: Path, field: str, quantity: Quantity, values: Array) -> None:
+    """Raise DataFileError for numbers beyond the bounds of a quantity."""
+    beyond = values[(values < quantity.minimum) | (values > quantity.maximum)]
+    if len(beyond):
+        allowed = f"must be within {quantity.minimum:g} ... {quantity.maximum:g} {quantity.unit}"
+        count = f", as in {len(beyond)} rows" if len(beyond) > 1 else ""
+        raise DataFileError(f"{path}, column {shown(field)} = {beyond[0]:g} {quantity.unit}{count}: {allowed}")
 
 
 def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: Mapping[str, str]) -> Iterator[Finding]:

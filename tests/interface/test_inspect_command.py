@@ -19,7 +19,7 @@ from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
-from tests.tank.readers.writers import LOGS, table
+from tests.tank.readers.writers import LOGS, Ros, servos, table, write_tlog
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -243,6 +243,31 @@ def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp
     assert ("These logs do not tell which thrusters" in text) == (base == "?")
     if base == "bluerov2":
         assert all(f'"{title}" = "u_{re.sub("[^0-9]", "", title)} [us]"' in text for title in titles)
+
+
+def test_outputs_that_never_change_drive_no_thruster(tmp_path: Path, inspect: Inspect) -> None:
+    """The vehicle of a telemetry log with eight outputs has six thrusters."""
+    pulses = [*(1500 + 400 * c for c in THRUSTERS), np.full(len(TIME), 1500), np.full(len(TIME), 1100)]
+    messages = [servos(100.0 + time, *map(round, row)) for time, row in zip(TIME, np.transpose(pulses), strict=True)]
+    write_tlog(tmp_path / "dive.tlog", messages)
+    out, draft = inspect()
+    assert 'base = "bluerov2"\n' in draft
+    assert "thruster 8" in out
+
+
+def test_what_is_used_is_not_called_unrecognised(tmp_path: Path, inspect: Inspect) -> None:
+    """Flags of validity, and all topics of commands, where each thruster has its own."""
+    titles = ",".join(["time [s]", *(f"u_{n} [1]" for n in motion.THRUSTERS), "depth [m]", "depth_valid"])
+    table(tmp_path / "a.csv", titles, TIME, *THRUSTERS, DEPTH, np.where(TIME < 5.0, 1.0, 0.0))
+    ros = Ros(2)
+    number = ros.store.types["std_msgs/msg/Float64"]
+    topics = {**{f"/thruster_{n}/input": own for n, own in motion.THRUSTERS.items()}, "/depth": DEPTH}
+    messages = [(name, TIME[n], number(data=v)) for name, own in topics.items() for n, v in enumerate(own)]
+    for path in tmp_path / "a.csv", ros.write(tmp_path / "b", messages):
+        out, _ = inspect(path)
+        assert "Not recognised" not in out
+        assert "thruster 6" in out
+        assert "the log has the vehicles" not in out
 
 
 OWN: dict[str, str | bytes] = {

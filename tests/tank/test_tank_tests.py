@@ -13,7 +13,7 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.io.messages import FileError
-from rov_fmu.tank.readers.tank_tables import Row
+from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 from tests.commands import TESTS
@@ -54,6 +54,15 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
         for path in TESTS.iterdir()
         if path.suffix == ".csv" or path.name == "rov.toml"
     }
+
+
+@pytest.mark.parametrize("unit", ["N 50", "kgf 50", "N.m 50", "us 0 50", "% ", "us -50 -50"])
+def test_a_command_of_a_table_may_be_a_force_or_any_pulse(unit: str, tmp_path: Path) -> None:
+    numbers = {"us -50 -50": (-75, -25, 0), "% ": (50, -50, -100)}.get(unit, (25, -25, -50))
+    rows = "".join(f"{number},{value}\n" for number, value in zip(numbers, (0.3, -0.2, -0.4), strict=True))
+    (tmp_path / "steady_surge.csv").write_text(f"command [{unit}],velocity [m/s]\n{rows}", encoding="utf-8")
+    found, _ = read_rows(tmp_path / "steady_surge.csv", "steady")
+    assert [row.command for row in found] == [0.5, -0.5, -1.0]
 
 
 def test_the_table_columns_of_rov_toml_serves_tables_too(folder: Path) -> None:

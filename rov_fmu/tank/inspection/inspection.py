@@ -23,6 +23,7 @@ from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_ta
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
 
@@ -65,13 +66,13 @@ class Inspection:
 def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_FILE) -> list[Inspection]:
     """Return what a log contains, for each piece between two restarts of its clock, or what a table contains.
 
-    The thrusters and columns have the names of the described vehicle, and the tables [columns], [topics] and [logs] of
-    its rov.toml are obeyed. Without one, the thrusters of a CSV log have the names of the first layout that fits, or
-    else names that follow from the headers. Raises DataFileError.
+    The thrusters and columns have the names of the described vehicle, and the tables [columns], [topics], [valid] and
+    [logs] of its rov.toml are obeyed. Without one, the thrusters of a CSV log have the names of the first layout that
+    fits, or else names that follow from the headers. Raises DataFileError.
     """
     layout = described.description.layout if described.description else None
     tables = described.tables
-    told = RovTables(columns=tables.columns, topics=tables.topics, logs=tables.logs)
+    told = RovTables(columns=tables.columns, topics=tables.topics, valid=tables.valid, logs=tables.logs)
     return _inspected(path, [*layouts], layout, told)
 
 
@@ -92,10 +93,11 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
             return [_of_table(path, kind, columns, ranges)]
         if not described:
             layout, columns = guessed(titles, numbers, axis, layouts)
-        names, _ = names_of(layout, RovTables(columns=columns, logs=tables.logs))
-        is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
+        names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
+        known = columns_of_log(layout, axis)
+        is_column, flags = KnownColumns(known_columns(known)).has, {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
-        unread = {title: ranges[title] for title in titles if not is_column(meant[title])}
+        unread = {title: ranges[title] for title in titles if not (is_column(meant[title]) or title in flags)}
         count = sum(title not in unread for title in titles)
         has_time = has_column(meant.values(), {"time": TIME})
         if not has_time and (table := _of_unnamed_table(path, renamed, ranges)):

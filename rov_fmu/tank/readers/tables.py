@@ -57,9 +57,9 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.commands import at_rest
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
-from rov_fmu.tank.no_measurement import FLAG, flag_columns
 from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece
+from rov_fmu.tank.readers.no_measurement import FLAG, flag_columns
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order. If it is exceeded, the times are not those of a log."""

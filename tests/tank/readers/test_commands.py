@@ -17,6 +17,7 @@ from rov_fmu.tank.log import Source
 SERVOS = "SERVO_OUTPUT_RAW SERVO_OUTPUT_RAW"
 ARRAY = "std_msgs/msg/Float64MultiArray"
 NUMBER = "std_msgs/msg/Float64"
+ODOMETRY = "nav_msgs/msg/Odometry"
 WRENCH = "geometry_msgs/msg/Wrench . ."
 WRENCHES = f"/a {WRENCH} force.x=5,9 force.y=1,1 force.z=1,1; /b {WRENCH} force.x=1,2 force.y=3,-4 force.z=1,1 "
 WRENCHES += "torque.x=5,5 torque.y=6,7 torque.z=8,9"
@@ -56,6 +57,12 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         "",
         "/rov_a/cmd: a 0 1: ('log: the log has the vehicles rov_a and rov_b. rov_a is used; `vehicle` in "
         "[logs] of rov.toml names another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
+    ),
+    "another vehicle without commands": (
+        f"/b/odom {ODOMETRY} b . x=1; /a/odom {ODOMETRY} a . x=1; /a/cmd {ARRAY} a . data[0]=0,1; /c/z/odom {ODOMETRY} c . x=1",
+        "a",
+        "",
+        "/a/cmd: a 0 1: | log: the log has the vehicles a and b. a is used; `vehicle` in [logs] of rov.toml names another",
     ),
     "a named vehicle": (VEHICLES, "a", "vehicle=rov_b", "/rov_b/cmd: a 0 -1: | rov_b is used"),
     "an unknown vehicle": (
@@ -109,8 +116,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         IDLE.format(1530) + "1530,1530,1730,1330",
         "a",
         "",
-        "a 0 0 0.5 -0.5: | no thrust is 1530 us, because the outputs rest there and never at 1500 us. If that is wrong, "
-        "write neutral = 1500 into [logs] of rov.toml | full thrust is 1130 and 1930 us, and no thrust 1530 us",
+        "a 0 0 0.5 -0.5: | no thrust is 1530 us, because the outputs rest there and never at 1500 us. If that is wrong"
+        ", write neutral = 1500 into [logs] of rov.toml | full thrust is 1130 and 1930 us, and no thrust 1530 us",
     ),
     "the range of the motors about outputs that rest elsewhere": (
         IDLE.format(1470) + "1470,1470,1720,1220",
@@ -158,8 +165,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         f"{SERVOS} 1 . servo1_raw=1540,1540,1640,1740",
         "a",
         "",
-        "a 0.1 0.1 0.35 0.6: | no output ever rests at 1500 us, which is taken as no thrust, and most stay at 1540 us. If "
-        "that is no thrust, write neutral = 1540 into [logs] of rov.toml",
+        "a 0.1 0.1 0.35 0.6: | no output ever rests at 1500 us, which is taken as no thrust, and most stay at 1540 us. "
+        "If that is no thrust, write neutral = 1540 into [logs] of rov.toml",
     ),
     "neutral alone": (ONE, "a", f"neutral=1520 {SERVO1}", "0.5 -0.7"),
     "span alone": (ONE, "a", f"span=200 {SERVO1}", "1.1 -1.3"),

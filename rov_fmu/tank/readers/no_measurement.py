@@ -65,7 +65,7 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> d
     if not words & {"valid", "validity", "invalid"}:
         return {}
     others = words - {"valid", "validity", "invalid", "is", "flag", "data", "measurement"}
-    named = {quantity for quantity in QUANTITIES if {*quantity.split()} <= others}
+    named = {quantity for quantity in QUANTITIES if " " in quantity and {*quantity.split()} <= others}
     meant = named or {quantity for pattern, of in FLAGS for quantity in of if re.search(pattern, " ".join(others))}
     return dict.fromkeys(meant if others else QUANTITIES, "invalid" not in words)
 

@@ -1,0 +1,204 @@
+"""Numbers of logs that are no measurements: marks, and flags of validity, in tables, bags and .mat files."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.columns import names_of
+from rov_fmu.tank.description import RovTables
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.log import Log
+from rov_fmu.tank.quality import checked
+from rov_fmu.tank.read_log import read_logs
+from rov_fmu.tank.readers.no_measurement import flag_of, marks
+from tests.tank.logs import measured
+from tests.tank.readers.motion import BLUEROV2
+from tests.tank.readers.writers import Ros, table
+
+N = 600
+TIME: Array = np.linspace(0.0, 59.9, N)
+NOISE: Array = np.random.default_rng(1).standard_normal(N)
+SPEED = np.round(np.sin(0.3 * TIME) + 0.01 * NOISE, 3)
+DEPTH = np.round(3.0 + 2.0 * np.sin(0.2 * TIME) + 0.01 * NOISE, 3)
+HEADING = np.round((40.0 * TIME + NOISE) % 360.0, 2)
+STEPS: Array = np.where(TIME % 20.0 < 10.0, 0.0, 1.0)
+BURSTS = (np.arange(N) % 97) < 9
+ONCE = np.arange(N) == 300
+
+MARKED: dict[str, tuple[str, Array, list[float]]] = {
+    **{
+        f"{mark} in bursts of a {name}": (name, np.where(BURSTS, mark, values), [mark])
+        for name, values in {"surge velocity": SPEED, "depth": DEPTH, "voltage": 15.0 + 0.1 * SPEED}.items()
+        for mark in (-32.768, 32.767, 999.999, -9999.0, 65.535)
+    },
+    "one -9999 of a depth": ("depth", np.where(ONCE, -9999.0, DEPTH), [-9999.0]),
+    "zeros in a dive": ("depth", np.where(BURSTS, 0.0, 30.0 + SPEED), [0.0]),
+    "marks on both sides": (
+        "surge velocity",
+        np.where(BURSTS, -32.768, np.where(np.roll(BURSTS, 20), 32.767, SPEED)),
+        [-32.768, 32.767],
+    ),
+    "two marks of different size": (
+        "depth",
+        np.where(BURSTS, -9999.0, np.where(np.roll(BURSTS, 20), -32.768, DEPTH)),
+        [-9999.0, -32.768],
+    ),
+    "most numbers are marks": ("surge velocity", np.where(np.arange(N) % 10 < 8, -32.768, SPEED), [-32.768]),
+    "marks of a coarse depth": ("depth", np.where(BURSTS, -9999.0, np.round(DEPTH)), [-9999.0]),
+    "marks of a depth that never changes": ("depth", np.where(BURSTS, -9999.0, 3.0), [-9999.0]),
+    "999.999 degrees": ("heading", np.radians(np.where(BURSTS, 999.999, HEADING)), [np.radians(999.999)]),
+    "one -9999 of a heading": ("heading", np.radians(np.where(ONCE, -9999.0, HEADING)), [np.radians(-9999.0)]),
+}
+"""A quantity, numbers in SI units, and the marks among them."""
+HONEST: dict[str, tuple[str, Array]] = {
+    "a speed": ("surge velocity", SPEED),
+    "a speed that saturates": ("surge velocity", np.clip(SPEED, -0.6, 0.4)),
+    "a speed at rest": ("surge velocity", np.where(BURSTS, SPEED, 0.0)),
+    "a speed of two levels": ("surge velocity", STEPS),
+    "a coarse speed": ("surge velocity", np.round(SPEED, 1)),
+    "a speed that is steady without noise": (
+        "surge velocity",
+        np.where(STEPS > 0.0, 0.8 + 0.2 * (TIME % 10.0 > 2), 0.0),
+    ),
+    "a short motion": ("yaw velocity", np.where(ONCE, 0.05, 0.001 * NOISE)),
+    "a depth": ("depth", DEPTH),
+    "a depth that never changes": ("depth", np.full(N, 3.0)),
+    "a depth of two levels": ("depth", 3.0 + 0.1 * STEPS),
+    "a coarse depth": ("depth", np.round(DEPTH)),
+    "a depth at the surface": ("depth", np.maximum(DEPTH - 3.0, 0.0)),
+    "a depth with an outlier": ("depth", np.where(ONCE, DEPTH + 3.0, DEPTH)),
+    "a depth after a long gap": ("depth", np.where(TIME < 20.0, 0.0, 30.0 + SPEED)),
+    "a heading that wraps": ("heading", np.radians(HEADING)),
+    "a heading about north": ("heading", np.radians(np.round(3.0 * SPEED) % 360.0)),
+    "a heading over several turns": ("heading", 0.5 * TIME),
+    "no numbers": ("depth", np.full(N, np.nan)),
+    "one number": ("depth", np.where(ONCE, 1.0, np.nan)),
+}
+
+
+@pytest.mark.parametrize("name", MARKED)
+def test_marks_are_found(name: str) -> None:
+    quantity, values, expected = MARKED[name]
+    assert sorted(marks(TIME, values, QUANTITIES[quantity])) == sorted(expected)
+
+
+@pytest.mark.parametrize("name", HONEST)
+def test_measurements_are_no_marks(name: str) -> None:
+    quantity, values = HONEST[name]
+    time = TIME + 100.0 * (TIME >= 20.0) if "gap" in name else TIME
+    assert marks(time, values, QUANTITIES[quantity]) == []
+
+
+FLAGS = {
+    "dvl_valid": "surge velocity, sway velocity, heave velocity",
+    "velocity_valid": "surge velocity, sway velocity, heave velocity",
+    "surge velocity valid": "surge velocity",
+    "DepthValid [-]": "depth, pressure",
+    "heading_invalid (0/1)": "-heading",
+    "imu.valid": "roll angle, pitch angle, heading, roll velocity, pitch velocity, yaw velocity",
+    "is_valid": ", ".join(QUANTITIES),
+    "altitude_valid": "",
+    "dvl": "",
+    "lock": "surge velocity, -depth",
+}
+"""Names, and the quantities of which they are flags; with a minus where a true flag marks what is invalid."""
+
+
+@pytest.mark.parametrize("name", FLAGS)
+def test_the_name_of_a_flag_tells_what_it_is_about(name: str) -> None:
+    found = flag_of(name, {"lock": ("surge velocity", "-depth")})
+    expected = [one for one in FLAGS[name].split(", ") if one]
+    assert found == {one.removeprefix("-"): not one.startswith("-") for one in expected}
+
+
+def read(path: Path, **tables: object) -> Log:
+    names, mistakes = names_of(BLUEROV2, RovTables.model_validate(tables))
+    assert not mistakes
+    (log,) = map(checked, read_logs(path, BLUEROV2, names))
+    return log
+
+
+def told(log: Log) -> list[str]:
+    return [one for one in sentences(log.findings, SENTENCES) if " left out, because " in one]
+
+
+HELD = np.where(BURSTS, np.roll(SPEED, 9), SPEED)
+COUNT = int(BURSTS.sum())
+
+
+@pytest.mark.parametrize("instead", [0.0, 999.999, HELD], ids=["zeros", "marks", "old values"])
+@pytest.mark.parametrize("kind", ["by its name", "by rov.toml", "the other way round", "texts", "rows of its own"])
+def test_a_flag_of_a_table_says_which_rows_are_no_measurements(kind: str, instead: Array, tmp_path: Path) -> None:
+    flag = {"by rov.toml": "lock", "the other way round": "bad"}.get(kind, "dvl_valid")
+    meant = {"lock": {"lock": ["surge velocity"]}, "bad": {"bad": "-surge velocity"}}.get(flag, {})
+    is_true = BURSTS if flag == "bad" else ~BURSTS
+    rows = [
+        f"{t:.2f},{c:g},{d},{v},{'TF'[not ok] if kind == 'texts' else int(ok)}"
+        for t, c, d, v, ok in zip(TIME, STEPS, DEPTH, np.where(BURSTS, instead, SPEED), is_true, strict=True)
+    ]
+    if kind == "rows of its own":
+        rows = [part for row in rows for part in (f"{row.split(',')[0]},,,,{row[-1]}", row[:-1])]
+    path = tmp_path / "dive.csv"
+    path.write_text("\n".join([f"time [s],u_5 [1],depth [m],surge velocity [m/s],{flag}", *rows]), encoding="utf-8")
+    log = read(path, valid=meant)
+    assert measured(log, "surge velocity") == pytest.approx(SPEED[~BURSTS])
+    assert measured(log, "depth") == pytest.approx(DEPTH)
+    assert told(log) == [
+        f"dive.csv: {COUNT} values of surge velocity [m/s] left out, because {flag} says that they are invalid"
+    ]
+
+
+def test_a_mark_is_told_with_its_columns_and_its_value(tmp_path: Path) -> None:
+    speeds = [np.where(BURSTS, 32768.0, 1000.0 * sign * SPEED) for sign in (1.0, -1.0)]
+    titles = "time [s],u_5 [1],heading [deg],-surge velocity [mm/s],sway velocity [mm/s]"
+    log = read(table(tmp_path / "dive.csv", titles, TIME, STEPS, np.where(BURSTS, 999.999, HEADING), *speeds))
+    end = "is far from all others: a mark that nothing was measured"
+    assert told(log) == [
+        f"dive.csv: {COUNT} values of heading [deg] left out, because 999.999 deg {end}",
+        f"dive.csv: {COUNT} values of -surge velocity [mm/s] left out, because -32.768 m/s {end}",
+        f"dive.csv: {COUNT} values of sway velocity [mm/s] left out, because 32.768 m/s {end}",
+    ]
+    assert measured(log, "sway velocity") == pytest.approx(-SPEED[~BURSTS])
+
+
+def test_a_mark_may_be_beyond_the_bounds_of_a_quantity_and_other_numbers_may_not(tmp_path: Path) -> None:
+    path, titles = tmp_path / "dive.csv", "time [s],u_5 [1],depth [m],surge velocity [m/s]"
+    log = read(table(path, titles, TIME, STEPS, DEPTH, np.where(BURSTS, -9999.0, SPEED)))
+    assert measured(log, "surge velocity") == pytest.approx(SPEED[~BURSTS])
+    with pytest.raises(DataFileError) as error:
+        read(table(path, titles, TIME, STEPS, DEPTH, 2000.0 * SPEED))
+    assert re.fullmatch(
+        rf"{path}, column 'surge velocity \[m/s\]' = \S+ m/s, as in \d+ rows: must be within -1000 ... 1000 m/s",
+        str(error.value),
+    )
+
+
+def test_marks_and_flags_of_matlab_and_of_a_bag(tmp_path: Path) -> None:
+    """A vector in a frame of the earth is rotated after its marks were left out."""
+    speed = np.where(BURSTS, -32.768, SPEED)
+    savemat(tmp_path / "a.mat", {"t": TIME, "u5": STEPS, "z": DEPTH, "v": HELD, "vel_valid": ~BURSTS})
+    columns = {"t": "time [s]", "u5": "u_5 [1]", "z": "depth [m]", "v": "surge velocity [m/s]"}
+    assert measured(read(tmp_path / "a.mat", columns=columns), "surge velocity") == pytest.approx(SPEED[~BURSTS])
+    ros = Ros(2)
+    types = ros.store.types
+    number, twist = types["std_msgs/msg/Float64"], types["geometry_msgs/msg/Twist"]
+    vector = types["geometry_msgs/msg/Vector3"]
+    messages = []
+    for time, command, depth, v, ok in zip(TIME, STEPS, DEPTH, speed, ~BURSTS, strict=True):
+        messages += [("/out", time, number(data=command)), ("/depth", time, number(data=depth))]
+        linear = vector(x=float(v), y=float(v), z=0.0)
+        messages += [("/twist", time, twist(linear=linear, angular=vector(x=0.0, y=0.0, z=0.0)))]
+        messages += [("/ok", time, number(data=float(ok)))]
+    bag = ros.write(tmp_path / "bag", messages)
+    topics = {"/out.data": "u_5 [1]"}
+    marked = read(bag, topics=topics)
+    assert measured(marked, "surge velocity") == pytest.approx(SPEED[~BURSTS])
+    assert "/twist.linear.x and /twist.linear.y left out, because -32.768 m/s is far" in told(marked)[0]
+    flagged = read(bag, topics=topics, valid={"/ok.data": ["depth"]})
+    assert measured(flagged, "depth") == pytest.approx(DEPTH[~BURSTS])
