@@ -10,7 +10,6 @@ from pathlib import Path
 from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import NO_FILE, brief, first_of, one_line
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.io.templates import render
@@ -22,7 +21,7 @@ from rov_fmu.tank.folder import unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
 from rov_fmu.tank.readers.listing import BAG, Listing, list_files
-from rov_fmu.tank.readers.parsers import one_parser
+from rov_fmu.tank.readers.parsers import format_of, one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -168,8 +167,8 @@ def _fields(inspections: Iterable[Inspection]) -> dict[str, str]:
 
 
 def _is_bag(path: Path) -> bool:
-    """Return True for a log with topics, by its name."""
-    return path.suffix.lower() in LOG_SUFFIXES
+    """Return True for a log with topics, which is no table."""
+    return not format_of(path).open
 
 
 def _questions(names: Mapping[str, str]) -> list[str]:
