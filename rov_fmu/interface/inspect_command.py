@@ -16,11 +16,11 @@ from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
-from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.findings import SENTENCES, Finding, about, sentences
 from rov_fmu.tank.folder import unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
-from rov_fmu.tank.readers.listing import BAG, Listing, list_files
+from rov_fmu.tank.readers.listing import BAG, Listing, list_files, named
 from rov_fmu.tank.readers.parsers import format_of, one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -34,7 +34,7 @@ class Inspected:
     warnings: Sequence[str]
     """A sentence for each file that cannot be read."""
     notes: Sequence[str]
-    """A sentence for each kind of other files in the folder."""
+    """A sentence about the tables in the folder, and one for each reason why others are not read."""
     draft: Path
     """The place of rov.toml."""
     text: str
@@ -71,8 +71,11 @@ def inspect_logs(path: Path) -> Inspected:
     inspections: list[Inspection] = []
     mistakes: list[str] = []
     findings: list[Finding] = listing.findings
+    logs = logs_among(listing.tests, described.tables.columns)
+    if tables := [test for test in listing.tests if test not in logs]:
+        findings.append(about(named(tables), "tank tests"))
     with one_parser():
-        for log in logs_among(listing.tests, described.tables.columns):
+        for log in logs:
             try:
                 inspections += inspect(log, layouts.values(), described)
             except DataFileError as error:
@@ -80,9 +83,9 @@ def inspect_logs(path: Path) -> Inspected:
                 findings.append(unreadable(log, error))
     if not inspections:
         raise DataFileError(*([*mistakes, *listing.lines("unreadable file")] if mistakes else listing.no_tests()))
-    tables = headers_of_tables(folder)
-    text = _draft(folder, inspections, tables, *_thrusters(inspections, layouts, tables.curves))
-    notes = [finding for finding in findings if finding.kind == "other files"]
+    headers = headers_of_tables(folder)
+    text = _draft(folder, inspections, headers, *_thrusters(inspections, layouts, headers.curves))
+    notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
     warnings = [finding for finding in findings if finding not in notes]
     return Inspected(inspections, sentences(warnings, SENTENCES), sentences(notes, SENTENCES), folder / ROV_FILE, text)
 

@@ -92,6 +92,7 @@ class _Range:
 SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
+    "tank tests": "{files}: read as tables of tank tests",
     "unnamed table": "{files}: a table with the {measured} at each command: name it {name}",
     "other files": "{files}: not read, because {reason}",
     # The form of a table

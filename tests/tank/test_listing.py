@@ -77,6 +77,9 @@ def test_each_file_that_is_not_read_is_named_with_the_reason(folder: Path, capsy
         assert f"{'not read' if is_usual else 'left out'}, because " in line
         assert reason in line
         assert line in (out if is_usual else err)
+    (folder / "dive.txt").write_text(LOG)
+    main(["identify", str(folder), "--inspect"])
+    assert "steady_heave_down.csv and 5 more *.csv: read as tables of tank tests." in capsys.readouterr().out
     added = {heading: len({*lines} - {*before[heading]}) for heading, lines in told.items()}
     assert added == {"Warnings": 4, "Doubts": 0, "Facts": 3}, "one line for each reason"
 

@@ -1,6 +1,6 @@
 """The files of a folder: which are logs and tables, by their content, and why the others are not read."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -34,7 +34,7 @@ class Listing:
         """A finding for each reason why files are not read: a warning, unless nobody expects them to be read."""
         usual = (PICTURE, EMPTY, NO_TABLE, IN_FOLDER)
         return [
-            about(_named(paths), "other files" if reason in usual else "unreadable file", reason=reason)
+            about(named(paths), "other files" if reason in usual else "unreadable file", reason=reason)
             for reason, paths in self.others.items()
         ]
 
@@ -48,16 +48,16 @@ class Listing:
         return [none, *self.lines("unreadable file", "other files")]
 
 
-def list_files(folder: Path, named: Collection[str] = ()) -> Listing:
+def list_files(folder: Path, known: Collection[str] = ()) -> Listing:
     """Return the files of a folder.
 
-    Nothing is told of hidden files, of vehicle files, FMUs and pages, and of those with the given names.
+    Nothing is told of hidden files, of vehicle files, FMUs and pages, and of those whose names are known.
     """
     listing = Listing(folder)
     for path in sorted(folder.iterdir()):
         if (path / BAG).is_file():
             listing.tests += sorted(part for part in path.iterdir() if part.name != BAG and part.is_file())
-        elif not (_is_of_program(path) or path.name in named):
+        elif not (_is_of_program(path) or path.name in known):
             reason = _why_not_read(path)
             if reason:
                 listing.others.setdefault(reason, []).append(path)
@@ -100,7 +100,7 @@ def _why_not_read(path: Path) -> str | None:
     return NO_TABLE if is_text and not looks_like_table(path) else ""
 
 
-def _named(paths: Collection[Path]) -> str:
+def named(paths: Iterable[Path]) -> str:
     """Return the names of files; of many with the same suffix, only the first one and how many there are."""
     names = []
     for suffix, group in groupby(sorted(paths, key=lambda path: path.suffix), lambda path: path.suffix):
