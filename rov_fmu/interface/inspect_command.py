@@ -21,6 +21,7 @@ from rov_fmu.tank.folder import unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
 from rov_fmu.tank.readers.listing import BAG, Listing, list_files, named
+from rov_fmu.tank.readers.other_files import NOT_OPENED
 from rov_fmu.tank.readers.parsers import format_of, one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -63,6 +64,8 @@ def inspect_logs(path: Path) -> Inspected:
     """
     if not path.exists():
         raise DataFileError(f"{path}: {NO_FILE}")
+    if not (path.is_dir() or path.is_file()):
+        raise DataFileError(f"{path}: {NOT_OPENED}")
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / BAG).is_file() else folder
     described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE

@@ -107,7 +107,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",
     "rows without time": "{files}: {count:#row} without a time left out",
     "rows without command": "{files}: {count:#row} without a command left out",
-    "torn rows": "{files}: {count:#row} with more cells than the header left out",
+    "torn rows": "{files}: {count:#row} with a wrong number of cells left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "column without unit": "{files}: {column} is not read, because its header has no unit. Write for example {header}",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",

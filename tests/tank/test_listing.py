@@ -50,7 +50,7 @@ OTHERS: dict[str, tuple[bytes, str]] = {  # files that are not read, with the be
     "empty.txt": (b"", "the file is empty"),
 }
 USUAL = (PICTURE, NO_TABLE, "the file is empty")
-SILENT = (".hidden.csv", "mine.toml", "mine.fmu", "report.html")
+SILENT = (".hidden.csv", "._dive.mcap", "mine.toml", "mine.fmu", "report.html", "Thumbs.db", "photos/._dive.csv")
 """Files that nobody expects to be read as a log or a table."""
 
 
@@ -133,9 +133,9 @@ def test_a_folder_with_many_photos_stays_readable(folder: Path) -> None:
 
 def test_what_needs_no_word_has_none(folder: Path) -> None:
     before = _told(folder)
+    (folder / "photos").mkdir()
     for name in SILENT:
         (folder / name).write_bytes(b"x = 1\n")
-    (folder / "photos").mkdir()
     (folder / "photos" / "a.jpg").write_bytes(OTHERS["photo.jpg"][0])
     assert _told(folder) == before
 
@@ -160,6 +160,7 @@ def test_only_files_are_opened(name: str, make: Callable[[Path], None], folder: 
     make(folder / name)
     assert list_files(folder).others == {"a device, a pipe or a link that leads nowhere is not opened": [folder / name]}
     assert f"{name}: left out, because it cannot be read: a device, a pipe " in _told(folder)["Warnings"][0]
+    assert main(["identify", "--inspect", str(folder / name)]) == 2
 
 
 def test_a_folder_without_anything_says_that_it_has_no_log(tmp_path: Path, capsys: Capsys) -> None:
