@@ -13,8 +13,11 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
-from rov_fmu.tank.readers.listing import list_files
+from rov_fmu.interface.inspect_command import inspect_logs
+from rov_fmu.tank.readers.listing import Listing, list_files
 from tests.commands import TESTS
+from tests.tank.readers.motion import DIVE
+from tests.tank.readers.writers import LOGS
 
 Capsys = pytest.CaptureFixture[str]
 LOG = "time [s],u_t [%],depth [m]\n" + "".join(f"{n / 10},{20 * (n // 40 % 3 - 1)},{n % 50}\n" for n in range(200))
@@ -102,6 +105,18 @@ def test_a_table_is_read_whatever_its_suffix(name: str, encoding: str, folder: P
     found = load_tests(folder)
     assert [log.file for log in found.folder.logs] == [name]
     assert not [line for lines in _told(folder).values() for line in lines if "not read" in line]
+
+
+def test_a_log_is_recognised_whatever_its_suffix(tmp_path: Path) -> None:
+    own = tmp_path / "own"
+    own.mkdir()
+    paths = []
+    for n, (suffix, write) in enumerate(LOGS.items()):
+        (tmp_path / suffix).mkdir()
+        paths.append(write(tmp_path / suffix, DIVE).rename(own / f"0000001{n}{'.log' * (n % 2)}"))
+    assert list_files(own) == Listing(own, sorted(paths))
+    (one,) = inspect_logs(paths[0]).logs
+    assert len(one.commands) == 6
 
 
 @pytest.mark.parametrize("suffix", ["tsv", "txt", "data"])
