@@ -10,19 +10,19 @@ from pathlib import Path
 from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import NO_FILE, brief, first_of, one_line
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, read_description
-from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.findings import SENTENCES, Finding, about, sentences
 from rov_fmu.tank.folder import unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
-from rov_fmu.tank.readers.listing import BAG, Listing, list_files
-from rov_fmu.tank.readers.parsers import one_parser
+from rov_fmu.tank.readers.listing import BAG, Listing, list_files, named
+from rov_fmu.tank.readers.other_files import NOT_OPENED
+from rov_fmu.tank.readers.parsers import format_of, one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -35,7 +35,7 @@ class Inspected:
     warnings: Sequence[str]
     """A sentence for each file that cannot be read."""
     notes: Sequence[str]
-    """A sentence for each kind of other files in the folder."""
+    """A sentence about the tables in the folder, and one for each reason why others are not read."""
     draft: Path
     """The place of rov.toml."""
     text: str
@@ -65,6 +65,8 @@ def inspect_logs(path: Path) -> Inspected:
     """
     if not path.exists():
         raise DataFileError(f"{path}: {NO_FILE}")
+    if not (path.is_dir() or path.is_file()):
+        raise DataFileError(f"{path}: {NOT_OPENED}")
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / BAG).is_file() else folder
     described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE
@@ -73,7 +75,10 @@ def inspect_logs(path: Path) -> Inspected:
     inspections: list[Inspection] = []
     mistakes: list[str] = []
     findings: list[Finding] = listing.findings
-    for log in logs_among(listing.tests, described.tables.columns):
+    logs = logs_among(listing.tests, described.tables.columns)
+    if tables := [test for test in listing.tests if test not in logs]:
+        findings.append(about(named(tables), "tank tests"))
+    for log in logs:
         try:
             inspections += inspect(log, layouts.values(), described)
         except DataFileError as error:
@@ -81,9 +86,9 @@ def inspect_logs(path: Path) -> Inspected:
             findings.append(unreadable(log, error))
     if not inspections:
         raise DataFileError(*([*mistakes, *listing.lines("unreadable file")] if mistakes else listing.no_tests()))
-    tables = headers_of_tables(folder)
-    text = _draft(folder, inspections, tables, *_thrusters(inspections, layouts, tables.curves))
-    notes = [finding for finding in findings if finding.kind == "other files"]
+    headers = headers_of_tables(folder)
+    text = _draft(folder, inspections, headers, *_thrusters(inspections, layouts, headers.curves))
+    notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
     warnings = [finding for finding in findings if finding not in notes]
     return Inspected(inspections, sentences(warnings, SENTENCES), sentences(notes, SENTENCES), folder / ROV_FILE, text)
 
@@ -162,8 +167,8 @@ def _fields(inspections: Iterable[Inspection]) -> dict[str, str]:
 
 
 def _is_bag(path: Path) -> bool:
-    """Return True for a log with topics, by its name."""
-    return path.suffix.lower() in LOG_SUFFIXES
+    """Return True for a log with topics, which is no table."""
+    return not format_of(path).open
 
 
 def _questions(names: Mapping[str, str]) -> list[str]:

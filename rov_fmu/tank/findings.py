@@ -95,6 +95,7 @@ MISFITS = ("motors without thruster", "thrusters without pulse")
 SENTENCES: dict[str, SentenceForm] = {
     # Files
     "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
+    "tank tests": "{files}: read as tables of tank tests",
     "unnamed table": "{files}: a table with the {measured} at each command: name it {name}",
     "other files": "{files}: not read, because {reason}",
     # The form of a table
@@ -113,7 +114,7 @@ SENTENCES: dict[str, SentenceForm] = {
     "rows without time": "{files}: {count:#row} without a time left out",
     "rows before commands": "{files}: {count:#row} before the first command left out",
     "late command": "{files}: {column} has no command before {at} s. Until then, its command is taken as 0",
-    "torn rows": "{files}: {count:#row} with more cells than the header left out",
+    "torn rows": "{files}: {count:#row} with a wrong number of cells left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
     "column without unit": "{files}: {column} is not read, because its header has no unit. Write for example {header}",
     "mark": (

@@ -1,7 +1,7 @@
 """Read and check a folder of tank tests with its rov.toml.
 
 The name of a file, in small or capital letters, gives the kind of test and the tested thrust curve or axis. Any text
-may follow after another underscore:
+may follow after another underscore, and any suffix:
 
     thrust_<curve>*.csv                        command, force                  bollard pull, (6)-(10)
     steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5

@@ -13,8 +13,11 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
-from rov_fmu.tank.readers.listing import list_files
+from rov_fmu.interface.inspect_command import inspect_logs
+from rov_fmu.tank.readers.listing import Listing, list_files
 from tests.commands import TESTS
+from tests.tank.readers.motion import DIVE
+from tests.tank.readers.writers import LOGS
 
 Capsys = pytest.CaptureFixture[str]
 LOG = "time [s],u_t [%],depth [m]\n" + "".join(f"{n / 10},{20 * (n // 40 % 3 - 1)},{n % 50}\n" for n in range(200))
@@ -50,7 +53,7 @@ OTHERS: dict[str, tuple[bytes, str]] = {  # files that are not read, with the be
     "empty.txt": (b"", "the file is empty"),
 }
 USUAL = (PICTURE, NO_TABLE, "the file is empty")
-SILENT = (".hidden.csv", "mine.toml", "mine.fmu", "report.html")
+SILENT = (".hidden.csv", "._dive.mcap", "mine.toml", "mine.fmu", "report.html", "Thumbs.db", "photos/._dive.csv")
 """Files that nobody expects to be read as a log or a table."""
 
 
@@ -77,6 +80,9 @@ def test_each_file_that_is_not_read_is_named_with_the_reason(folder: Path, capsy
         assert f"{'not read' if is_usual else 'left out'}, because " in line
         assert reason in line
         assert line in (out if is_usual else err)
+    (folder / "dive.txt").write_text(LOG)
+    main(["identify", str(folder), "--inspect"])
+    assert "steady_heave_down.csv and 5 more *.csv: read as tables of tank tests." in capsys.readouterr().out
     added = {heading: len({*lines} - {*before[heading]}) for heading, lines in told.items()}
     assert added == {"Warnings": 4, "Doubts": 0, "Facts": 3}, "one line for each reason"
 
@@ -99,6 +105,18 @@ def test_a_table_is_read_whatever_its_suffix(name: str, encoding: str, folder: P
     found = load_tests(folder)
     assert [log.file for log in found.folder.logs] == [name]
     assert not [line for lines in _told(folder).values() for line in lines if "not read" in line]
+
+
+def test_a_log_is_recognised_whatever_its_suffix(tmp_path: Path) -> None:
+    own = tmp_path / "own"
+    own.mkdir()
+    paths = []
+    for n, (suffix, write) in enumerate(LOGS.items()):
+        (tmp_path / suffix).mkdir()
+        paths.append(write(tmp_path / suffix, DIVE).rename(own / f"0000001{n}{'.log' * (n % 2)}"))
+    assert list_files(own) == Listing(own, sorted(paths))
+    (one,) = inspect_logs(paths[0]).logs
+    assert len(one.commands) == 6
 
 
 @pytest.mark.parametrize("suffix", ["tsv", "txt", "data"])
@@ -130,9 +148,9 @@ def test_a_folder_with_many_photos_stays_readable(folder: Path) -> None:
 
 def test_what_needs_no_word_has_none(folder: Path) -> None:
     before = _told(folder)
+    (folder / "photos").mkdir()
     for name in SILENT:
         (folder / name).write_bytes(b"x = 1\n")
-    (folder / "photos").mkdir()
     (folder / "photos" / "a.jpg").write_bytes(OTHERS["photo.jpg"][0])
     assert _told(folder) == before
 
@@ -157,6 +175,7 @@ def test_only_files_are_opened(name: str, make: Callable[[Path], None], folder: 
     make(folder / name)
     assert list_files(folder).others == {"a device, a pipe or a link that leads nowhere is not opened": [folder / name]}
     assert f"{name}: left out, because it cannot be read: a device, a pipe " in _told(folder)["Warnings"][0]
+    assert main(["identify", "--inspect", str(folder / name)]) == 2
 
 
 def test_a_folder_without_anything_says_that_it_has_no_log(tmp_path: Path, capsys: Capsys) -> None:

@@ -1,6 +1,6 @@
 """The files of a folder: which are logs and tables, by their content, and why the others are not read."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -10,11 +10,13 @@ from rov_fmu.io.csv_table import DataFileError, looks_like_table
 from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.readers.other_files import EMPTY, IN_FOLDER, NO_FILE, NO_TABLE, PICTURE
+from rov_fmu.tank.readers.other_files import EMPTY, IN_FOLDER, NO_TABLE, NOT_OPENED, PICTURE
 from rov_fmu.tank.readers.parsers import FORMAT_NAMES, TABLE, format_of
 
 BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
+_OF_SYSTEM = (BAG, "Thumbs.db", "desktop.ini")
+"""The files that systems put into folders."""
 _MOST_NAMES = 3
 """The largest number of files with the same suffix that a sentence names one by one."""
 
@@ -34,7 +36,7 @@ class Listing:
         """A finding for each reason why files are not read: a warning, unless nobody expects them to be read."""
         usual = (PICTURE, EMPTY, NO_TABLE, IN_FOLDER)
         return [
-            about(_named(paths), "other files" if reason in usual else "unreadable file", reason=reason)
+            about(named(paths), "other files" if reason in usual else "unreadable file", reason=reason)
             for reason, paths in self.others.items()
         ]
 
@@ -48,16 +50,16 @@ class Listing:
         return [none, *self.lines("unreadable file", "other files")]
 
 
-def list_files(folder: Path, named: Collection[str] = ()) -> Listing:
+def list_files(folder: Path, known: Collection[str] = ()) -> Listing:
     """Return the files of a folder.
 
-    Nothing is told of hidden files, of vehicle files, FMUs and pages, and of those with the given names.
+    Nothing is told of hidden files, of vehicle files, FMUs and pages, and of those whose names are known.
     """
     listing = Listing(folder)
     for path in sorted(folder.iterdir()):
         if (path / BAG).is_file():
             listing.tests += sorted(part for part in path.iterdir() if part.name != BAG and part.is_file())
-        elif not (_is_of_program(path) or path.name in named):
+        elif not (_needs_no_word(path) or path.name in known):
             reason = _why_not_read(path)
             if reason:
                 listing.others.setdefault(reason, []).append(path)
@@ -71,11 +73,14 @@ def has_usual_suffix(path: Path) -> bool:
     return path.name.lower().endswith((*LOG_SUFFIXES, *TABLE_SUFFIXES))
 
 
-def _is_of_program(path: Path) -> bool:
+def _needs_no_word(path: Path) -> bool:
+    """Return True for a hidden file, a file of the system, and one that this program has written or reads by name."""
+    if path.name.startswith(".") or path.name in _OF_SYSTEM or path.suffix.lower() in OWN_SUFFIXES:
+        return True
     if path.suffix.lower() == ".mcap" and path.is_file():
         with suppress(OSError), path.open("rb") as file:
             return IDENTIFIED.encode() in file.read(64)
-    return path.name.startswith(".") or path.name == BAG or path.suffix.lower() in OWN_SUFFIXES
+    return False
 
 
 def _why_not_read(path: Path) -> str | None:
@@ -86,11 +91,12 @@ def _why_not_read(path: Path) -> str | None:
     """
     try:
         if not (path.is_file() or path.is_dir()):
-            return NO_FILE
+            return NOT_OPENED
         if has_usual_suffix(path):
             return ""
         if path.is_dir():
-            has_tests = any(part.is_file() and not _why_not_read(part) for part in path.iterdir())
+            parts = (part for part in path.iterdir() if part.is_file() and not _needs_no_word(part))
+            has_tests = not all(map(_why_not_read, parts))
             return IN_FOLDER if has_tests else None
         is_text = format_of(path) is TABLE
     except DataFileError as error:
@@ -100,7 +106,7 @@ def _why_not_read(path: Path) -> str | None:
     return NO_TABLE if is_text and not looks_like_table(path) else ""
 
 
-def _named(paths: Collection[Path]) -> str:
+def named(paths: Iterable[Path]) -> str:
     """Return the names of files; of many with the same suffix, only the first one and how many there are."""
     names = []
     for suffix, group in groupby(sorted(paths, key=lambda path: path.suffix), lambda path: path.suffix):
