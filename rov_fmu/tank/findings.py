@@ -163,7 +163,7 @@ SENTENCES: dict[str, SentenceForm] = {
         "command is the largest of all logs: {full}. {inputs}"
     ),
     "channel left out": "{files}: {source} is left out for {quantities}: {words}",
-    "clock restarts": "{files}: the clock restarts after {at} s. The log is read as two, before and after",
+    "clock restarts": "{files}: the clock restarts or jumps after {at} s. The log is read as two, before and after",
     "unlikely rate": (
         "{files}: the column {column} gives {rate} rows a second. Is its unit another one: s, ms, us or ns?"
     ),

@@ -7,10 +7,11 @@ import tempfile
 import time
 from contextlib import closing, suppress
 from pathlib import Path
+from pickle import PicklingError
 
 import pytest
 
-from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, Limits
+from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
 
 
 class Counter:
@@ -45,6 +46,12 @@ class Counter:
     def pid(self) -> int:
         return os.getpid()
 
+    def unsendable(self) -> object:
+        return lambda: self.n
+
+    def zeros(self, size: int) -> bytes:
+        return bytes(size)
+
 
 def test_methods_return_and_raise_as_in_this_process_and_the_object_remembers() -> None:
     with closing(ChildProcess(Counter, 2, limits=Limits(time=60.0))) as child:
@@ -52,6 +59,8 @@ def test_methods_return_and_raise_as_in_this_process_and_the_object_remembers() 
         assert (child.call("add", 3), child.call("add", 2, 10)) == (5, 25)
         with pytest.raises(LookupError, match="not here"):
             child.call("fail", "not here")
+        with pytest.raises((AttributeError, RuntimeError, PicklingError), match="pickle"):
+            child.call("unsendable")
         assert child.call("add", 0) == 25
     with pytest.raises(ValueError, match="must not be negative"):
         ChildProcess(Counter, -1)
@@ -69,6 +78,15 @@ def test_the_end_of_the_process_is_told_with_its_cause_and_its_files_are_removed
     with pytest.raises(ChildError, match=f"^ended its process: {cause}$"):
         child.call(method, *arguments)
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
+def test_a_result_counts_twice_as_it_is_packed_within_the_memory_of_the_call() -> None:
+    """The caller needs no more memory for it than that, either."""
+    with closing(ChildProcess(Counter, 0, limits=Limits(memory=600_000_000))) as child:
+        assert len(child.call("zeros", 100_000_000)) == 100_000_000
+        with pytest.raises(LimitError, match=r"0\.6 GB of memory"):
+            child.call("zeros", 400_000_000)
 
 
 def test_a_call_beyond_its_time_limit_ends_the_process() -> None:

@@ -218,7 +218,7 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
     except FileError:
         raise
     except Exception as error:
-        told = re.sub(rf"{re.escape(gettempdir())}\S*", path.name, str(error))  # where it was unpacked
+        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, str(error))  # where it was unpacked
         kind, reason = format_of(path), brief(told) or type(error).__name__
         hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
         raise UnreadableFileError(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.tank.inspection.inspection import inspect
 from tests.tank.logs import read_log
 from tests.tank.readers import motion, writers
@@ -20,6 +21,14 @@ TOLD = {
 }
 """The kinds of findings by format but for bags of ROS."""
 FORMATS = {**writers.LOGS, ".csv": writers.csv, "text": writers.flash_text, "BlueOS": writers.blueos}
+
+
+def test_axes_are_the_same_objects_in_what_another_process_read(tmp_path: Path) -> None:
+    """They are compared by identity."""
+    channels = read_log(writers.csv(tmp_path, DIVE), BLUEROV2).log.channels
+    axes = [channel.quantity.axis for channel in channels if channel.quantity.axis]
+    assert axes
+    assert all(axis is AXES[axis.name] for axis in axes)
 
 
 @pytest.mark.parametrize("name", FORMATS)
