@@ -61,7 +61,7 @@ def test_a_command_of_a_table_may_be_a_force_or_any_pulse(unit: str, tmp_path: P
     numbers = {"us -50 -50": (-75, -25, 0), "% ": (50, -50, -100)}.get(unit, (25, -25, -50))
     rows = "".join(f"{number},{value}\n" for number, value in zip(numbers, (0.3, -0.2, -0.4), strict=True))
     (tmp_path / "steady_surge.csv").write_text(f"command [{unit}],velocity [m/s]\n{rows}", encoding="utf-8")
-    found, _ = read_rows(tmp_path / "steady_surge.csv", "steady")
+    found, _, _ = read_rows(tmp_path / "steady_surge.csv", "steady")
     assert [row.command for row in found] == [0.5, -0.5, -1.0]
 
 
