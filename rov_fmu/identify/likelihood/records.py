@@ -4,7 +4,7 @@ Nothing is resampled onto a common grid. Samples that come faster than the vehic
 which keeps what they tell and bounds the time of a fit.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, sin
 
@@ -88,15 +88,17 @@ class SampledLog:
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:
     """Return what the filter reads of a log; None if it tests none of these axes."""
-    if not driven_axes(log, layout)[0]:
+    axes, findings = driven_axes(log, layout)
+    if not axes:
         return None
+    decaying = {finding.axis for finding in findings if finding.kind == FREE_DECAY}
     assert log.commands
     begin = float(log.commands.rows[0])
     measured = tuple(_measured(log, layout))[:MOST_SENSORS]
     since, told, inputs = _rows(log, layout)
     full = _samples(measured, begin, FASTEST, averaged=True)
     thin = _samples(measured, begin, THINNED, averaged=False)
-    start, errors = _start(measured, layout)
+    start, errors = _start(measured, layout, decaying)
     sensors = tuple(m.sensor for m in measured)
     record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout))
     time, value, sensor = thin
@@ -272,8 +274,13 @@ def _tilt(log: Log, layout: Layout) -> Array:
     return np.array([time, values, unwrapped(pitch)[pitch.there][first]])
 
 
-def _start(measured: Sequence[SampledChannel], layout: Layout) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the states at the first sample, and the standard deviations of those that the filter follows."""
+def _start(
+    measured: Sequence[SampledChannel], layout: Layout, decaying: Collection[str]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the states at the first sample, and the standard deviations of those that the filter follows.
+
+    A velocity that is not measured is taken to be small, unless it is clearly not, or is that of a free decay.
+    """
     start = dict(layout.at_rest)
     first = {(m.sensor.axis.name, m.sensor.is_velocity): m for m in measured}
     errors = {name: _CALM for name in layout.state if name not in DRIFTS}
@@ -288,7 +295,7 @@ def _start(measured: Sequence[SampledChannel], layout: Layout) -> tuple[dict[str
             start[axis.velocity], errors[axis.velocity] = value[0], value[1] + 0.1 * _CALM
         elif (m := first.get((axis.name, False))) and (axis in (HEAVE, YAW) or len(layout.axes) == 1):
             _, speeds = velocities(m.channel)
-            if len(speeds) and abs(speeds[0]) > 2.0 * _CALM:  # the vehicle moves already
+            if len(speeds) and (axis.name in decaying or abs(speeds[0]) > 2.0 * _CALM):
                 start[axis.velocity], errors[axis.velocity] = float(speeds[0]), _CALM + 0.5 * abs(float(speeds[0]))
         position = DRIFTS[axis.place]
         if not axis.is_rotation and position in layout.state:
