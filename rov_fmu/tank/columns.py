@@ -164,9 +164,8 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
         if axis and quantity.axis == axis:
             short = "velocity" if quantity.is_velocity else axis.position
         also = (name,) if short != name else ()
-        column = replace(
-            quantity.column, also=(*quantity.also, *also), minimum=None, maximum=None
-        )  # checked after marks are left out
+        # `read_log` checks the bounds after the marks of no measurement are left out.
+        column = replace(quantity.column, also=(*quantity.also, *also), minimum=None, maximum=None)
         columns.setdefault(short, LogColumn(column, Entry(name, quantity)))  # the distance along the axis comes first
     return columns
 

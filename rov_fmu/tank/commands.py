@@ -235,10 +235,10 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
 
 def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
     """Return the other vehicles whose depth or position has a topic of the same name and type as that of a vehicle."""
-    gives_place = [message.kind for message in MESSAGES if message.gives in (POSITION, "depth")]
+    gives_place = [message for message in MESSAGES if message.gives in (POSITION, "depth")]
     places: dict[tuple[str, str], set[str]] = {}
     for source in (topic.source for topic in topics if vehicle):
-        if any(re.fullmatch(kind, source.kind) for kind in gives_place):
+        if any(re.fullmatch(one.kind, source.kind) and re.search(one.topic, source.topic) for one in gives_place):
             places.setdefault((source.kind, source.topic.removeprefix(f"/{source.vehicle}/")), set()).add(
                 source.vehicle
             )

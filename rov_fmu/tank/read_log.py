@@ -136,7 +136,8 @@ def _meant(
                 converted = np.array([*map(entry.convert, numbers.tolist())]) if entry.convert else values
                 told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
                 if quantity := entry.quantity:
-                    _check_bounds(path, field, quantity, converted)
+                    if not topic.source.kind:
+                        _check_bounds(path, field, quantity, converted)
                     source = replace(topic.source, topic=field)
                     channels += of_scalar(quantity, source, topic.time, converted)
                 elif told.any():
@@ -147,7 +148,7 @@ def _meant(
 
 
 def _check_bounds(path: Path, field: str, quantity: Quantity, values: Array) -> None:
-    """Raise DataFileError for numbers beyond the bounds of a quantity."""
+    """Raise DataFileError for numbers in a table beyond the bounds of a quantity."""
     beyond = values[(values < quantity.minimum) | (values > quantity.maximum)]
     if len(beyond):
         allowed = f"must be within {quantity.minimum:g} ... {quantity.maximum:g} {quantity.unit}"

@@ -45,6 +45,7 @@ _IDLE_PULSE = 100.0
 _FEWEST_WORKING = 3
 """The least number of numbered outputs that never rest and are taken as commands of thrusters."""
 _NO_THRUSTER = 2
+"""The grade of a header that names no thruster."""
 _NO_COMMAND = {"rc", "rcin", "max", "min", "limit", "n", "kgf", "lbf", *NOT_COMMANDED}
 """Words in headers that are no commands: of a pilot, limits, and forces."""
 _NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
@@ -138,16 +139,17 @@ def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array], layouts:
 
     Outputs are numbered: if one is a command, then so are the others of its name, unit and range.
     """
-    possible = {title: _family(title) for title in meant if _may_be_command(title, numbers[title])}
-    sure = [title for title in possible if _is_command(title, numbers[title], meant[title])]
-    families = {possible[title]: _are_pulses(numbers[title]) for title in sure} | dict.fromkeys(
-        (family for family in {*possible.values()} if _work_all_the_time(possible, numbers, family)), True
-    )
-    found = [
-        title
-        for title, family in possible.items()
-        if title in sure or ("#" in family[0] and families.get(family) is _are_pulses(numbers[title]))
-    ]
+    possible = [title for title in meant if _may_be_command(title, numbers[title])]
+    sure = {title for title in possible if _is_command(title, numbers[title], meant[title])}
+    families: dict[tuple[str, str, bool], list[str]] = {}
+    for title in possible:
+        name, unit = header_parts(title)
+        families.setdefault((re.sub(r"\d+", "#", name), unit, _are_pulses(numbers[title])), []).append(title)
+    for (name, _, are_pulses), own in families.items():
+        is_sure = not sure.isdisjoint(own) or (are_pulses and _work_all_the_time([numbers[title] for title in own]))
+        if "#" in name and is_sure:
+            sure.update(own)
+    found = [title for title in possible if title in sure]
     best = min(map(_grade, found), default=0)
     found = [title for title in found if _grade(title) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
     ends = {name: _ends(numbers[title]) for name, title in zip(_names(found), found, strict=True)}
@@ -176,12 +178,6 @@ def likely_thrusters(
 
 def _ends(numbers: Array) -> tuple[float, float]:
     return float(numbers.min()), float(numbers.max())
-
-
-def _family(title: str) -> tuple[str, str]:
-    """Return what numbered outputs share: the name with # for its numbers, and the unit."""
-    name, unit = header_parts(title)
-    return re.sub(r"\d+", "#", name), unit
 
 
 def _grade(title: str) -> int:
@@ -273,12 +269,9 @@ def _is_command(title: str, numbers: Array, meant: str) -> bool:
     return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
 
 
-def _work_all_the_time(
-    possible: Mapping[str, tuple[str, str]], numbers: Mapping[str, Array], family: tuple[str, str]
-) -> bool:
+def _work_all_the_time(outputs: Iterable[Array]) -> bool:
     """Return True for several outputs in whole microseconds on both sides of the usual neutral pulse."""
-    own = [numbers[title] for title in possible if possible[title] == family]
-    working = [values for values in own if values.min() < NEUTRAL < values.max()]
+    working = [values for values in outputs if values.min() < NEUTRAL < values.max()]
     whole = all(_within(values, _USUAL_PULSES) and (values == np.round(values)).all() for values in working)
     return len(working) >= _FEWEST_WORKING and whole
 

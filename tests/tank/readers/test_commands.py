@@ -59,10 +59,11 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         "[logs] of rov.toml names another', 'log: the commands of the thrusters are those of /rov_a/cmd', ",
     ),
     "another vehicle without commands": (
-        f"/b/odom {ODOMETRY} b . x=1; /a/odom {ODOMETRY} a . x=1; /a/cmd {ARRAY} a . data[0]=0,1; /c/z/odom {ODOMETRY} c . x=1",
+        f"/b/odom {ODOMETRY} b . x=1; /a/odom {ODOMETRY} a . x=1; /a/cmd {ARRAY} a . data[0]=0,1; "
+        f"/c/z/odom {ODOMETRY} c . x=1",
         "a",
         "",
-        "/a/cmd: a 0 1: | log: the log has the vehicles a and b. a is used; `vehicle` in [logs] of rov.toml names another",
+        "/a/cmd: a 0 1: | log: the log has the vehicles a and b. a is used; `vehicle` in [logs] of rov.toml names",
     ),
     "a named vehicle": (VEHICLES, "a", "vehicle=rov_b", "/rov_b/cmd: a 0 -1: | rov_b is used"),
     "an unknown vehicle": (
