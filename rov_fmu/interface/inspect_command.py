@@ -66,7 +66,7 @@ def inspect_logs(path: Path) -> Inspected:
         raise DataFileError(f"{path}: {NO_FILE}")
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / _BAG).is_file() else folder
-    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE
+    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).exists() else NO_ROV_FILE
     layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
     inspections: list[Inspection] = []
     mistakes: list[str] = []

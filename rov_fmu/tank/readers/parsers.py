@@ -21,8 +21,8 @@ import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
 from rov_fmu.io.csv_table import LARGEST, DataFileError, UnreadableFileError
-from rov_fmu.io.messages import NO_FILE, brief, listed
-from rov_fmu.io.reading import read_lines
+from rov_fmu.io.messages import brief, listed
+from rov_fmu.io.reading import open_file, read_lines
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import read_bag, read_mcap
 from rov_fmu.tank.readers.content import Content
@@ -69,13 +69,8 @@ _MAVLINK_STARTS = (b"\xfe", b"\xfd")
 
 def format_of(path: Path) -> Format:
     """Return the format of a log by its first bytes. Raises DataFileError for a file that is none."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(1024)
-    except FileNotFoundError:
-        raise DataFileError(f"{path}: {NO_FILE}") from None
-    except OSError as error:
-        raise UnreadableFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    with open_file(path, UnreadableFileError) as file:
+        head = file.read(1024)
     if not head:
         raise UnreadableFileError(f"{path}: the file is empty")
     for beginning, kind in _BEGINNINGS.items():
