@@ -96,7 +96,7 @@ def _processor() -> str:
 def _write(folder: Path, key: str, content: bytes) -> Path:
     """Write a library whole or not at all. Another process may write the same library at the same time."""
     path = folder / _name(key, content)
-    write_whole(Output(path, content))
+    write_whole(Output(path, content), force=True)
     return path
 
 
